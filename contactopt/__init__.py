@@ -1,4 +1,5 @@
-"""contactopt: frictional contact between elastic bodies as mathematical programs, with certified answers.
+"""contactopt: frictional contact between elastic bodies as mathematical programs, with certified
+answers.
 
     >>> import contactopt
     >>> result = contactopt.run("punch-2d", mu=0.3)
@@ -6,7 +7,8 @@
     >>> solution = contactopt.solve(problem, tol=1e-10)
     >>> contactopt.natural_map_residual(problem, solution.reactions)
 
-Names are loaded when first used: `import contactopt` costs nothing, scikit-fem and cvxpy only what needs them.
+Names are loaded when first used: `import contactopt` costs nothing, scikit-fem and cvxpy only what
+needs them.
 """
 
 from importlib import import_module
@@ -28,11 +30,26 @@ if TYPE_CHECKING:
     from contactopt.methods.diagnosis import Diagnosis, diagnose
     from contactopt.methods.driver import solve
     from contactopt.methods.enumeration import all_solutions
-    from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual, siconos_residual
+    from contactopt.problem import (
+        InterfaceProblem,
+        Solution,
+        Status,
+        natural_map_residual,
+        siconos_residual,
+    )
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
     from contactopt.scenes.contact import Contact
-    from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.scenes.scene import (
+        BodyForce,
+        HalfSpace,
+        Part,
+        Plate,
+        Rigid,
+        Scene,
+        Support,
+        Traction,
+    )
     from contactopt.simplification.findings import Simplification, Simplified
     from contactopt.simplification.search import simplify
     from contactopt.solving.paths import PathResult, follow
@@ -52,13 +69,28 @@ _HOMES = {
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
     "coupling.reduction": ("reduce", "reduce_bodies"),
-    "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual", "siconos_residual"),
+    "problem": (
+        "InterfaceProblem",
+        "Solution",
+        "Status",
+        "natural_map_residual",
+        "siconos_residual",
+    ),
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),
     "scenes.contact": ("Contact",),
     "meshes.mesh_files": ("load_mesh",),
-    "scenes.scene": ("BodyForce", "HalfSpace", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
+    "scenes.scene": (
+        "BodyForce",
+        "HalfSpace",
+        "Part",
+        "Plate",
+        "Rigid",
+        "Scene",
+        "Support",
+        "Traction",
+    ),
     "methods.driver": ("solve",),
 }
 _MODULES = {

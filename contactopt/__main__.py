@@ -20,11 +20,13 @@ def main() -> int:
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)
         code = INTERRUPTED
-    except BrokenPipeError:  # the program that reads the output, such as `head`, wants no more of it
+    # the program that reads the output, such as `head`, wants no more of it
+    except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
     if code == INTERRUPTED:
-        # CPython ends itself by SIGINT instead, if the interrupt came within exec() of a text, as dataclasses use it.
+        # CPython ends itself by SIGINT instead, if the interrupt came within exec() of a text, as
+        # dataclasses use it.
         atexit._run_exitfuncs()  # such as those that free what processes share
         sys.stdout.flush()
         sys.stderr.flush()

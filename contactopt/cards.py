@@ -11,17 +11,13 @@ def count(number: int, thing: str, things: str = "") -> str:
 
     Parameters
     ----------
-    number
-        How many there are.
-    thing
-        The word for one of them.
-    things
-        The word for several; by default the word for one with an s.
+    number : How many there are.
+    thing : The word for one of them.
+    things : The word for several; by default the word for one with an s.
 
     Returns
     -------
-    str
-        The number and the word.
+    The number and the word.
     """
     return f"{number} {thing if number == 1 else things or thing + 's'}"
 
@@ -31,15 +27,12 @@ def line(name: str, *facts: str) -> str:
 
     Parameters
     ----------
-    name
-        The name of the class.
-    facts
-        What is said of the object. Empty texts are left out.
+    name : The name of the class.
+    facts : What is said of the object. Empty texts are left out.
 
     Returns
     -------
-    str
-        A text such as 'Solution(solved, 3 iterations)'.
+    A text such as 'Solution(solved, 3 iterations)'.
     """
     return f"{name}({', '.join(fact for fact in facts if fact)})"
 
@@ -49,15 +42,12 @@ def card(title: str, rows: Mapping[str, object]) -> str:
 
     Parameters
     ----------
-    title
-        The caption of the table.
-    rows
-        The values by their names, one row each.
+    title : The caption of the table.
+    rows : The values by their names, one row each.
 
     Returns
     -------
-    str
-        The element `table`.
+    The element `table`.
     """
     cells = "".join(
         f'<tr><th scope="row" style="text-align:left">{html.escape(str(name))}</th>'

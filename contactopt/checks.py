@@ -11,28 +11,32 @@ import numpy as np
 
 from contactopt.errors import InputError
 
-RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+RESERVED = {
+    "con",
+    "prn",
+    "aux",
+    "nul",
+    *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)),
+}
 LONGEST_NAME = 100  # characters
 
 
-def check_number(name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False) -> None:
+def check_number(
+    name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False
+) -> None:
     """Check that a value is a finite number in (low, high), or in [low, high) when `closed`.
 
     Parameters
     ----------
-    name
-        What the value is, in the words of the message.
-    value
-        What the user gave.
-    low, high
-        The bounds, which are infinite unless given.
-    closed
-        Whether the lower bound itself is allowed.
+    name : What the value is, in the words of the message.
+    value : What the user gave.
+    low, high : The bounds, which are infinite unless given.
+    closed : Whether the lower bound itself is allowed.
 
     Raises
     ------
-    InputError
-        If the value is no number, is not finite, or lies outside the bounds. Text and masked values are no numbers.
+    InputError : If the value is no number, is not finite, or lies outside the bounds. Text and
+        masked values are no numbers.
     """
     try:
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
@@ -44,7 +48,9 @@ def check_number(name: str, value: float, low: float = -np.inf, high: float = np
             bounds.append(f"{'at least' if closed else 'greater than'} {low:g}")
         if high < np.inf:
             bounds.append(f"less than {high:g}")
-        raise InputError(f"{name} must be a finite number {' and '.join(bounds)}".rstrip() + f"; got {value!r}.")
+        raise InputError(
+            f"{name} must be a finite number {' and '.join(bounds)}".rstrip() + f"; got {value!r}."
+        )
 
 
 def check_memory(what: str, needed: float) -> None:
@@ -52,30 +58,31 @@ def check_memory(what: str, needed: float) -> None:
 
     Parameters
     ----------
-    what
-        What needs the memory, in the words of the message.
-    needed
-        How much it needs at least [bytes].
+    what : What needs the memory, in the words of the message.
+    needed : How much it needs at least [bytes].
 
     Raises
     ------
-    InputError
-        If less is free, as far as the system tells.
+    InputError : If less is free, as far as the system tells.
     """
     free = _free_memory()
     if needed > free:
         raise InputError(
-            f"{what} needs about {needed / 1e9:.2g} GB of memory, more than the {free / 1e9:.2g} GB that are free; take "
-            "fewer elements."
+            f"{what} needs about {needed / 1e9:.2g} GB of memory, more than the {free / 1e9:.2g} GB"
+            " that are free; take fewer elements."
         )
 
 
 def _free_memory() -> float:
-    """What the system and the limits of this process leave [bytes]; infinite where neither is known."""
+    """What the system and the limits of this process leave [bytes]; infinite where neither is
+    known.
+    """
     found = np.inf
     with suppress(OSError, ValueError, StopIteration):
         with open("/proc/meminfo") as file:
-            found = 1024.0 * int(next(line for line in file if line.startswith("MemAvailable")).split()[1])
+            found = 1024.0 * int(
+                next(line for line in file if line.startswith("MemAvailable")).split()[1]
+            )
         with open("/proc/self/statm") as file:
             mapped = os.sysconf("SC_PAGE_SIZE") * int(file.read().split()[0])
         import resource
@@ -92,13 +99,11 @@ def given(value: Any) -> bool:
 
     Parameters
     ----------
-    value
-        An array, a number, a list, or an empty array where nothing was given.
+    value : An array, a number, a list, or an empty array where nothing was given.
 
     Returns
     -------
-    bool
-        True if the value has at least one entry.
+    True if the value has at least one entry.
     """
     try:
         return np.size(value) > 0
@@ -111,13 +116,11 @@ def check_positive(**sizes: float) -> None:
 
     Parameters
     ----------
-    sizes
-        The values by their names, in which _ stands for a space in the message.
+    sizes : The values by their names, in which _ stands for a space in the message.
 
     Raises
     ------
-    InputError
-        If a size is no number, not finite, or not positive.
+    InputError : If a size is no number, not finite, or not positive.
     """
     for name, value in sizes.items():
         check_number(name.replace("_", " "), value, low=0.0)
@@ -128,15 +131,12 @@ def check_count(name: str, value: int) -> None:
 
     Parameters
     ----------
-    name
-        What the value is, in the words of the message.
-    value
-        What the user gave.
+    name : What the value is, in the words of the message.
+    value : What the user gave.
 
     Raises
     ------
-    InputError
-        If the value is no integer or is less than 1. True and False are no integers here.
+    InputError : If the value is no integer or is less than 1. True and False are no integers here.
     """
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
@@ -147,29 +147,30 @@ def real_array(name: str, value: Any) -> np.ndarray:
 
     Parameters
     ----------
-    name
-        What the value is, in the words of the message.
-    value
-        A number, a list of any depth, or an array.
+    name : What the value is, in the words of the message.
+    value : A number, a list of any depth, or an array.
 
     Returns
     -------
-    ndarray
-        The numbers in the shape of the value. They are a copy.
+    The numbers in the shape of the value. They are a copy.
 
     Raises
     ------
-    InputError
-        On text, on rows of different lengths, on complex numbers, and on numbers that are not finite.
+    InputError : On text, on rows of different lengths, on complex numbers, and on numbers that are
+        not finite.
     """
     try:
         array = np.asarray(value)
     except ValueError as error:
-        raise InputError(f"{name} must be an array of numbers; its rows have different lengths.") from error
+        raise InputError(
+            f"{name} must be an array of numbers; its rows have different lengths."
+        ) from error
     if array.dtype.kind == "c":
         raise InputError(f"{name} must be real; got complex numbers.")
     if array.dtype.kind not in "biuf" and array.size:
-        raise InputError(f"{name} must be an array of numbers; got {type(value).__name__} of {array.dtype}.")
+        raise InputError(
+            f"{name} must be an array of numbers; got {type(value).__name__} of {array.dtype}."
+        )
     numbers = np.array(array, dtype=float)
     if not np.all(np.isfinite(numbers)):
         raise InputError(f"{name} holds a number that is not finite.")
@@ -179,21 +180,18 @@ def real_array(name: str, value: Any) -> np.ndarray:
 def check_name(what: str, name: object) -> None:
     """Check that a name can become a file's name in a folder, and can lead to no other folder.
 
-    Refused are names that are no text, empty, longer than 100 characters, or made of dots only; names with a slash, a
-    backslash, a colon or a character that cannot be printed; names that begin or end with a space; and the device
-    names of Windows.
+    Refused are names that are no text, empty, longer than 100 characters, or made of dots only;
+    names with a slash, a backslash, a colon or a character that cannot be printed; names that begin
+    or end with a space; and the device names of Windows.
 
     Parameters
     ----------
-    what
-        What the name belongs to, in the words of the message.
-    name
-        The name that the user gave.
+    what : What the name belongs to, in the words of the message.
+    name : The name that the user gave.
 
     Raises
     ------
-    InputError
-        If the name is refused.
+    InputError : If the name is refused.
     """
     wrong = ""
     if not isinstance(name, str):
@@ -217,15 +215,13 @@ def short(value: object, most: int = 60) -> str:
 
     Parameters
     ----------
-    value
-        Any object.
-    most
-        How many characters may stay as they are. A longer text becomes three quarters of this and three dots.
+    value : Any object.
+    most : How many characters may stay as they are. A longer text becomes three quarters of this
+        and three dots.
 
     Returns
     -------
-    str
-        The text for a message.
+    The text for a message.
     """
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"

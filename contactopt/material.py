@@ -24,30 +24,28 @@ def lame(material: Material) -> tuple[float, float]:
 
     Parameters
     ----------
-    material
-        Young's modulus and Poisson's ratio.
+    material : Young's modulus and Poisson's ratio.
 
     Returns
     -------
-    tuple
-        lambda = E nu / ((1 + nu) (1 - 2 nu)) and the shear modulus G = E / (2 (1 + nu)) [stress].
+    lambda = E nu / ((1 + nu) (1 - 2 nu)) and the shear modulus G = E / (2 (1 + nu)) [stress].
     """
     E, nu = material.E, material.nu
     return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
 
 def lame_by_poisson(material: Material) -> tuple[float, float]:
-    """Compute the derivatives of Lame's parameters by Poisson's ratio. Those by E are (lambda, G) / E.
+    """Compute the derivatives of Lame's parameters by Poisson's ratio.
+
+    Those by E are (lambda, G) / E.
 
     Parameters
     ----------
-    material
-        Young's modulus and Poisson's ratio.
+    material : Young's modulus and Poisson's ratio.
 
     Returns
     -------
-    tuple
-        The derivatives of lambda and of G [stress].
+    The derivatives of lambda and of G [stress].
     """
     E, nu = material.E, material.nu
     below = (1 + nu) * (1 - 2 * nu)

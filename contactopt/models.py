@@ -1,21 +1,25 @@
 """The convex programs of friction in cvxpy, written as on a blackboard.
 
-Signs and letters are those of contactopt.problem: u = Q r + V lambda + q, V' r + s = 0. Every function takes an
-InterfaceProblem, dimensionless or not (backends want it dimensionless), and returns a Program:
+Signs and letters are those of contactopt.problem: u = Q r + V lambda + q, V' r + s = 0. Every
+function takes an InterfaceProblem, dimensionless or not (backends want it dimensionless), and
+returns a Program:
 
     normal           forces r_n of contact without friction, or with r_t given (paper, eq (21))
     displacements    the dual of `normal`: gaps and approach instead of forces
     penalised        `normal` with a spring in every contact: penetration instead of a constraint
     bilateral        `normal` without separation: r_n of any sign
-    tangential       friction forces under given bounds, r_n given (eq (22)): intervals, discs or polygons
+    tangential       friction forces under given bounds, r_n given (eq (22)): intervals, discs or
+                     polygons
     tresca           normal and tangential forces together, friction bounds given
     associated       convex relaxation of Coulomb's law: slip opens the gap by mu |u_t|
     acary_cadoux     the same with the gap shifted by mu s; Coulomb's law where s = |u_t|
 
-Discs and cones become polygons and pyramids with `facets`, which makes the last four QPs also in 3D.
+Discs and cones become polygons and pyramids with `facets`, which makes the last four QPs also in
+3D.
 
-All are convex because Q is positive semidefinite; that is the caller's promise (contactopt.methods.backends.conic checks it by
-Cholesky), since cvxpy's own test of it fails at random on large matrices.
+All are convex because Q is positive semidefinite; that is the caller's promise
+(contactopt.methods.backends.conic checks it by Cholesky), since cvxpy's own test of it fails at
+random on large matrices.
 """
 
 from __future__ import annotations
@@ -36,10 +40,12 @@ Reader = Callable[[], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A cvxpy problem with its variables and parameters by name; solve with `program.problem.solve(solver=...)`.
+    """A cvxpy problem with its variables and parameters by name; solve with
+    `program.problem.solve(solver=...)`.
 
-    multipliers  after a solve, by name and with the signs of contactopt.problem: "gap" u_n (k,), "slip" u_t (k, d - 1),
-                 "approach" lambda of the plates (p,), ...; each function says which. InputError before a solve.
+    multipliers  after a solve, by name and with the signs of contactopt.problem: "gap" u_n (k,),
+                 "slip" u_t (k, d - 1), "approach" lambda of the plates (p,), ...; each function
+                 says which. InputError before a solve.
     """
 
     problem: Any
@@ -59,75 +65,77 @@ def normal(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
+    problem : Any interface problem; backends want it dimensionless.
 
     Returns
     -------
-    Program
-        Variable r_n (k,). Parameter r_t (k (dim - 1),), zero unless it is set. Multipliers "gap" (k,), and "approach"
-        of the plates whose motion has a normal part.
+    Variable r_n (k,). Parameter r_t (k (dim - 1),), zero unless it is set. Multipliers "gap" (k,),
+    and "approach" of the plates whose motion has a normal part.
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     push = r >= 0
     readers = {"gap": lambda: _dual(push)} | readers
-    return Program(cp.Problem(cp.Minimize(cost), [push, *balance]), {"r_n": r}, {"r_t": r_t}, readers)
+    return Program(
+        cp.Problem(cp.Minimize(cost), [push, *balance]), {"r_n": r}, {"r_t": r_t}, readers
+    )
 
 
 def displacements(problem: InterfaceProblem) -> Program:
-    """min (u - q_n - V_n lambda)' S (u - q_n - V_n lambda) / 2 - s' lambda   subject to  u >= 0,  S = Q_nn^-1.
+    """min (u - q_n - V_n lambda)' S (u - q_n - V_n lambda) / 2 - s' lambda   subject to  u >= 0,  S
+    = Q_nn^-1.
 
-    The elastic energy minus the work of the loads, in displacements. The optimal value is minus that of `normal` at
-    r_t = 0.
+    The elastic energy minus the work of the loads, in displacements. The optimal value is minus
+    that of `normal` at r_t = 0.
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
+    problem : Any interface problem; backends want it dimensionless.
 
     Returns
     -------
-    Program
-        Variables u, the gap (k,), and lambda, the approach (p,). Multiplier "reaction", r_n = S (u - q_n - V_n
-        lambda).
+    Variables u, the gap (k,), and lambda, the approach (p,). Multiplier "reaction", r_n = S (u -
+    q_n - V_n lambda).
 
     Raises
     ------
-    InputError
-        If Q_nn is singular, because displacements do not determine forces then.
+    InputError : If Q_nn is singular, because displacements do not determine forces then.
     """
     dim = problem.dim
     try:
-        S = la.cho_solve(la.cho_factor(_symmetric(problem.Q[::dim, ::dim])), np.eye(problem.contacts))
+        S = la.cho_solve(
+            la.cho_factor(_symmetric(problem.Q[::dim, ::dim])), np.eye(problem.contacts)
+        )
     except la.LinAlgError as error:
-        raise InputError("the normal compliance is singular, so use the program in forces, `normal`.") from error
+        raise InputError(
+            "the normal compliance is singular, so use the program in forces, `normal`."
+        ) from error
     u, plates, V = cp.Variable(problem.contacts, name="u"), _pushing(problem), problem.V[::dim]
     variables, stretch, work = {"u": u}, u - problem.q[:, 0], 0
     if plates.any():
         variables["lambda"] = lam = cp.Variable(plates.sum(), name="lambda")
         stretch, work = stretch - V[:, plates] @ lam, problem.s[plates] @ lam
     apart = u >= 0
-    program = cp.Problem(cp.Minimize(cp.quad_form(stretch, cp.psd_wrap(_symmetric(S))) / 2 - work), [apart])
+    program = cp.Problem(
+        cp.Minimize(cp.quad_form(stretch, cp.psd_wrap(_symmetric(S))) / 2 - work), [apart]
+    )
     return Program(program, variables, {}, {"reaction": lambda: _dual(apart)})
 
 
 def penalised(problem: InterfaceProblem, stiffness: float = 1e3) -> Program:
     """`normal` plus |r_n|^2 / (2 stiffness): bodies may penetrate, r_n = stiffness max(-u_n, 0).
 
-    This is the dual of penalising max(-u_n, 0)^2 in displacements. The penetration falls like 1 / stiffness.
+    This is the dual of penalising max(-u_n, 0)^2 in displacements. The penetration falls like 1 /
+    stiffness.
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
-    stiffness
-        Of each contact node [force / length].
+    problem : Any interface problem; backends want it dimensionless.
+    stiffness : Of each contact node [force / length].
 
     Returns
     -------
-    Program
-        Variable r_n (k,). Parameters r_t (k (dim - 1),) and compliance = 1 / stiffness. Multipliers "gap", negative
-        where the bodies penetrate, and "approach".
+    Variable r_n (k,). Parameters r_t (k (dim - 1),) and compliance = 1 / stiffness. Multipliers
+    "gap", negative where the bodies penetrate, and "approach".
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     compliance = cp.Parameter(nonneg=True, value=1 / stiffness)
@@ -144,37 +152,33 @@ def bilateral(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
+    problem : Any interface problem; backends want it dimensionless.
 
     Returns
     -------
-    Program
-        Variable r_n (k,) of any sign. Parameter r_t (k (dim - 1),). Multiplier "approach".
+    Variable r_n (k,) of any sign. Parameter r_t (k (dim - 1),). Multiplier "approach".
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     return Program(cp.Problem(cp.Minimize(cost), balance), {"r_n": r}, {"r_t": r_t}, readers)
 
 
 def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
-    """min r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t   subject to  |r_t| <= g at each contact.
+    """min r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t   subject to  |r_t| <= g at each
+    contact.
 
-    Plates that only move tangentially belong to this program, V_t' r_t + s = 0. The approach lambda of the others is
-    given.
+    Plates that only move tangentially belong to this program, V_t' r_t + s = 0. The approach lambda
+    of the others is given.
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
-    facets
-        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
-        2D.
+    problem : Any interface problem; backends want it dimensionless.
+    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
+        which are intervals in 2D.
 
     Returns
     -------
-    Program
-        Variable r_t (k (dim - 1),). Parameters r_n (k,), g (k,) and approach. Multipliers "slip" u_t, and "shift" of
-        the tangential plates.
+    Variable r_t (k (dim - 1),). Parameters r_n (k,), g (k,) and approach. Multipliers "slip" u_t,
+    and "shift" of the tangential plates.
     """
     n, t = _components(problem)
     plates, V = _pushing(problem), problem.V[t]
@@ -185,60 +189,64 @@ def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
         parameters["approach"] = cp.Parameter(plates.sum())
         c = c + V[:, plates] @ parameters["approach"]
     balance, shift = _balance(V[:, ~plates].T @ r + problem.s[~plates], "shift")
-    law, slip, _ = _friction(cp.reshape(r, (problem.dim - 1, len(n)), order="F"), parameters["g"], facets)
+    law, slip, _ = _friction(
+        cp.reshape(r, (problem.dim - 1, len(n)), order="F"), parameters["g"], facets
+    )
     cost = cp.quad_form(r, cp.psd_wrap(_symmetric(problem.Q[np.ix_(t, t)]))) / 2 + c @ r
-    return Program(cp.Problem(cp.Minimize(cost), [law, *balance]), {"r_t": r}, parameters, {"slip": slip} | shift)
+    return Program(
+        cp.Problem(cp.Minimize(cost), [law, *balance]),
+        {"r_t": r},
+        parameters,
+        {"slip": slip} | shift,
+    )
 
 
 def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
-    """min r' Q r / 2 + q' r   subject to  r_n >= 0 where contacts may open,  |r_t| <= g,  V' r + s = 0.
+    """min r' Q r / 2 + q' r   subject to  r_n >= 0 where contacts may open,  |r_t| <= g,  V' r + s
+    = 0.
 
     This is Tresca's law where g is its limit, and Coulomb's law where g = mu |r_n|.
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
-    facets
-        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
-        2D.
+    problem : Any interface problem; backends want it dimensionless.
+    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
+        which are intervals in 2D.
 
     Returns
     -------
-    Program
-        Variable r (k dim,), normal first in each block. Parameter g (k,). Multipliers "gap", "slip" and "approach".
+    Variable r (k dim,), normal first in each block. Parameter g (k,). Multipliers "gap", "slip" and
+    "approach".
     """
     r, r_n, r_t, cost, balance, approach = _parts(problem)
     g = cp.Parameter(problem.contacts, nonneg=True)
     law, slip, _ = _friction(r_t, g, facets)
     push, gap = _push(r_n, problem.law.lowest == 0)
     readers = {"gap": gap, "slip": slip} | approach
-    return Program(cp.Problem(cp.Minimize(cost), [*push, law, *balance]), {"r": r}, {"g": g}, readers)
+    return Program(
+        cp.Problem(cp.Minimize(cost), [*push, law, *balance]), {"r": r}, {"g": g}, readers
+    )
 
 
 def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r' Q r / 2 + q' r   subject to  r in Coulomb's cones |r_t| <= mu r_n,  V' r + s = 0.
 
-    Its optimality conditions are those of friction with an associated flow rule: contacts that slip also open, by u_n
-    = mu |u_t|.
+    Its optimality conditions are those of friction with an associated flow rule: contacts that slip
+    also open, by u_n = mu |u_t|.
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
-    facets
-        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
-        2D.
+    problem : Any interface problem; backends want it dimensionless.
+    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
+        which are intervals in 2D.
 
     Returns
     -------
-    Program
-        Variable r (k dim,). Multipliers "gap" (so opened), "slip" and "approach".
+    Variable r (k dim,). Multipliers "gap" (so opened), "slip" and "approach".
 
     Raises
     ------
-    InputError
-        If the law has no such cones.
+    InputError : If the law has no such cones.
     """
     return _over_cones(problem, None, facets)
 
@@ -246,28 +254,24 @@ def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
 def acary_cadoux(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r' Q r / 2 + (q + mu s n)' r   subject to  r in Coulomb's cones,  V' r + s_plates = 0.
 
-    At its solution u_n + mu s is at least mu |u_t|, so that Coulomb's law holds where s = |u_t|. Source: Acary,
-    Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via convex
-    optimization.
+    At its solution u_n + mu s is at least mu |u_t|, so that Coulomb's law holds where s = |u_t|.
+    Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb
+    friction problem via convex optimization.
 
     Parameters
     ----------
-    problem
-        Any interface problem; backends want it dimensionless.
-    facets
-        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
-        2D.
+    problem : Any interface problem; backends want it dimensionless.
+    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
+        which are intervals in 2D.
 
     Returns
     -------
-    Program
-        Variable r (k dim,). Parameter s (k,), zero unless it is set. Multipliers "gap" u_n, "slip" u_t and
-        "approach".
+    Variable r (k dim,). Parameter s (k,), zero unless it is set. Multipliers "gap" u_n, "slip" u_t
+    and "approach".
 
     Raises
     ------
-    InputError
-        If the law has no such cones.
+    InputError : If the law has no such cones.
     """
     s = cp.Parameter(problem.contacts, nonneg=True, value=np.zeros(problem.contacts))
     return _over_cones(problem, s, facets)
@@ -276,20 +280,20 @@ def acary_cadoux(problem: InterfaceProblem, facets: int | None = None) -> Progra
 def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dict[str, Any]]:
     """min t' Q t / 2 + c' t   subject to  |t_i| <= g_i at each contact i,  A t = b.
 
-    This is `tangential` for one matrix and many c, g and b: build it once, set the parameters and solve many times.
+    This is `tangential` for one matrix and many c, g and b: build it once, set the parameters and
+    solve many times.
 
     Parameters
     ----------
-    Q
-        (2k, 2k) symmetric positive semidefinite; the caller checks that, because cvxpy's own check is unreliable.
-    A
-        (p, 2k) rows of the balance.
+    Q : (2k, 2k) symmetric positive semidefinite; the caller checks that, because cvxpy's own check
+        is unreliable.
+    A : (p, 2k) rows of the balance.
 
     Returns
     -------
-    (problem, variable, parameters)
-        The cvxpy problem, its variable t (2k,), and its parameters c (2k,), g (k,) and b (p,) by name. The
-        multipliers of A t = b are the dual value of the last constraint.
+    (problem, variable, parameters) : The cvxpy problem, its variable t (2k,), and its parameters c
+        (2k,), g (k,) and b (p,) by name. The multipliers of A t = b are the dual value of the last
+        constraint.
     """
     k, p = len(Q) // 2, len(A)
     t = cp.Variable(2 * k, name="t")
@@ -303,25 +307,32 @@ def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dic
 
 
 def as_conic(program: Program) -> dict[str, Any]:
-    """The data of min x' P x / 2 + q' x  subject to  A x + y = b,  y in cones: zero, nonnegative, second-order, in
+    """The data of min x' P x / 2 + q' x  subject to  A x + y = b,  y in cones: zero, nonnegative,
+    second-order, in
     this order.
 
     Parameters
     ----------
-    program
-        Its parameters must have values.
+    program : Its parameters must have values.
 
     Returns
     -------
-    dict
-        Keys P, q, A, b (P and A sparse, P with both triangles), zero and nonneg (numbers of rows), soc (list of
-        dimensions), and columns: name of a variable -> its slice of x.
+    Keys P, q, A, b (P and A sparse, P with both triangles), zero and nonneg (numbers of rows), soc
+    (list of dimensions), and columns: name of a variable -> its slice of x.
     """
     data, _, _ = program.problem.get_problem_data(cp.CLARABEL)
     dims, first = data["dims"], data["param_prob"].var_id_to_col
-    columns = {name: slice(first[v.id], first[v.id] + v.size) for name, v in program.variables.items()}
+    columns = {
+        name: slice(first[v.id], first[v.id] + v.size) for name, v in program.variables.items()
+    }
     cones = {"zero": int(dims.zero), "nonneg": int(dims.nonneg), "soc": [int(d) for d in dims.soc]}
-    return {"P": data["P"], "q": data["c"], "A": data["A"], "b": data["b"], "columns": columns} | cones
+    return {
+        "P": data["P"],
+        "q": data["c"],
+        "A": data["A"],
+        "b": data["b"],
+        "columns": columns,
+    } | cones
 
 
 def as_qp(program: Program) -> Any:
@@ -329,24 +340,24 @@ def as_qp(program: Program) -> Any:
 
     Parameters
     ----------
-    program
-        Its parameters must have values.
+    program : Its parameters must have values.
 
     Returns
     -------
-    qpsolvers.Problem
-        Its x is ordered as in as_conic().
+    Its x is ordered as in as_conic().
 
     Raises
     ------
-    InputError
-        If the program has second-order cones.
+    InputError : If the program has second-order cones.
     """
     import qpsolvers
 
     conic = as_conic(program)
     if conic["soc"]:
-        raise InputError("the program has second-order cones, so it is no QP: use as_conic, or polygons (facets=...).")
+        raise InputError(
+            "the program has second-order cones, so it is no QP: use as_conic, or polygons"
+            " (facets=...)."
+        )
     A, b, zero = conic["A"].toarray(), conic["b"], conic["zero"]
     equal = {"A": A[:zero], "b": b[:zero]} if zero else {}
     less = {"G": A[zero:], "h": b[zero:]} if conic["nonneg"] else {}
@@ -380,7 +391,9 @@ def _normal_parts(problem: InterfaceProblem) -> tuple[Any, Any, list[Any], dict[
 
 
 def _parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, list[Any], dict[str, Reader]]:
-    """Variable r, its normal part (k,) and tangential part (dim - 1, k), cost, balance, its multiplier by name."""
+    """Variable r, its normal part (k,) and tangential part (dim - 1, k), cost, balance, its
+    multiplier by name.
+    """
     r = cp.Variable(problem.q.size, name="r")
     blocks = cp.reshape(r, (problem.dim, problem.contacts), order="F")
     balance, approach = _balance(problem.V.T @ r + problem.s, "approach")
@@ -390,7 +403,9 @@ def _parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, list[Any], di
 
 def _over_cones(problem: InterfaceProblem, s: Any, facets: int | None) -> Program:
     if not (problem.law.unilateral and problem.law.proportional):
-        raise InputError("this law has no cone of forces |r_t| <= mu r_n: use `tresca` or `bilateral`.")
+        raise InputError(
+            "this law has no cone of forces |r_t| <= mu r_n: use `tresca` or `bilateral`."
+        )
     r, r_n, r_t, cost, balance, approach = _parts(problem)
     law, slip, size = _friction(r_t, cp.multiply(problem.mu, r_n), facets)
     push = r_n >= 0  # follows from the cone unless mu = 0
@@ -398,13 +413,17 @@ def _over_cones(problem: InterfaceProblem, s: Any, facets: int | None) -> Progra
         cost = cost + cp.multiply(problem.mu, s) @ r_n
     gap = lambda: _dual(push) + problem.mu * (size() - (0 if s is None else s.value))  # noqa: E731
     program = cp.Problem(cp.Minimize(cost), [push, law, *balance])
-    return Program(program, {"r": r}, {} if s is None else {"s": s}, {"gap": gap, "slip": slip} | approach)
+    return Program(
+        program, {"r": r}, {} if s is None else {"s": s}, {"gap": gap, "slip": slip} | approach
+    )
 
 
 def _friction(t: Any, g: Any, facets: int | None = None) -> tuple[Any, Reader, Reader]:
-    """|t_i| <= g_i for the columns of t (d, k), the reader of the slip u_t (k, d) and that of the multiplier of g (k,).
+    """|t_i| <= g_i for the columns of t (d, k), the reader of the slip u_t (k, d) and that of the
+    multiplier of g (k,).
 
-    Intervals are polygons with two facets. Polygons are inscribed: they never allow more friction than the disc.
+    Intervals are polygons with two facets. Polygons are inscribed: they never allow more friction
+    than the disc.
     """
     d, k = t.shape
     if d == 2 and facets is None:
@@ -415,13 +434,18 @@ def _friction(t: Any, g: Any, facets: int | None = None) -> tuple[Any, Reader, R
     D, reach = np.array([[1.0], [-1.0]]), 1.0
     if d == 2:
         angle = 2 * np.pi * np.arange(facets or 0) / (facets or 1)
-        D, reach = np.stack([np.cos(angle), np.sin(angle)], axis=1), float(np.cos(np.pi / (facets or 1)))
+        D, reach = (
+            np.stack([np.cos(angle), np.sin(angle)], axis=1),
+            float(np.cos(np.pi / (facets or 1))),
+        )
     polygon = D @ t <= reach * np.ones((len(D), 1)) @ cp.reshape(g, (1, k), order="F")
     return polygon, lambda: -_dual(polygon).T @ D, lambda: reach * _dual(polygon).sum(axis=0)
 
 
 def _push(r_n: Any, apart: np.ndarray) -> tuple[list[Any], Reader]:
-    """r_n >= 0 at the contacts that may open, a mask (k,), and the reader of the gap (k,), zero at the others."""
+    """r_n >= 0 at the contacts that may open, a mask (k,), and the reader of the gap (k,), zero at
+    the others.
+    """
     if not apart.any():
         return [], lambda: np.zeros(len(apart))
     push = (r_n if apart.all() else r_n[np.flatnonzero(apart)]) >= 0

@@ -40,18 +40,28 @@ if TYPE_CHECKING:
 
 Note = Callable[[str], None]
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
-PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
+PATH_KEYS = (
+    "approach",
+    "shift",
+    "shear_force",
+    "contact_half_width",
+    "stick_half_width",
+    "friction_work",
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
+    """A solved scene.
 
-    `summary["seconds"]` holds the wall time [s] of each phase: those of the solution (see contactopt.solving.solve_scene),
-    `recover` of the fields, `figures` and `files` where some were asked for, and `total` of the whole run.
+    `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
 
-    `path` holds all states of a scene that has a load path; the rest of the result is then that of the last state.
-    `estimate` is what refinement to an asked accuracy found.
+    `summary["seconds"]` holds the wall time [s] of each phase: those of the solution (see
+    contactopt.solving.solve_scene), `recover` of the fields, `figures` and `files` where some were
+    asked for, and `total` of the whole run.
+
+    `path` holds all states of a scene that has a load path; the rest of the result is then that of
+    the last state. `estimate` is what refinement to an asked accuracy found.
     """
 
     scene: Scene
@@ -68,7 +78,15 @@ class Result:
         states = "" if self.path is None else count(len(self.path.states), "state")
         contacts = count(s["contact_nodes"], "contact")
         aim = "" if self.estimate is None else repr(self.estimate)
-        return line("Result", self.scene.name, s["status"], f"residual {s['residual']:.1e}", contacts, states, aim)
+        return line(
+            "Result",
+            self.scene.name,
+            s["status"],
+            f"residual {s['residual']:.1e}",
+            contacts,
+            states,
+            aim,
+        )
 
     def _repr_html_(self) -> str:
         s, (length, stress) = self.summary, self.scene.units
@@ -84,13 +102,16 @@ class Result:
                 rows[key.replace("_", " ")] = f"{s[key]:.6g} {length}"
         if self.estimate is not None:
             rows[self.estimate.quantity] = f"{self.estimate.value:.6g}; {self.estimate.message}"
-            rows["meshes"] = "; ".join(f"{level.unknowns}: {level.value:.6g}" for level in self.estimate.levels)
+            rows["meshes"] = "; ".join(
+                f"{level.unknowns}: {level.value:.6g}" for level in self.estimate.levels
+            )
         return card(f"{self.scene.name}, {self.scene.friction}", rows)
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
         """Write the result as one page to explore in a browser, and open it.
 
-        The page needs no network and nothing but the browser (contactopt.figures.view_page says what is on it).
+        The page needs no network and nothing but the browser (contactopt.figures.view_page says
+        what is on it).
 
         Parameters
         ----------
@@ -103,7 +124,8 @@ class Result:
 
         Raises
         ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or if the file cannot be written
+        InputError : if plotly is not installed, which the page takes its drawing program from, or
+            if the file cannot be written
         """
         import tempfile
         import webbrowser
@@ -164,32 +186,38 @@ def run(
 
     Parameters
     ----------
-    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one (PATHS); a scene file, whose
-        name ends in .toml; or a Scene
+    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one
+        (PATHS); a scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     method, normal, tangential : names; by default `auto`, or `alternating` if a backend is named
-    preconditioner : a name in contactopt.methods.preconditioners, of methods that take products with Q; it selects
-        Q = 'implicit'
+    preconditioner : a name in contactopt.methods.preconditioners, of methods that take products
+        with Q; it selects Q = 'implicit'
     Q, solver : form of Q and solver of the bodies, see reduce(); 'auto' by default
     tol : bound on the natural-map residual; 1e-8 by default
     elements : across the contact half-width
-    accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
-        sentence in `Result.estimate` says why not; `elements` only scales the first mesh
-    quantity : a name of contactopt.derivatives.outputs; of one of several pairs of surfaces 'NAME:PAIR'; or one of
-        contactopt.readings.places, such as 'von_mises:BODY:BOUNDARY' or 'pressure@X,Y'
-    adaptive : whether meshes are refined only where the quantity needs it (contactopt.accuracy), each body by itself, and not
-        everywhere; quadrilaterals become triangles
-    max_unknowns, time_limit, max_memory : bounds on the search for the accuracy: unknowns of a mesh, seconds and GB of all. No
-        further mesh is begun that would pass one; the result is then the best answer so far, with its estimate
-        All arguments from `method` to here may stand in a scene file; those given here win.
-    simplest : whether all that can be left out exactly is left out first: halves across planes of symmetry, the third dimension of
-        plates between rollers (contactopt.simplify). The certificate of the whole proves it on the first mesh, or the whole is
-        solved. `Result.scene` is what was solved
-    figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn, which saves half of the time
-        of a small scene
-    html : whether to write view.html too, the result as a page to explore (needs `pip install 'contactopt[view]'`)
+    accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it
+        is met, or until a sentence in `Result.estimate` says why not; `elements` only scales the
+        first mesh
+    quantity : a name of contactopt.derivatives.outputs; of one of several pairs of surfaces
+        'NAME:PAIR'; or one of contactopt.readings.places, such as 'von_mises:BODY:BOUNDARY' or
+        'pressure@X,Y'
+    adaptive : whether meshes are refined only where the quantity needs it (contactopt.accuracy),
+        each body by itself, and not everywhere; quadrilaterals become triangles
+    max_unknowns, time_limit, max_memory : bounds on the search for the accuracy: unknowns of a
+        mesh, seconds and GB of all. No further mesh is begun that would pass one; the result is
+        then the best answer so far, with its estimate All arguments from `method` to here may stand
+        in a scene file; those given here win.
+    simplest : whether all that can be left out exactly is left out first: halves across planes of
+        symmetry, the third dimension of plates between rollers (contactopt.simplify). The
+        certificate of the whole proves it on the first mesh, or the whole is solved. `Result.scene`
+        is what was solved
+    figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn,
+        which saves half of the time of a small scene
+    html : whether to write view.html too, the result as a page to explore (needs `pip install
+        'contactopt[view]'`)
     note : receives progress messages
-    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies live in this process
+    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
+        live in this process
     changes : to the arguments of a named scene, or to the fields of a Scene
 
     Returns
@@ -198,7 +226,8 @@ def run(
 
     Raises
     ------
-    InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
+    InputError : on input that cannot be used, with a sentence that says what to do; nothing is left
+        half-written
     """
     start = time.perf_counter()
     files = _wanted_files(figures, html)
@@ -223,9 +252,12 @@ def run(
         {name: value for name, value in bounds.items() if value is not None},
     )
     chosen = find_method(method, **given)
-    backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
+    # refused here, before any work, if one of them cannot be used
+    backends = chosen.backends(states[-1].dim)
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
-    options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    options = Options(
+        form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note
+    )
     known = None
     if simplest:
         states, known = _simplest(states, options)
@@ -233,7 +265,9 @@ def run(
     if team is not None:
         idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
         if idle > 0:
-            note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
+            note(
+                f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies"
+            )
         states = tuple(spread(state, team) for state in states)
     try:
         known = known if team is None and aim is None else None
@@ -249,15 +283,19 @@ def _too_large(scene: Scene, why: str) -> str:
     bodies = count(len(scene.parts), "body", "bodies")
     held = f"{resident_memory() / 1e9:.2g} GB were taken when more was asked for"
     return (
-        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than there is: "
-        f"{held}{f' ({why})' if why else ''}; take fewer elements."
+        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than"
+        f" there is: {held}{f' ({why})' if why else ''}; take fewer elements."
     )
 
 
 def _wanted_files(figures: Sequence[str], html: bool) -> tuple[str, ...]:
-    """The formats of the figures, and 'html' for the page; InputError, before any work, for what cannot be written."""
+    """The formats of the figures, and 'html' for the page; InputError, before any work, for what
+    cannot be written.
+    """
     if isinstance(figures, str) or not set(figures) <= set(FORMATS):
-        raise InputError(f"figures must be formats of {', '.join(FORMATS)}, or () for none; got {figures!r}.")
+        raise InputError(
+            f"figures must be formats of {', '.join(FORMATS)}, or () for none; got {figures!r}."
+        )
     if html:
         from contactopt.figures.view_page import check_installed
 
@@ -287,7 +325,14 @@ def _finish(
         fields = recover(solved.reduction, solved.solution)
     summary = _summary(solved, names[0], names[1:], path, estimate)
     made = Result(
-        solved.reduction.scene, solved.reduction, solved.solution, fields, solved.zones, summary, path, estimate
+        solved.reduction.scene,
+        solved.reduction,
+        solved.solution,
+        fields,
+        solved.zones,
+        summary,
+        path,
+        estimate,
     )
     if out is None:
         return replace(made, summary=summary | _seconds(seconds, start))
@@ -353,12 +398,16 @@ def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
     return (_states(scene, changes) if file is None else _states_of_file(file, changes))[-1]
 
 
-def _simplest(states: tuple[Scene, ...], options: Options) -> tuple[tuple[Scene, ...], Solved | None]:
-    """The scene after all exact simplifications, and its solution, which proved them on its first mesh."""
+def _simplest(
+    states: tuple[Scene, ...], options: Options
+) -> tuple[tuple[Scene, ...], Solved | None]:
+    """The scene after all exact simplifications, and its solution, which proved them on its first
+    mesh.
+    """
     if len(states) > 1:
         raise InputError(
-            f"scene '{states[0].name}' has a load path, whose states would all have to be symmetric; ask contactopt.simplify "
-            "for each state."
+            f"scene '{states[0].name}' has a load path, whose states would all have to be"
+            " symmetric; ask contactopt.simplify for each state."
         )
     from contactopt.simplification.search import proved_part
 
@@ -370,12 +419,17 @@ def _form(Q: str, preconditioner: str | None) -> str:
     if preconditioner is None:
         return Q
     if Q == "explicit":
-        raise InputError("a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop one of them.")
+        raise InputError(
+            "a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop one of"
+            " them."
+        )
     return "implicit"
 
 
 class Aim(NamedTuple):
-    """An accuracy to be reached: the bound, what it bounds, whether meshes are refined only where that needs it, and limits."""
+    """An accuracy to be reached: the bound, what it bounds, whether meshes are refined only where
+    that needs it, and limits.
+    """
 
     accuracy: float
     quantity: str
@@ -383,15 +437,20 @@ class Aim(NamedTuple):
     limits: Limits
 
 
-def _aim(accuracy: float | None, quantity: str | None, adaptive: bool, bounds: dict[str, Any]) -> Aim | None:
+def _aim(
+    accuracy: float | None, quantity: str | None, adaptive: bool, bounds: dict[str, Any]
+) -> Aim | None:
     if (accuracy is None) != (quantity is None):
-        raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
+        raise InputError(
+            "accuracy and quantity belong together: the bound, and the name of what it bounds."
+        )
     if accuracy is None or quantity is None:
         if adaptive:
             raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
         if bounds:
             raise InputError(
-                "bounds on unknowns, time and memory end the search for an accuracy: give an accuracy and a quantity."
+                "bounds on unknowns, time and memory end the search for an accuracy: give an"
+                " accuracy and a quantity."
             )
         return None
     return Aim(accuracy, quantity, adaptive, Limits(**bounds))
@@ -417,7 +476,9 @@ def _summary(
     path: PathResult | None,
     estimate: Estimate | None,
 ) -> dict[str, Any]:
-    """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
+    """What is known of the answer but for the seconds: half-widths and pressure are the quantities
+    that accuracy bounds.
+    """
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
     found = tables(reduction, solution)
@@ -448,25 +509,34 @@ def _summary(
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": [*remarks(reduction, solution), *beyond, *([] if peak is None else _smoothed(peak, largest))],
+        "remarks": [
+            *remarks(reduction, solution),
+            *beyond,
+            *([] if peak is None else _smoothed(peak, largest)),
+        ],
         **found,
         "limits": limits,
     }
     if path is not None:
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
-        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in keys}
+        summary |= {"states": len(path.states)} | {
+            key: float(path.history[key][-1]) for key in keys
+        }
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
     return summary
 
 
 def _smoothed(peak: Reading, largest: float) -> list[str]:
-    """One sentence where the largest pressure at a node and the one that is read around it are not the same."""
+    """One sentence where the largest pressure at a node and the one that is read around it are not
+    the same.
+    """
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
-        f"the largest pressure at a node is {largest:.4g}, what its neighbours let expect is {peak.value:.4g}, give or take "
-        f"{peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
+        f"the largest pressure at a node is {largest:.4g}, what its neighbours let expect is"
+        f" {peak.value:.4g}, give or take {peak.uncertainty:.2g}: refine the meshes there, or ask"
+        " for an accuracy."
     ]
 
 

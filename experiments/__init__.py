@@ -1,6 +1,7 @@
 """What is asked of the package and what is taught with it.
 
-questions/  one question each: `python -m experiments.questions.NAME` answers it and writes reports/NAME/;
+questions/  one question each: `python -m experiments.questions.NAME` answers it and writes
+            reports/NAME/;
 campaigns/  experiment files of `contactopt bench`, which compare methods over problems;
 tutorials/  scripts that are also notebooks and pages of the documentation;
 site/       the documentation;

@@ -1,4 +1,6 @@
-"""What every experiment writes: reports/NAME/report.md, its table as CSV with the environment, its figures."""
+"""What every experiment writes: reports/NAME/report.md, its table as CSV with the environment, its
+figures.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,10 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "qpsolvers", "cvxpy", "clarabel", "p
 def environment() -> str:
     """Python, packages and machine, in one line."""
     packages = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
-    return f"Python {platform.python_version()}, {packages}; {platform.machine()}, {os.cpu_count()} cores"
+    return (
+        f"Python {platform.python_version()}, {packages}; {platform.machine()}, {os.cpu_count()}"
+        " cores"
+    )
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:
@@ -38,7 +43,10 @@ def write(
     tables: dict[str, list[dict[str, Any]]],
     figures: dict[str, Any],
 ) -> None:
-    """Write reports/name/ with its report. `text` is Markdown in which {table} stands for the table of that name."""
+    """Write reports/name/ with its report.
+
+    `text` is Markdown in which {table} stands for the table of that name.
+    """
     folder = REPORTS / name
     folder.mkdir(parents=True, exist_ok=True)
     for stem, rows in tables.items():
@@ -57,8 +65,12 @@ def write(
     print(path.read_text())
 
 
-def merged(name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, Any]]:
-    """The committed table of an experiment with these rows in place of those that have the same values of `keys`."""
+def merged(
+    name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, ...]
+) -> list[dict[str, Any]]:
+    """The committed table of an experiment with these rows in place of those that have the same
+    values of `keys`.
+    """
     path = REPORTS / name / f"{table}.csv"
     if not path.exists():
         return rows

@@ -1,4 +1,6 @@
-"""A headless Chromium that opens a page, answers questions about it and takes pictures, over its debugging protocol."""
+"""A headless Chromium that opens a page, answers questions about it and takes pictures, over its
+debugging protocol.
+"""
 
 import asyncio
 import base64
@@ -11,7 +13,9 @@ import time
 import urllib.request
 from pathlib import Path
 
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
+)
 OPTIONS = (
     "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--remote-debugging-port=0",
@@ -29,7 +33,9 @@ class Browser:
 
         self.folder = tempfile.mkdtemp()
         command = [CHROMIUM, *OPTIONS, f"--user-data-dir={self.folder}", "about:blank"]
-        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
         port = Path(self.folder, "DevToolsActivePort")
         end = time.time() + 60
         while not (port.exists() and port.read_text().strip()):
@@ -37,7 +43,9 @@ class Browser:
             time.sleep(0.1)
         number = port.read_text().split()[0]
         with urllib.request.urlopen(f"http://127.0.0.1:{number}/json") as answer:
-            address = next(tab["webSocketDebuggerUrl"] for tab in json.load(answer) if tab["type"] == "page")
+            address = next(
+                tab["webSocketDebuggerUrl"] for tab in json.load(answer) if tab["type"] == "page"
+            )
         self.loop, self.numbers = asyncio.new_event_loop(), itertools.count(1)
 
         async def connect():
@@ -47,7 +55,13 @@ class Browser:
         for domain in ("Runtime", "Log", "Page"):
             self.call(f"{domain}.enable")
         width, height = self.size
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
         self.call("Page.navigate", url=self.file.resolve().as_uri())
         return self
 
@@ -63,14 +77,19 @@ class Browser:
 
     async def _call(self, method, arguments):
         number = next(self.numbers)
-        await self.socket.write_message(json.dumps({"id": number, "method": method, "params": arguments}))
+        await self.socket.write_message(
+            json.dumps({"id": number, "method": method, "params": arguments})
+        )
         while True:
             message = json.loads(await self.socket.read_message())
             if message.get("method") == "Runtime.exceptionThrown":
-                self.faults.append(message["params"]["exceptionDetails"]["exception"].get("description", "?"))
+                self.faults.append(
+                    message["params"]["exceptionDetails"]["exception"].get("description", "?")
+                )
             if message.get("method") in ("Log.entryAdded", "Runtime.consoleAPICalled"):
                 entry = message["params"].get(
-                    "entry", {"level": message["params"].get("type"), "text": message["params"].get("args")}
+                    "entry",
+                    {"level": message["params"].get("type"), "text": message["params"].get("args")},
                 )
                 if entry["level"] == "error":
                     self.faults.append(str(entry["text"]))
@@ -80,7 +99,9 @@ class Browser:
 
     def ask(self, expression):
         """The value of a JavaScript expression."""
-        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        result = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
@@ -94,10 +115,15 @@ class Browser:
     def press(self, key):
         for kind in ("keyDown", "keyUp"):
             self.call(
-                "Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 and kind == "keyDown" else ""
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key=key,
+                text=key if len(key) == 1 and kind == "keyDown" else "",
             )
 
     def picture(self, file, whole=True):
         """A PNG of the window, or of the whole page."""
-        data = self.call("Page.captureScreenshot", captureBeyondViewport=whole, format="png")["data"]
+        data = self.call("Page.captureScreenshot", captureBeyondViewport=whole, format="png")[
+            "data"
+        ]
         Path(file).write_bytes(base64.b64decode(data))

@@ -11,18 +11,25 @@ MATERIAL = Material(5.0, 0.3)
 
 
 def one_contact(force: tuple[float, float], mu: float) -> InterfaceProblem:
-    """K u = f - (t, n) with K = [[1, 1.5], [1.5, 4]] (order tangential, normal), as Q r + q = u with normal first."""
+    """K u = f - (t, n) with K = [[1, 1.5], [1.5, 4]] (order tangential, normal), as Q r + q = u
+    with normal first.
+    """
     W = np.linalg.inv(np.array([[1.0, 1.5], [1.5, 4.0]]))
     swap = [1, 0]
     return InterfaceProblem(W[np.ix_(swap, swap)], [-(W @ force)[swap]], mu)
 
 
 def block(kind: str, low: float, high: float, cells: int = 4, width: float = 1.0):
-    """Unit-wide block between two heights: square, cylinder's section or cube; boundaries side0.., top, bottom."""
+    """Unit-wide block between two heights: square, cylinder's section or cube; boundaries side0..,
+    top, bottom.
+    """
     across = np.linspace(0.0, width, cells + 1) ** 1.3  # uneven on purpose
     grids = [across] * (2 if kind == "solid" else 1)
     up = "z" if kind == "solid" else "y"
-    names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {"top": f"{up}+", "bottom": f"{up}-"}
+    names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {
+        "top": f"{up}+",
+        "bottom": f"{up}-",
+    }
     return rename(tensor_mesh(*grids, np.linspace(low, high, cells)), **names)
 
 
@@ -32,9 +39,16 @@ def two_blocks(kind: str, force: float = 3.0, mu: float = 0.0, material=MATERIAL
     sides = tuple(Support(f"side{i}", {c: 0.0}) for i, c in enumerate(components[:-1]))
     up = components[-1]
     upper = Part(
-        "upper", block(kind, 0, 1), material, sides, (Plate("top", {up: -force}, glued=False),), contact="bottom"
+        "upper",
+        block(kind, 0, 1),
+        material,
+        sides,
+        (Plate("top", {up: -force}, glued=False),),
+        contact="bottom",
     )
-    lower = Part("lower", block(kind, -2, 0), material, (*sides, Support("bottom", {up: 0.0})), contact="top")
+    lower = Part(
+        "lower", block(kind, -2, 0), material, (*sides, Support("bottom", {up: 0.0})), contact="top"
+    )
     return Scene(f"two blocks, {kind}", upper, lower, mu, kind=kind)
 
 

@@ -52,16 +52,30 @@ def lower_carries(scene: Any, pair: Any, upper: Any, lower: Any) -> Coupling:
     return couple_surfaces(scene, replace(pair, carrier="lower"), upper, lower)
 
 
-def couple(scene: Any, own: str | None = None, elements: int | None = None, zone: float | None = None) -> Coupled:
+def couple(
+    scene: Any, own: str | None = None, elements: int | None = None, zone: float | None = None
+) -> Coupled:
     name = "mortar" if own is None else f"{own}_carries"
-    kinds = {f"{side}_carries": ("mortar_scenes", f"{side}_carries", "") for side in ("upper", "lower")}
+    kinds = {
+        f"{side}_carries": ("mortar_scenes", f"{side}_carries", "") for side in ("upper", "lower")
+    }
     with patch.dict(COUPLINGS, kinds):
         reduction = reduce_bodies(scene, elements, zone, coupling=name)
     parts, sides = (scene.upper, scene.lower), []
     for b, p in zip((r.body for r in reduction.bodies), parts):
         facets = b.basis.mesh.boundaries[p.contact]
         faces = face_nodes(b.basis, b.degree, facets)
-        sides.append(faces_of(b.name, b.basis.mesh.refdom.__name__, b.degree, *faces, b.weight, b.locations, p.curve))
+        sides.append(
+            faces_of(
+                b.name,
+                b.basis.mesh.refdom.__name__,
+                b.degree,
+                *faces,
+                b.weight,
+                b.locations,
+                p.curve,
+            )
+        )
     return Coupled(reduction, mortar(*sides, own))
 
 
@@ -76,17 +90,35 @@ def resultants(forces: list[np.ndarray], points: list[np.ndarray]) -> tuple[np.n
 
 
 def slab(
-    kind: str, low: float, high: float, cells: int, start: float = 0.0, end: float = 1.0, power: float = 1.3
+    kind: str,
+    low: float,
+    high: float,
+    cells: int,
+    start: float = 0.0,
+    end: float = 1.0,
+    power: float = 1.3,
 ) -> Any:
-    """Two layers of elements between two heights and two places, `cells` of uneven width; boundaries as conftest.block."""
-    grids = [start + (end - start) * np.linspace(0.0, 1.0, cells + 1) ** power] * (2 if kind == "solid" else 1)
+    """Two layers of elements between two heights and two places, `cells` of uneven width;
+    boundaries as conftest.block.
+    """
+    grids = [start + (end - start) * np.linspace(0.0, 1.0, cells + 1) ** power] * (
+        2 if kind == "solid" else 1
+    )
     up = "z" if kind == "solid" else "y"
-    names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {"top": f"{up}+", "bottom": f"{up}-"}
+    names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {
+        "top": f"{up}+",
+        "bottom": f"{up}-",
+    }
     return rename(tensor_mesh(*grids, np.linspace(low, high, 3)), **names)
 
 
-def ring(inner: float, outer: float, layers: int, sectors: int, angle: float, curved: bool = False) -> Any:
-    """A ring or a part of it from angle 0 on; boundaries inner, outer, start, end. `curved`: of isoparametric elements."""
+def ring(
+    inner: float, outer: float, layers: int, sectors: int, angle: float, curved: bool = False
+) -> Any:
+    """A ring or a part of it from angle 0 on; boundaries inner, outer, start, end.
+
+    `curved`: of isoparametric elements.
+    """
     full = angle > 2 * np.pi - 1e-9
     mesh = tensor_mesh(np.linspace(inner, outer, layers + 1), np.linspace(0, angle, sectors + 1))
     names = {"inner": "x-", "outer": "x+", "start": "y-", "end": "y+"}
@@ -109,7 +141,9 @@ def ring(inner: float, outer: float, layers: int, sectors: int, angle: float, cu
     return closed.with_boundaries(
         {
             name: lambda x, radius=radius: (
-                np.hypot(*x) < radius * 1.0001 if radius == inner else np.hypot(*x) > (inner + 3 * outer) / 4
+                np.hypot(*x) < radius * 1.0001
+                if radius == inner
+                else np.hypot(*x) > (inner + 3 * outer) / 4
             )
             for name, radius in (("inner", inner), ("outer", size.max()))
         }
@@ -117,9 +151,17 @@ def ring(inner: float, outer: float, layers: int, sectors: int, angle: float, cu
 
 
 def press_fit(
-    sectors: tuple[int, int], degree: int, interference: float, kept: bool, curved: bool, kind: str = "", mu=0.0
+    sectors: tuple[int, int],
+    degree: int,
+    interference: float,
+    kept: bool,
+    curved: bool,
+    kind: str = "",
+    mu=0.0,
 ):
-    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2; `kept`: the true circles are known."""
+    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2; `kept`: the true circles are
+    known.
+    """
     material = Material(5.0, 0.3)
     sides = (Support("start", {"y": 0.0}), Support("end", {"x": 0.0}))
 

@@ -28,9 +28,12 @@ def stack(
     material=None,
     **more,
 ):
-    """`count` blocks of height one on a rigid floor. `side` and `weight` are forces per volume, along x and downwards.
+    """`count` blocks of height one on a rigid floor.
 
-    cells[i] is the number of elements along each side of block i, order a permutation of the bodies.
+    `side` and `weight` are forces per volume, along x and downwards.
+
+    cells[i] is the number of elements along each side of block i, order a permutation of the
+    bodies.
     """
     kind = kind or ("plane-strain" if dim == 2 else "solid")
     force = [0.0] * dim
@@ -41,7 +44,9 @@ def stack(
         low, high = [0.0] * (dim - 1) + [float(i)], [width] * (dim - 1) + [i + 1.0]
         mesh = block(low, high, [cells[i % len(cells)]] * dim)
         made = material or Material(1000.0, 0.3)
-        bodies.append(Part(f"block{i}", mesh, made, loads=(BodyForce(tuple(force)),), contact="bottom"))
+        bodies.append(
+            Part(f"block{i}", mesh, made, loads=(BodyForce(tuple(force)),), contact="bottom")
+        )
         contacts.append(Contact(f"block{i}", f"block{i - 1}:top" if i else "floor", mu))
     chosen = bodies if order is None else [bodies[i] for i in order]
     return Scene("stack", bodies=tuple(chosen), contacts=tuple(contacts), kind=kind, **more)

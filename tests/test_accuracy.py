@@ -40,8 +40,10 @@ def test_the_remainder_of_a_power_of_the_mesh_size_is_exact(order):
 
 
 def test_the_remainder_does_not_trust_luck():
-    assert remainder(1.0, 1e-6, 2)[0] == pytest.approx(1 / 12)  # what second order leaves of the difference before
-    assert remainder(1.0, 0.9, 2)[0] == pytest.approx(0.9 / (2**0.75 - 1))  # no slower than order 3/4
+    # what second order leaves of the difference before
+    assert remainder(1.0, 1e-6, 2)[0] == pytest.approx(1 / 12)
+    # no slower than order 3/4
+    assert remainder(1.0, 0.9, 2)[0] == pytest.approx(0.9 / (2**0.75 - 1))
     rest, order = remainder(1.0, -0.1, 2)
     assert rest == pytest.approx(-0.25) and order is None
     assert remainder(None, 0.3, 2) == (pytest.approx(0.1), None)
@@ -53,7 +55,9 @@ def test_the_remainder_does_not_trust_luck():
 
 def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
     sphere = scenes.sphere()
-    coarse, fine = (scene.upper.build_mesh(8, 20.0) for scene in (sphere, split_scene(sphere, 8, 1)))
+    coarse, fine = (
+        scene.upper.build_mesh(8, 20.0) for scene in (sphere, split_scene(sphere, 8, 1))
+    )
     assert fine.nelements == 4 * coarse.nelements
     assert set(fine.boundaries) == set(coarse.boundaries)
     nodes = np.unique(fine.facets[:, fine.boundaries["contact"]])
@@ -73,7 +77,9 @@ def test_split_of_a_flat_mesh_stays_flat():
 
 
 def test_the_fitted_peak_is_hertz_where_the_axis_node_is_not():
-    scene = scenes.sphere(mu=0.0, radius=4000, foundation_radius=8000, foundation_height=8000, rigid="sphere")
+    scene = scenes.sphere(
+        mu=0.0, radius=4000, foundation_radius=8000, foundation_height=8000, rigid="sphere"
+    )
     reduction = reduce_bodies(scene, 32, scene.reference.half_width)
     solution = solve(reduction.problem)
     nodal = solution.reactions[0, 0] / reduction.problem.areas[0]
@@ -94,7 +100,9 @@ def test_the_peak_of_an_exact_ellipse_is_exact():
 
 
 def test_clapeyron():
-    """Without gap and loads but a plate's, the elastic energy is half the plate's work, which friction shares."""
+    """Without gap and loads but a plate's, the elastic energy is half the plate's work, which
+    friction shares.
+    """
     reduction = reduce_bodies(punch())
     solution = solve(reduction.problem, tol=1e-12)
     work = 100 * value_of("approach", reduction, solution)
@@ -108,7 +116,9 @@ def test_quantities_in_3d_agree_with_the_plane():
     reduction = reduce_bodies(scenes.cattaneo(3, elements=6))
     solution = solve(reduction.problem)
     assert not at_rim(reduction, solution)
-    assert peak_pressure(reduction, solution) == pytest.approx(reduction.scene.reference.peak, rel=0.05)
+    assert peak_pressure(reduction, solution) == pytest.approx(
+        reduction.scene.reference.peak, rel=0.05
+    )
 
 
 # Refinement
@@ -120,7 +130,10 @@ def test_refinement_meets_the_target_from_coarse_to_fine():
     fine, second = refine([scene], "approach", 2e-3)
     assert first.reached and second.reached and second.error <= 2e-3
     assert fine.reduction.dofs > rough.reduction.dofs
-    assert fine.reduction.dofs == second.levels[-1].unknowns and second.levels[-1].value == second.value
+    assert (
+        fine.reduction.dofs == second.levels[-1].unknowns
+        and second.levels[-1].value == second.value
+    )
     truth = refine([scene], "approach", 5e-4)[1].extrapolated
     assert 0.5 < second.error / abs(second.value / truth - 1) < 4
     assert abs(second.extrapolated / truth - 1) < abs(second.value / truth - 1) / 2
@@ -139,9 +152,15 @@ def test_a_quantity_that_does_not_converge_is_given_up(monkeypatch):
         return Reading((s.reactions[:, 0] / reduction.problem.areas).max())
 
     monkeypatch.setitem(READINGS, "corner", corner)
-    monkeypatch.setitem(ROWS, "corner", ("", lambda name, rest, scene: Quantity(name, None, corner)))
+    monkeypatch.setitem(
+        ROWS, "corner", ("", lambda name, rest, scene: Quantity(name, None, corner))
+    )
     _, estimate = refine([punch()], "corner", 1e-3)
-    assert not estimate.reached and "does not converge" in estimate.message and len(estimate.levels) < 7
+    assert (
+        not estimate.reached
+        and "does not converge" in estimate.message
+        and len(estimate.levels) < 7
+    )
 
 
 def test_a_limit_on_unknowns(monkeypatch):
@@ -174,7 +193,9 @@ def test_given_meshes_are_halved():
 
 def test_given_meshes_of_solids_are_divided_too():
     _, estimate = refine([two_blocks("solid")], "approach", 0.1, limits=Limits(6000))
-    assert len(estimate.levels) > 1 and estimate.levels[-1].unknowns > 4 * estimate.levels[0].unknowns
+    assert (
+        len(estimate.levels) > 1 and estimate.levels[-1].unknowns > 4 * estimate.levels[0].unknowns
+    )
 
 
 def test_a_load_path_is_refined_as_a_whole():
@@ -195,7 +216,16 @@ def test_units_do_not_matter():
 
 
 def test_command_line(tmp_path, capsys):
-    arguments = ["run", "punch-2d", "--out", str(tmp_path), "--accuracy", "0.02", "--quantity", "energy"]
+    arguments = [
+        "run",
+        "punch-2d",
+        "--out",
+        str(tmp_path),
+        "--accuracy",
+        "0.02",
+        "--quantity",
+        "energy",
+    ]
     assert cli.main(arguments) == 0
     text = capsys.readouterr().out
     assert "estimated relative error" in text and "below the target" in text
@@ -212,7 +242,10 @@ def test_command_line(tmp_path, capsys):
     [
         ({"accuracy": 0.1}, "accuracy and quantity belong together"),
         ({"quantity": "energy"}, "accuracy and quantity belong together"),
-        ({"accuracy": 0.1, "quantity": "noise"}, "choose from pressure.*, width.*, approach, stick.*, energy"),
+        (
+            {"accuracy": 0.1, "quantity": "noise"},
+            "choose from pressure.*, width.*, approach, stick.*, energy",
+        ),
         ({"accuracy": 0.0, "quantity": "energy"}, "the accuracy must be a finite number"),
     ],
 )
@@ -223,7 +256,9 @@ def test_bad_input(changes, words):
 
 def test_a_scene_without_a_plate_has_no_approach():
     base = two_blocks("plane-strain")
-    driven = replace(base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1})))
+    driven = replace(
+        base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1}))
+    )
     with pytest.raises(InputError, match="no plate, hence no approach"):
         run(replace(base, upper=driven), accuracy=0.1, quantity="approach")
 
@@ -260,7 +295,8 @@ def test_effectivity_at_a_singular_edge(mu):
 def test_effectivity_of_the_stick_ratio(kind, mu):
     row = effectivity(scenes.rigid_punch(kind, mu=mu), "stick", 1e-2)
     assert abs(row["true error"]) <= 1e-2 and row["effectivity"] >= 0.5
-    # At mu = .5 contacts slip on a ring of 2 to 6 % of the half-width, at the corner, which a few contacts resolve. Their
+    # At mu = .5 contacts slip on a ring of 2 to 6 % of the half-width, at the corner, which a few
+    # contacts resolve. Their
     # distance bounds what can be claimed there, however near the reading comes.
     assert row["effectivity"] <= (4 if mu == 0.3 else 15)
 
@@ -282,25 +318,37 @@ def test_hertz_within_a_thousandth_on_5000_unknowns(kind):
     reduction, solution = solved.reduction, solved.solution
     assert reduction.dofs <= 5000
     for quantity in ("pressure", "width"):
-        assert value_of(quantity, reduction, solution) == pytest.approx(exact(scene)[quantity], rel=1e-3)
+        assert value_of(quantity, reduction, solution) == pytest.approx(
+            exact(scene)[quantity], rel=1e-3
+        )
 
 
 def test_a_quantity_of_one_of_several_pairs():
     """A cylinder on a block, and elsewhere a block on a floor: the cylinder's pressure is Hertz's."""
     round_one = scenes.cylinder(mu=0.0, force=30.0)
-    mesh = rename(tensor_mesh(np.linspace(0, 2, 3), np.linspace(0, 1, 3)), axis="x-", contact="y-", top="y+")
+    mesh = rename(
+        tensor_mesh(np.linspace(0, 2, 3), np.linspace(0, 1, 3)), axis="x-", contact="y-", top="y+"
+    )
     plate = Plate("top", {"y": -1.0}, glued=False)
     block = Part("block", mesh, Material(5.0, 0.3), (Support("axis", {"x": 0.0}),), (plate,))
     names = round_one.upper.name, round_one.lower.name
     pairs = Contact(*names, 0.0), Contact("block", "floor", 0.3)
     scene = replace(
-        round_one, upper=None, lower=None, mu=None, bodies=(*round_one.parts, block, Rigid("floor")), contacts=pairs
+        round_one,
+        upper=None,
+        lower=None,
+        mu=None,
+        bodies=(*round_one.parts, block, Rigid("floor")),
+        contacts=pairs,
     )
     result = run(scene, accuracy=0.1, quantity="pressure:" + "-".join(names), figures=())
     assert result.estimate.reached
     assert result.estimate.value == pytest.approx(round_one.reference.peak, rel=0.02)
     for wrong, message in (
-        ("pressure", "2 pairs of surfaces, each with its own pressure and half-widths; name the pair"),
+        (
+            "pressure",
+            "2 pairs of surfaces, each with its own pressure and half-widths; name the pair",
+        ),
         ("pressure:a-b", "there is no pair of surfaces 'a-b'; the pairs are .*, block-floor"),
         ("energy:block-floor", "the energy belongs to the whole scene"),
     ):

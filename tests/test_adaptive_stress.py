@@ -1,4 +1,6 @@
-"""Local refinement for stresses: exact values are met, corners are recognised, bounds hold, the history is kept."""
+"""Local refinement for stresses: exact values are met, corners are recognised, bounds hold, the
+history is kept.
+"""
 
 import json
 
@@ -33,16 +35,20 @@ def tube_stress(scene):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_stress_at_a_bore_is_that_of_lame(degree):
-    """The bore is no contact and has no curve: its nodes lie on a circle, and new nodes are put on it.
+    """The bore is no contact and has no curve: its nodes lie on a circle, and new nodes are put on
+    it.
 
-    Estimates do not see that edges are chords of the circles: the errors are twice what was asked for.
+    Estimates do not see that edges are chords of the circles: the errors are twice what was asked
+    for.
     """
     scene = make_scene("press-fit", degree=degree)
     _, estimate = locally(scene, "von_mises:shaft:inner", 1e-2)
     assert estimate.reached and estimate.value == pytest.approx(tube_stress(scene), rel=0.02)
     assert np.linalg.norm(estimate.levels[-1].place) == pytest.approx(10.0, rel=1e-6)
     component = locally(scene, "stress_xx:shaft@0,10", 1e-2)[1]
-    assert component.value == pytest.approx(-tube_stress(scene) / np.sqrt(1 - 0.3 + 0.3**2), rel=0.02)
+    assert component.value == pytest.approx(
+        -tube_stress(scene) / np.sqrt(1 - 0.3 + 0.3**2), rel=0.02
+    )
 
 
 def test_whole_meshes_serve_stresses_as_well():
@@ -56,18 +62,26 @@ def test_whole_meshes_serve_stresses_as_well():
 
 
 def angle_bracket():
-    """An L of the skfem documentation, its re-entrant corner at the origin, clamped above and pressed on a floor."""
+    """An L of the skfem documentation, its re-entrant corner at the origin, clamped above and
+    pressed on a floor.
+    """
     mesh = skfem.MeshTri.init_lshaped().refined(1)
     names = {"floor": lambda x: x[1] == -1, "top": lambda x: (x[1] == 1) & (x[0] <= 0)}
     part = Part(
-        "bracket", mesh.with_boundaries(names), MATERIAL, loads=(Plate("top", {"x": 0.02, "y": -0.2}),), contact="floor"
+        "bracket",
+        mesh.with_boundaries(names),
+        MATERIAL,
+        loads=(Plate("top", {"x": 0.02, "y": -0.2}),),
+        contact="floor",
     )
     return Scene("bracket", part, Rigid("floor", (0.0, 1.0)), mu=0.6)
 
 
 def test_a_re_entrant_corner_is_recognised_and_said():
     solved, estimate = locally(angle_bracket(), "von_mises:bracket@0,0,radius=0.5", 0.02)
-    assert not estimate.reached and "re-entrant corner" in estimate.message and solved.solution.solved
+    assert (
+        not estimate.reached and "re-entrant corner" in estimate.message and solved.solution.solved
+    )
     assert np.linalg.norm(estimate.levels[-1].place) < 0.2 and len(estimate.levels) < 10
     assert locally(angle_bracket(), "von_mises:bracket@-0.5,0.1", 0.02)[1].reached
 
@@ -95,12 +109,18 @@ def test_arcs_are_told_from_polygons():
         x = np.array([polar.p[0] * np.cos(polar.p[1]), stretch * polar.p[0] * np.sin(polar.p[1])])
         mesh = skfem.MeshTri(x, polar.t)
         mesh = mesh.with_boundaries(
-            {"inner": mesh.facets_satisfying(lambda x, s=stretch: np.hypot(x[0], x[1] / s) < 1.1, True)}
+            {
+                "inner": mesh.facets_satisfying(
+                    lambda x, s=stretch: np.hypot(x[0], x[1] / s) < 1.1, True
+                )
+            }
         )
         curves.append(boundary_curve(mesh, "inner", arcs=True))
         assert boundary_curve(mesh, "inner") is not None
     between = 0.97 * np.array([np.cos(angle[:-1] + 0.1), np.sin(angle[:-1] + 0.1)])
-    assert curves[1] is None and np.allclose(np.linalg.norm(curves[0](between), axis=0), 1.0, atol=1e-12)
+    assert curves[1] is None and np.allclose(
+        np.linalg.norm(curves[0](between), axis=0), 1.0, atol=1e-12
+    )
 
 
 def test_bent_edges_follow_the_circle():
@@ -108,9 +128,13 @@ def test_bent_edges_follow_the_circle():
     disc = skfem.MeshTri.init_circle(2)
     mesh = disc.with_boundaries({"rim": disc.boundary_facets()})
     curved = bent(mesh, {"rim": boundary_curve(mesh, "rim")})
-    straight, along = (skfem.Basis(made, skfem.ElementTriP1(), intorder=4).dx.sum() for made in (mesh, curved))
+    straight, along = (
+        skfem.Basis(made, skfem.ElementTriP1(), intorder=4).dx.sum() for made in (mesh, curved)
+    )
     assert abs(straight / np.pi - 1) > 0.02 and abs(along / np.pi - 1) < 2e-4
-    assert np.array_equal(curved.boundaries["rim"], mesh.boundaries["rim"]) and np.array_equal(curved.t, mesh.t)
+    assert np.array_equal(curved.boundaries["rim"], mesh.boundaries["rim"]) and np.array_equal(
+        curved.t, mesh.t
+    )
     assert bent(mesh, {}) is mesh
 
 
@@ -120,7 +144,9 @@ def test_a_quarter_model_whose_nodes_do_not_match_knows_its_planes():
 
 
 def ball(size):
-    """A rigid ball of radius 20 on a quarter of a block of even tetrahedra: the contact has a radius of about one."""
+    """A rigid ball of radius 20 on a quarter of a block of even tetrahedra: the contact has a
+    radius of about one.
+    """
     ticks = np.linspace(0, 12, round(12 / size) + 1)
     names = {
         "top": lambda x: x[2] == 0,
@@ -132,12 +158,18 @@ def ball(size):
     held = (Support("bottom"), Support("x", {"x": 0.0}), Support("y", {"y": 0.0}))
     block = Part("block", mesh, MATERIAL, held, contact="top")
     force = 4 * MATERIAL.E / (1 - MATERIAL.nu**2) / 60
-    rigid = Rigid("ball", (0.0, 0.0, 1.0), lambda x: (x[0] ** 2 + x[1] ** 2) / 40, force={"z": -force})
-    return Scene("ball", rigid, block, 0.0, kind="solid", copies=4, law="frictionless"), 1.5 * force / np.pi
+    rigid = Rigid(
+        "ball", (0.0, 0.0, 1.0), lambda x: (x[0] ** 2 + x[1] ** 2) / 40, force={"z": -force}
+    )
+    return Scene(
+        "ball", rigid, block, 0.0, kind="solid", copies=4, law="frictionless"
+    ), 1.5 * force / np.pi
 
 
 def test_a_contact_smaller_than_the_elements_is_not_taken_for_resolved():
-    """One closed contact carries all of the force whatever the mesh of the body: only its pressure betrays the error."""
+    """One closed contact carries all of the force whatever the mesh of the body: only its pressure
+    betrays the error.
+    """
     scene, peak = ball(4.0)
     first = solve_scene(scene)
     asked = find_quantity("pressure", scene)
@@ -161,12 +193,23 @@ def test_the_pressure_at_contacts_exceeds_its_means_as_a_parabola_does():
 
 
 def test_limits_and_history_from_the_command_line_and_scene_files(tmp_path, capsys):
-    line = ["run", "press-fit", "--adaptive", "--accuracy", "1e-4", "--quantity", "von_mises:shaft:inner"]
+    line = [
+        "run",
+        "press-fit",
+        "--adaptive",
+        "--accuracy",
+        "1e-4",
+        "--quantity",
+        "von_mises:shaft:inner",
+    ]
     out = tmp_path / "out"
     assert main([*line, "--max-unknowns", "400", "--out", str(out)]) == 1
     assert "more than 400" in capsys.readouterr().out and (out / "refinement.png").exists()
     found = json.loads((out / "summary.json").read_text())["accuracy"]
-    assert all(level["unknowns"] <= 400 and level["seconds"] > 0 and level["error"] > 0 for level in found["levels"])
+    assert all(
+        level["unknowns"] <= 400 and level["seconds"] > 0 and level["error"] > 0
+        for level in found["levels"]
+    )
     assert main([*line, "--max-memory", "1e-6", "--no-figures", "--out", str(out)]) == 1
     assert "GB of memory" in capsys.readouterr().out
     file = tmp_path / "block.toml"

@@ -1,4 +1,6 @@
-"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors; unknowns go where they are needed."""
+"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors;
+unknowns go where they are needed.
+"""
 
 import numpy as np
 import pytest
@@ -33,7 +35,9 @@ MESHES = {
 def measure(mesh, name=None):
     """Size of a named boundary, or of the whole mesh."""
     element = skfem.ElementTriP1() if isinstance(mesh, skfem.MeshTri) else skfem.ElementTetP1()
-    basis = skfem.Basis(mesh, element) if name is None else skfem.FacetBasis(mesh, element, facets=name)
+    basis = (
+        skfem.Basis(mesh, element) if name is None else skfem.FacetBasis(mesh, element, facets=name)
+    )
     return float(basis.dx.sum())
 
 
@@ -50,7 +54,8 @@ def test_divided_meshes_are_whole_and_keep_their_boundaries(kind):
         assert measure(mesh) == pytest.approx(1.0)
         assert {name: measure(mesh, name) for name in NAMES} == pytest.approx(sizes)
         inside = np.setdiff1d(np.arange(mesh.nfacets), mesh.boundary_facets())
-        assert np.all(mesh.f2t[1, inside] >= 0)  # no hanging nodes: every inner facet has two elements
+        # no hanging nodes: every inner facet has two elements
+        assert np.all(mesh.f2t[1, inside] >= 0)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])
@@ -73,11 +78,13 @@ def test_corners_stay_corners():
 
 
 def pressed_block(n):
-    mesh = skfem.MeshTri.init_tensor(np.linspace(-1, 1, 2 * n + 1), np.linspace(0, 1, n + 1)).with_boundaries(
-        {"contact": lambda x: x[1] == 0, "top": lambda x: x[1] == 1}
-    )
+    mesh = skfem.MeshTri.init_tensor(
+        np.linspace(-1, 1, 2 * n + 1), np.linspace(0, 1, n + 1)
+    ).with_boundaries({"contact": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
     block = Part("block", mesh, MATERIAL, supports=(Support("top"),))
-    return Scene("block", block, Rigid("floor", (0.0, 1.0), lambda x: x[0] ** 2 / 20 - 0.01), mu=0.3)
+    return Scene(
+        "block", block, Rigid("floor", (0.0, 1.0), lambda x: x[0] ** 2 / 20 - 0.01), mu=0.3
+    )
 
 
 def test_stress_errors_vanish_for_uniform_stress_and_fall_with_the_mesh():
@@ -93,7 +100,8 @@ def test_stress_errors_vanish_for_uniform_stress_and_fall_with_the_mesh():
         smooth = np.zeros(len(body.at_rest))
         smooth[body.body.unknowns] = np.array([np.sin(x + y), x * y])
         errors.append(body.recovery_errors(smooth, smooth)[0].sum())
-    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3  # the square of an error of first order
+    # the square of an error of first order
+    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3
 
 
 def reduce_body(scene):
@@ -111,11 +119,15 @@ def test_the_estimate_agrees_with_the_error(quantity):
     error = abs(best.extrapolated - coarse.value) / best.extrapolated
     assert best.reached and coarse.reached
     assert 0.5 < coarse.error / error < 4
-    assert abs(best.extrapolated - coarse.extrapolated) < 0.5 * abs(best.extrapolated - coarse.value)
+    assert abs(best.extrapolated - coarse.extrapolated) < 0.5 * abs(
+        best.extrapolated - coarse.value
+    )
 
 
 def test_unknowns_go_where_the_quantity_needs_them():
-    """For the peak pressure of Hertz the elements at the contact become small and the rest of the mesh stays as it is."""
+    """For the peak pressure of Hertz the elements at the contact become small and the rest of the
+    mesh stays as it is.
+    """
     scene = make_scene("cylinder-2d", mu=0.0)
     solved, estimate = locally(scene, "pressure", 5e-3)
     assert estimate.reached and solved.solution.solved
@@ -127,8 +139,12 @@ def test_unknowns_go_where_the_quantity_needs_them():
 @pytest.mark.parametrize("angle", [30.0, 137.0])
 def test_a_turned_scene_is_refined_the_same(angle):
     scene = pressed_block(4)
-    straight, turned = (locally(each, "energy", 0.02)[1] for each in (scene, moved(scene, turn(angle))))
-    assert [level.unknowns for level in turned.levels] == [level.unknowns for level in straight.levels]
+    straight, turned = (
+        locally(each, "energy", 0.02)[1] for each in (scene, moved(scene, turn(angle)))
+    )
+    assert [level.unknowns for level in turned.levels] == [
+        level.unknowns for level in straight.levels
+    ]
     assert turned.value == pytest.approx(straight.value, rel=1e-9)
 
 
@@ -139,7 +155,8 @@ def test_what_elements_add_is_the_whole_estimate():
     sizes = np.abs(errors.bodies[0])
     assert errors.total == pytest.approx(sizes.sum()) and len(errors.bodies[1]) == 0
     assert sizes[marked[0]].sum() >= 0.6 * sizes.sum()
-    assert sizes[marked[0]].sum() - sizes[marked[0]].min() < 0.6 * sizes.sum()  # with one less it would not be enough
+    # with one less it would not be enough
+    assert sizes[marked[0]].sum() - sizes[marked[0]].min() < 0.6 * sizes.sum()
 
 
 def test_bounds_end_the_loop_with_the_best_answer():
@@ -153,7 +170,11 @@ def test_bounds_end_the_loop_with_the_best_answer():
 
 @pytest.mark.parametrize(
     "arguments, words",
-    [(("energy", 2.0), "accuracy"), (("heat", 0.1), "unknown quantity"), (("approach", 0.1), "no plate")],
+    [
+        (("energy", 2.0), "accuracy"),
+        (("heat", 0.1), "unknown quantity"),
+        (("approach", 0.1), "no plate"),
+    ],
 )
 def test_bad_input(arguments, words):
     with pytest.raises(InputError, match=words):
@@ -163,7 +184,9 @@ def test_bad_input(arguments, words):
 def test_solutions_on_refined_meshes_are_those_of_the_same_mesh():
     solved, _ = locally(pressed_block(4), "energy", 0.03)
     again = solve(reduce(solved.reduction.scene))
-    assert np.allclose(again.reactions, solved.solution.reactions, atol=1e-6 * again.reactions.max())
+    assert np.allclose(
+        again.reactions, solved.solution.reactions, atol=1e-6 * again.reactions.max()
+    )
 
 
 def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
@@ -171,8 +194,20 @@ def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
     from contactopt.cli import main
 
     result = run("cylinder-2d", mu=0.0, accuracy=0.02, quantity="pressure", adaptive=True)
-    assert result.estimate.reached and result.summary["accuracy"]["levels"][-1]["contacts"] == result.problem.contacts
-    line = ["run", "punch-2d", "--accuracy", "0.02", "--quantity", "energy", "--adaptive", "--no-figures"]
+    assert (
+        result.estimate.reached
+        and result.summary["accuracy"]["levels"][-1]["contacts"] == result.problem.contacts
+    )
+    line = [
+        "run",
+        "punch-2d",
+        "--accuracy",
+        "0.02",
+        "--quantity",
+        "energy",
+        "--adaptive",
+        "--no-figures",
+    ]
     assert main([*line, "--out", str(tmp_path / "out")]) == 0
     assert "contacts" in capsys.readouterr().out
     with pytest.raises(InputError, match="needs an aim"):

@@ -10,12 +10,16 @@ CYCLING = (-10.0, 1.0)
 
 
 def test_a_known_cycle_is_recognised_with_its_two_values():
-    """K = [[1, 1.5], [1.5, 4]], f = (-10, 1), mu = 1: the iteration alternates between two normal forces."""
+    """K = [[1, 1.5], [1.5, 4]], f = (-10, 1), mu = 1: the iteration alternates between two normal
+    forces.
+    """
     problem = one_contact(CYCLING, 1.0)
     solution = solve(problem, method="alternating")
     assert solution.status.label == "cycling" and not solution.solved
     more = solve(problem, max_iterations=solution.iterations - 1, method="alternating")
-    assert sorted([solution.reactions[0, 0], more.reactions[0, 0]]) == pytest.approx([5.11864, 8.32203], abs=1e-5)
+    assert sorted([solution.reactions[0, 0], more.reactions[0, 0]]) == pytest.approx(
+        [5.11864, 8.32203], abs=1e-5
+    )
 
 
 def test_relaxation_breaks_the_cycle():
@@ -27,7 +31,10 @@ def test_relaxation_breaks_the_cycle():
 @pytest.mark.parametrize("mu,converges", [(0.6, True), (0.67, False)])
 def test_contraction_threshold(mu, converges):
     """The critical friction coefficient is K_tt / |K_tn| = 2/3."""
-    assert solve(one_contact(CYCLING, mu), max_iterations=2000, method="alternating").solved is converges
+    assert (
+        solve(one_contact(CYCLING, mu), max_iterations=2000, method="alternating").solved
+        is converges
+    )
 
 
 def test_answers_satisfy_the_laws_they_claim():
@@ -43,7 +50,9 @@ def test_answers_satisfy_the_laws_they_claim():
     assert np.all(np.abs(r[:, 1]) <= bound + 1e-8 * scale_r)
     slipping = np.abs(u[:, 1]) > 1e-6 * scale_u
     assert slipping.any()
-    assert np.allclose(r[slipping, 1], -bound[slipping] * np.sign(u[slipping, 1]), atol=1e-8 * scale_r)
+    assert np.allclose(
+        r[slipping, 1], -bound[slipping] * np.sign(u[slipping, 1]), atol=1e-8 * scale_r
+    )
 
 
 def test_in_3d_friction_opposes_slip(cube):
@@ -58,7 +67,9 @@ def test_in_3d_friction_opposes_slip(cube):
 
 
 def test_one_tangential_direction_solved_as_discs_gives_the_same():
-    """A 2D problem embedded in 3D with a second direction in which nothing happens: QP against SOCP."""
+    """A 2D problem embedded in 3D with a second direction in which nothing happens: QP against
+    SOCP.
+    """
     flat = reduce(scenes.flat_punch(2, elements=5))
     k = flat.contacts
     place = np.arange(3 * k).reshape(k, 3)
@@ -69,9 +80,14 @@ def test_one_tangential_direction_solved_as_discs_gives_the_same():
     V = np.zeros((3 * k, 1))
     V[rows] = flat.V
     solid = InterfaceProblem(Q, q, flat.mu, V, flat.s)
-    a, b = solve(flat, tol=1e-10, method="alternating"), solve(solid, tol=1e-10, method="alternating")
+    a, b = (
+        solve(flat, tol=1e-10, method="alternating"),
+        solve(solid, tol=1e-10, method="alternating"),
+    )
     assert a.solved and b.solved
-    assert np.allclose(b.reactions[:, :2], a.reactions, atol=1e-8) and np.allclose(b.reactions[:, 2], 0, atol=1e-9)
+    assert np.allclose(b.reactions[:, :2], a.reactions, atol=1e-8) and np.allclose(
+        b.reactions[:, 2], 0, atol=1e-9
+    )
 
 
 def test_no_friction():
@@ -85,7 +101,9 @@ def test_bilateral_contact():
     problem = reduce(scenes.flat_punch(2, elements=5, bilateral=True))
     solution = solve(problem, tol=1e-10, method="alternating")
     assert solution.solved
-    assert np.allclose(problem.displacements(solution.reactions, solution.multipliers)[:, 0], 0, atol=1e-8)
+    assert np.allclose(
+        problem.displacements(solution.reactions, solution.multipliers)[:, 0], 0, atol=1e-8
+    )
 
 
 def test_bilateral_contact_holds_against_pulling():
@@ -110,8 +128,13 @@ def test_bad_relaxation(relaxation):
 def test_order_of_the_nodes_does_not_matter(cube):
     order = np.random.default_rng(0).permutation(cube.contacts)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
-    mixed = InterfaceProblem(cube.Q[np.ix_(rows, rows)], cube.q[order], cube.mu[order], cube.V[rows], cube.s)
-    a, b = solve(cube, tol=1e-10, method="alternating"), solve(mixed, tol=1e-10, method="alternating")
+    mixed = InterfaceProblem(
+        cube.Q[np.ix_(rows, rows)], cube.q[order], cube.mu[order], cube.V[rows], cube.s
+    )
+    a, b = (
+        solve(cube, tol=1e-10, method="alternating"),
+        solve(mixed, tol=1e-10, method="alternating"),
+    )
     assert np.allclose(a.reactions[order], b.reactions, atol=1e-7)
 
 
@@ -124,10 +147,16 @@ def test_direction_of_the_tangents_does_not_matter(cube):
     T = np.zeros((3 * cube.contacts, 3 * cube.contacts))
     for i, block in enumerate(R):
         T[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = block
-    turned = InterfaceProblem(T @ cube.Q @ T.T, np.einsum("kab,kb->ka", R, cube.q), cube.mu, T @ cube.V, cube.s)
-    a, b = solve(cube, tol=1e-11, method="alternating"), solve(turned, tol=1e-11, method="alternating")
+    turned = InterfaceProblem(
+        T @ cube.Q @ T.T, np.einsum("kab,kb->ka", R, cube.q), cube.mu, T @ cube.V, cube.s
+    )
+    a, b = (
+        solve(cube, tol=1e-11, method="alternating"),
+        solve(turned, tol=1e-11, method="alternating"),
+    )
     assert a.solved and b.solved
-    # Where a symmetry plane holds a component, its force moves nothing and is undetermined: compare displacements.
+    # Where a symmetry plane holds a component, its force moves nothing and is undetermined: compare
+    # displacements.
     moved = turned.Q @ (np.einsum("kab,kb->ka", R, a.reactions) - b.reactions).ravel()
     assert np.abs(moved).max() < 1e-8 * np.abs(turned.Q @ b.reactions.ravel()).max()
     assert np.allclose(a.reactions[:, 0], b.reactions[:, 0], atol=1e-8)

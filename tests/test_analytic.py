@@ -27,18 +27,24 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def graded_rule(*breaks):
-    """Composite Gauss rule on (breaks[0], breaks[-1]), refined towards every break: for singular integrands."""
+    """Composite Gauss rule on (breaks[0], breaks[-1]), refined towards every break: for singular
+    integrands.
+    """
     x, w = [], []
     for low, high in pairwise(breaks):
         cuts = (high - low) / 2 * 0.2 ** np.arange(10)
         edges = np.concatenate([[low], low + cuts[::-1], high - cuts[1:], [high]])
-        x.append(((edges[1:] + edges[:-1])[:, None] / 2 + np.diff(edges)[:, None] / 2 * NODES).ravel())
+        x.append(
+            ((edges[1:] + edges[:-1])[:, None] / 2 + np.diff(edges)[:, None] / 2 * NODES).ravel()
+        )
         w.append((np.diff(edges)[:, None] / 2 * WEIGHTS).ravel())
     return np.concatenate(x), np.concatenate(w)
 
 
 def contact_rule(a, *breaks):
-    """Rule on (-a, a) or (0, a) with x = a sin(t), which takes root singularities at the edges away."""
+    """Rule on (-a, a) or (0, a) with x = a sin(t), which takes root singularities at the edges
+    away.
+    """
     t, w = graded_rule(*np.arcsin(np.unique(breaks) / a))
     return np.clip(a * np.sin(t), -a * (1 - 1e-15), a * (1 - 1e-15)), w * a * np.cos(t)
 
@@ -46,7 +52,8 @@ def contact_rule(a, *breaks):
 def half_space(pressure, shear, a, r, beta, inner=()):
     """E*/2 (u_z, u_r) at radius r under axisymmetric tractions, by quadrature over rings of load.
 
-    Independent of the product's Abel transforms: Johnson (1985), section 3.7, by elliptic integrals.
+    Independent of the product's Abel transforms: Johnson (1985), section 3.7, by elliptic
+    integrals.
     """
     s, w = contact_rule(a, 0, *inner, r, a)
     p, q, m, complete = (
@@ -61,11 +68,16 @@ def half_space(pressure, shear, a, r, beta, inner=()):
 
 
 def half_plane(pressure, shear, a, x, beta, inner=()):
-    """E*/2 (u_z', u_x') at x under plane tractions: Johnson (1985), eq (2.25), principal values by subtraction."""
+    """E*/2 (u_z', u_x') at x under plane tractions: Johnson (1985), eq (2.25), principal values by
+    subtraction.
+    """
     s, w = contact_rule(a, -a, 0, *inner, *(-np.array(inner)), x, a)
     p, q = float(pressure(np.array(x))), float(shear(np.array(x)))
     logarithm = np.log((a + x) / (a - x))
-    cauchy = [(w @ ((f(s) - at) / (x - s)) + at * logarithm) / np.pi for f, at in ((pressure, p), (shear, q))]
+    cauchy = [
+        (w @ ((f(s) - at) / (x - s)) + at * logarithm) / np.pi
+        for f, at in ((pressure, p), (shear, q))
+    ]
     return -cauchy[0] + beta * q, -beta * p - cauchy[1]
 
 
@@ -79,21 +91,30 @@ def test_moduli():
     assert dundurs(None, RUBBER) == pytest.approx((1, 2 / 7))
     steel = Material(210e3, 0.25)
     assert dundurs(steel, RUBBER) == pytest.approx(-np.array(dundurs(RUBBER, steel)))
-    moduli = 5 / (1 - 0.09), 210e3 / (1 - 0.0625)  # alpha is the relative difference of the plane-strain moduli
+    # alpha is the relative difference of the plane-strain moduli
+    moduli = 5 / (1 - 0.09), 210e3 / (1 - 0.0625)
     assert dundurs(steel, RUBBER)[0] == pytest.approx((moduli[1] - moduli[0]) / sum(moduli))
     for function in (contact_modulus, tangential_modulus, dundurs):
         with pytest.raises(InputError, match="both bodies are rigid"):
             function(None, None)
 
 
-@pytest.mark.parametrize("radius,a,peak,approach", [(50, 11.093, 0.3880, 2.461), (100, 13.976, 0.2444, 1.953)])
+@pytest.mark.parametrize(
+    "radius,a,peak,approach", [(50, 11.093, 0.3880, 2.461), (100, 13.976, 0.2444, 1.953)]
+)
 def test_hertz_point_published_values(radius, a, peak, approach):
     reference = hertz_point(100.0, radius, contact_modulus(RUBBER, RUBBER))
-    assert (reference.half_width, reference.peak, reference.approach) == pytest.approx((a, peak, approach), rel=3e-4)
+    assert (reference.half_width, reference.peak, reference.approach) == pytest.approx(
+        (a, peak, approach), rel=3e-4
+    )
 
 
 def test_pressures_carry_the_load():
-    for reference in (hertz_line(7, 50, 2.7), flat_punch_line(7, 20), flat_punch_line_bonded(7, 20, 2 / 7)):
+    for reference in (
+        hertz_line(7, 50, 2.7),
+        flat_punch_line(7, 20),
+        flat_punch_line_bonded(7, 20, 2 / 7),
+    ):
         a = reference.half_width
         x, w = contact_rule(a, -a, a)
         assert w @ reference.pressure(x) == pytest.approx(7, rel=1e-7)
@@ -126,14 +147,21 @@ def test_bonded_punches_satisfy_the_half_space(beta):
     line = flat_punch_line_bonded(7.0, 20.0, beta)
     point = flat_punch_axisymmetric_bonded(7.0, 20.0, 2.7, beta)
     for x in (1.0, 9.0, 19.0):
-        assert half_plane(line.pressure, line.shear, 20.0, x, beta) == pytest.approx((0, 0), abs=1e-6)
+        assert half_plane(line.pressure, line.shear, 20.0, x, beta) == pytest.approx(
+            (0, 0), abs=1e-6
+        )
         normal, tangential = half_space(point.pressure, point.shear, 20.0, x, beta)
-        assert (2 / 2.7 * normal, tangential) == pytest.approx((point.approach, 0), rel=1e-6, abs=1e-6)
+        assert (2 / 2.7 * normal, tangential) == pytest.approx(
+            (point.approach, 0), rel=1e-6, abs=1e-6
+        )
         assert line.shear(np.array(-x)) == -line.shear(np.array(x))
 
 
 def test_bonded_stiffness_and_frictionless_limit():
-    ratio = flat_punch_axisymmetric(7, 20, 2.7).approach / flat_punch_axisymmetric_bonded(7, 20, 2.7, 2 / 7).approach
+    ratio = (
+        flat_punch_axisymmetric(7, 20, 2.7).approach
+        / flat_punch_axisymmetric_bonded(7, 20, 2.7, 2 / 7).approach
+    )
     assert ratio == pytest.approx(0.7 * np.log(1.8) / 0.4, rel=1e-12)
     assert ratio == pytest.approx(1.028627, abs=1e-6)
     r = np.array([0.0, 3.0, 19.9])
@@ -148,7 +176,14 @@ def test_bonded_stiffness_and_frictionless_limit():
 # Cattaneo-Mindlin
 P, R, E, GS, MU = 7.0, 50.0, 2.7, 0.6, 0.4
 LIMIT = MU * P
-HISTORIES = [[0.6], [0.9, 0.1], [0.8, -0.5, 0.3], [0.7, -0.7], [-0.4, 0.2], [0.5, 0.2, 0.4, -0.1, 0.95]]
+HISTORIES = [
+    [0.6],
+    [0.9, 0.1],
+    [0.8, -0.5, 0.3],
+    [0.7, -0.7],
+    [-0.4, 0.2],
+    [0.5, 0.2, 0.4, -0.1, 0.95],
+]
 
 
 def line(shares):
@@ -173,7 +208,8 @@ def test_tangential_traction(shares):
     q = plane.shear(x)
     assert 2 * w @ q == pytest.approx(shares[-1] * LIMIT, rel=1e-8)
     assert np.all(np.abs(q) <= MU * plane.pressure(x) * (1 + 1e-12))
-    excess = -2 / (np.pi * E) * 2 * w @ (q * np.log(2 * x / a))  # less the full stick, T / (pi sqrt(a^2 - x^2))
+    # less the full stick, T / (pi sqrt(a^2 - x^2))
+    excess = -2 / (np.pi * E) * 2 * w @ (q * np.log(2 * x / a))
     assert plane.shift == pytest.approx(excess, rel=1e-6)
 
     a = sphere.half_width
@@ -190,10 +226,15 @@ def test_no_slip_inside_the_stick_zone():
     history = [0.9, -0.3, 0.5]
     for i in range(3):
         now, before = line(history[: i + 1]), line(history[:i] or [0.0])
-        assert now.stick_half_width == pytest.approx(now.half_width * np.sqrt(1 - [0.9, 0.6, 0.4][i]), rel=1e-12)
+        assert now.stick_half_width == pytest.approx(
+            now.half_width * np.sqrt(1 - [0.9, 0.6, 0.4][i]), rel=1e-12
+        )
         for share in (0.1, 0.8):
             x, kinks = share * now.stick_half_width, zones(history)
-            strain = [half_plane(np.zeros_like, f.shear, f.half_width, x, 0.0, kinks)[1] for f in (now, before)]
+            strain = [
+                half_plane(np.zeros_like, f.shear, f.half_width, x, 0.0, kinks)[1]
+                for f in (now, before)
+            ]
             assert strain[0] == pytest.approx(strain[1], abs=1e-8)
 
 
@@ -224,13 +265,17 @@ def test_cycle_loss_is_the_area_of_the_loop(share):
 
 
 def test_cycle_loss_of_cylinders_is_the_work_of_friction():
-    """4 int mu p s dx with the slip s of the first loading, integrated from the strains of the two surfaces."""
+    """4 int mu p s dx with the slip s of the first loading, integrated from the strains of the two
+    surfaces.
+    """
     share = 0.7
     first = line([share])
     a, c = first.half_width, first.stick_half_width
     x = np.linspace(c, a, 400)[1:-1]
     strain = [2 / E * half_plane(np.zeros_like, first.shear, a, s, 0.0, [c])[1] for s in x]
-    slip = np.concatenate([[0.0], np.cumsum((np.array(strain)[1:] + np.array(strain)[:-1]) / 2 * np.diff(x))])
+    slip = np.concatenate(
+        [[0.0], np.cumsum((np.array(strain)[1:] + np.array(strain)[:-1]) / 2 * np.diff(x))]
+    )
     work = 4 * 2 * trapezoid(MU * first.pressure(x) * np.abs(slip), x)
     assert work == pytest.approx(cycle_loss_line(P, E, MU, share * LIMIT), rel=2e-3)
 

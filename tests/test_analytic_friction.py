@@ -1,4 +1,6 @@
-"""Coulomb friction between dissimilar materials, against the half-space, limits and a contact algorithm."""
+"""Coulomb friction between dissimilar materials, against the half-space, limits and a contact
+algorithm.
+"""
 
 import numpy as np
 import pytest
@@ -28,8 +30,12 @@ CASES = [(0.05, RIGID), (0.3, RIGID), (0.3, 0.5), (1.0, 0.5), (2.0, 0.5), (0.1, 
 def solutions(mu, beta, round_bodies=False):
     """(plane, axisymmetric) with P = 7, E* = 2.7, a = 20 or R = 50."""
     if round_bodies:
-        return hertz_line_friction(7.0, 50.0, 2.7, mu, beta), hertz_point_friction(7.0, 50.0, 2.7, mu, beta)
-    return flat_punch_line_friction(7.0, 20.0, mu, beta), flat_punch_axisymmetric_friction(7.0, 20.0, 2.7, mu, beta)
+        return hertz_line_friction(7.0, 50.0, 2.7, mu, beta), hertz_point_friction(
+            7.0, 50.0, 2.7, mu, beta
+        )
+    return flat_punch_line_friction(7.0, 20.0, mu, beta), flat_punch_axisymmetric_friction(
+        7.0, 20.0, 2.7, mu, beta
+    )
 
 
 @pytest.mark.parametrize(
@@ -77,26 +83,33 @@ def test_punches_satisfy_the_half_space(mu, beta):
     for share in (0.3, 0.95, 1.02, 2.0):
         x = share * plane.stick_half_width
         if x < 20:
-            normal, tangential = half_plane(plane.pressure, plane.shear, 20.0, x, beta, [plane.stick_half_width])
+            normal, tangential = half_plane(
+                plane.pressure, plane.shear, 20.0, x, beta, [plane.stick_half_width]
+            )
             mean = 7 / 40
             assert normal == pytest.approx(0, abs=2e-5 * mean)
             if share < 1:
                 assert tangential == pytest.approx(0, abs=2e-5 * mean)
             else:
-                assert tangential * np.sign(beta) < -1e-4 * mean  # the surface slips against the friction
+                # the surface slips against the friction
+                assert tangential * np.sign(beta) < -1e-4 * mean
         r = share * circle.stick_half_width
         if r < 20:
-            normal, tangential = half_space(circle.pressure, circle.shear, 20.0, r, beta, [circle.stick_half_width])
-            assert 2 / 2.7 * normal == pytest.approx(circle.approach, rel=2e-6)
-            assert 2 / 2.7 * tangential / circle.approach * np.sign(beta) == pytest.approx(0, abs=1e-6) or (
-                share > 1 and tangential * beta < 0
+            normal, tangential = half_space(
+                circle.pressure, circle.shear, 20.0, r, beta, [circle.stick_half_width]
             )
+            assert 2 / 2.7 * normal == pytest.approx(circle.approach, rel=2e-6)
+            assert 2 / 2.7 * tangential / circle.approach * np.sign(beta) == pytest.approx(
+                0, abs=1e-6
+            ) or (share > 1 and tangential * beta < 0)
 
 
 @pytest.mark.parametrize("mu,beta", CASES)
 def test_round_bodies_satisfy_the_half_space(mu, beta):
-    """The surface takes the shape of the round body; the strain that a point had when it began to stick stays: by
-    similarity u_x ~ x |x| there."""
+    """The surface takes the shape of the round body; the strain that a point had when it began to
+    stick stays: by
+    similarity u_x ~ x |x| there.
+    """
     line, point = solutions(mu, beta, round_bodies=True)
     strain, stretch = [], []
     for share in (0.3, 0.6, 0.95, 1.1):
@@ -105,7 +118,9 @@ def test_round_bodies_satisfy_the_half_space(mu, beta):
             normal, tangential = half_plane(
                 line.pressure, line.shear, line.half_width, x, beta, [line.stick_half_width]
             )
-            assert 2 / 2.7 * normal == pytest.approx(-x / 50, rel=1e-5, abs=1e-6 * line.half_width / 50)
+            assert 2 / 2.7 * normal == pytest.approx(
+                -x / 50, rel=1e-5, abs=1e-6 * line.half_width / 50
+            )
             strain.append(tangential / x)
         r = share * point.stick_half_width
         if r < point.half_width:
@@ -120,7 +135,9 @@ def test_round_bodies_satisfy_the_half_space(mu, beta):
 
 @pytest.mark.parametrize("ratio", [0.2, 0.4, 0.8, 1.6])
 def test_weak_coupling_gives_the_textbook_formulas(ratio):
-    """mu/beta fixed, beta to zero: K'(k)/K(k) = beta/mu; ln((1 + k)/(1 - k))/(2 k) = (mu/beta) K'(k)."""
+    """mu/beta fixed, beta to zero: K'(k)/K(k) = beta/mu; ln((1 + k)/(1 - k))/(2 k) = (mu/beta)
+    K'(k).
+    """
     beta = 1e-3
     plane = brentq(lambda k: ellipk(1 - k**2) / ellipk(k**2) - 1 / ratio, 1e-6, 1 - 1e-9)
     circle = brentq(lambda k: np.arctanh(k) / k - ratio * ellipk(1 - k**2), 1e-6, 1 - 1e-9)
@@ -133,7 +150,10 @@ def test_strong_friction_gives_the_bonded_punch():
     beta = 0.1
     for friction, bonded in zip(
         solutions(2.0, beta),
-        (flat_punch_line_bonded(7.0, 20.0, beta), flat_punch_axisymmetric_bonded(7.0, 20.0, 2.7, beta)),
+        (
+            flat_punch_line_bonded(7.0, 20.0, beta),
+            flat_punch_axisymmetric_bonded(7.0, 20.0, 2.7, beta),
+        ),
     ):
         assert friction.pressure(x) == pytest.approx(bonded.pressure(x), rel=1e-6)
         assert friction.shear(x) == pytest.approx(bonded.shear(x), rel=5e-5)
@@ -146,13 +166,17 @@ def test_singularity_of_the_edge(mu, beta):
     for punch in solutions(mu, beta):
         room = (20 - punch.stick_half_width) * np.array([1e-4, 1e-5])
         p = punch.pressure(20 - room)
-        assert np.log(p[1] / p[0]) / np.log(10) == pytest.approx(0.5 - np.arctan(mu * beta) / np.pi, abs=1e-4)
+        assert np.log(p[1] / p[0]) / np.log(10) == pytest.approx(
+            0.5 - np.arctan(mu * beta) / np.pi, abs=1e-4
+        )
 
 
 def contact_algorithm(mu, beta, elements=400):
-    """c/a of the plane punch by constant elements and active sets, from nothing but the law of friction.
+    """c/a of the plane punch by constant elements and active sets, from nothing but the law of
+    friction.
 
-    Displacements at the middle of each element from Flamant's logarithm; the edge is graded. No use of Spence's theory.
+    Displacements at the middle of each element from Flamant's logarithm; the edge is graded. No use
+    of Spence's theory.
     """
     edges = np.sin(np.pi / 2 * np.linspace(0, 1, elements + 1))
     x, width = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
@@ -163,12 +187,16 @@ def contact_algorithm(mu, beta, elements=400):
     right = potential(x[:, None] - edges[:-1]) - potential(x[:, None] - edges[1:])
     left = potential(x[:, None] + edges[1:]) - potential(x[:, None] + edges[:-1])
     even, odd = -(right + left) / np.pi, -(right - left) / np.pi
-    total = np.tril(np.ones((elements, elements)), -1) * width + np.diag(width / 2)  # int from 0 to x
+    # int from 0 to x
+    total = np.tril(np.ones((elements, elements)), -1) * width + np.diag(width / 2)
     stick = np.ones(elements, dtype=bool)
     for _ in range(60):
         slip = ~stick
         matrix = np.block(
-            [[even, beta * total, -np.ones((elements, 1))], [-beta * total, odd, np.zeros((elements, 1))]]
+            [
+                [even, beta * total, -np.ones((elements, 1))],
+                [-beta * total, odd, np.zeros((elements, 1))],
+            ]
         )
         matrix[elements:][slip] = 0
         matrix[elements:, :elements][slip, slip] = -mu
@@ -177,14 +205,17 @@ def contact_algorithm(mu, beta, elements=400):
         solution = np.linalg.solve(matrix, np.append(np.zeros(2 * elements), 1.0))
         p, q = solution[:elements], solution[elements:-1]
         moved = odd @ q - beta * total @ p
-        new = np.where(stick, np.abs(q) <= mu * p, moved > 0)  # slip goes against the friction, inwards
+        # slip goes against the friction, inwards
+        new = np.where(stick, np.abs(q) <= mu * p, moved > 0)
         if np.array_equal(new, stick):
             return edges[np.argmin(stick)]
         stick = new
     raise AssertionError("the active sets do not settle")
 
 
-@pytest.mark.parametrize("mu,beta", [(0.2, RIGID), (0.3, RIGID), (0.5, RIGID), (0.4, 0.5), (0.05, 0.05)])
+@pytest.mark.parametrize(
+    "mu,beta", [(0.2, RIGID), (0.3, RIGID), (0.5, RIGID), (0.4, 0.5), (0.05, 0.05)]
+)
 def test_stick_zone_of_a_contact_algorithm(mu, beta):
     assert contact_algorithm(mu, beta) == pytest.approx(stick_ratio(mu, beta), abs=0.006)
 

@@ -15,8 +15,8 @@ def test_rooms_import_only_what_stands_below_them():
 
 def test_heavy_imports_wait_until_they_are_used():
     code = (
-        "import sys, contactopt, contactopt.cli, contactopt.methods.driver;"
-        "print([m for m in ('skfem', 'cvxpy', 'matplotlib', 'qpsolvers', 'meshio') if m in sys.modules])"
+        "import sys, contactopt, contactopt.cli, contactopt.methods.driver;print([m for m in"
+        " ('skfem', 'cvxpy', 'matplotlib', 'qpsolvers', 'meshio') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

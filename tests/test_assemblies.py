@@ -10,11 +10,12 @@ from contactopt.meshes.polar import disc, right_half_disc, ring
 
 
 def shape_error(modulus, radius, clearance, exact):
-    """How far the pin's pressure is from keeping both surfaces together in its contact, and apart beyond.
+    """How far the pin's pressure is from keeping both surfaces together in its contact, and apart
+    beyond.
 
-    Sums of modes cos(n phi) of the pressure on the rims of a disc and of a hole, each solved by Airy's function (Michell): the
-    radial displacements of modes n >= 2 add up to (R / E*) 2 n / (n^2 - 1) p_n, and to (R / E*) p_0 of the mean; n = 1 is the
-    approach.
+    Sums of modes cos(n phi) of the pressure on the rims of a disc and of a hole, each solved by
+    Airy's function (Michell): the radial displacements of modes n >= 2 add up to (R / E*) 2 n /
+    (n^2 - 1) p_n, and to (R / E*) p_0 of the mean; n = 1 is the approach.
     """
     count = 2**17
     phi = np.arange(count) * 2 * np.pi / count
@@ -27,7 +28,9 @@ def shape_error(modulus, radius, clearance, exact):
     inside = signed < 0.98 * exact.half_width / radius
     approach = np.linalg.lstsq(np.cos(phi[inside])[:, None], apart[inside], rcond=None)[0][0]
     gap = apart - approach * np.cos(phi)
-    return np.abs(gap[inside]).max() / clearance, gap[signed > 1.02 * exact.half_width / radius].min() / clearance
+    return np.abs(gap[inside]).max() / clearance, gap[
+        signed > 1.02 * exact.half_width / radius
+    ].min() / clearance
 
 
 @pytest.mark.parametrize("load", [0.02, 0.5, 2.0, 20.0])
@@ -36,10 +39,13 @@ def test_pin_fulfils_the_equations_of_disc_and_hole(load):
     exact = analytic.pin_in_hole(load, radius, clearance, modulus)
     closed, least = shape_error(modulus, radius, clearance, exact)
     assert closed < 2e-4 * max(1, load) and least > 0
-    s = np.linspace(-1, 1, 4001)[1:-1]  # the load is the resultant: substitute away the root at the edge
+    # the load is the resultant: substitute away the root at the edge
+    s = np.linspace(-1, 1, 4001)[1:-1]
     angle = exact.half_width / radius * np.sin(np.pi / 2 * s)
     weight = np.gradient(angle)
-    assert np.sum(exact.pressure(radius * angle) * np.cos(angle) * radius * weight) == pytest.approx(load, rel=1e-5)
+    assert np.sum(
+        exact.pressure(radius * angle) * np.cos(angle) * radius * weight
+    ) == pytest.approx(load, rel=1e-5)
 
 
 def test_pin_becomes_hertz_and_fills_the_hole():
@@ -56,18 +62,24 @@ def test_pin_becomes_hertz_and_fills_the_hole():
 
 
 def test_press_fit_is_lames_ring_integrated():
-    """Radial displacements from the differential equation r u'' + u' - u / r = 0, solved numerically for both rings."""
+    """Radial displacements from the differential equation r u'' + u' - u / r = 0, solved
+    numerically for both rings.
+    """
     shaft, hub = Material(200.0, 0.3), Material(70.0, 0.2)
     exact = analytic.press_fit(0.02, 10.0, 20.0, 45.0, shaft, hub)
 
     def push(material, free, loaded):
-        """Outward displacement of the loaded side under unit pressure; u = c1 r + c2 / r fulfils the equation."""
+        """Outward displacement of the loaded side under unit pressure; u = c1 r + c2 / r fulfils
+        the equation.
+        """
         lam, G = contactopt.material.lame(material)
         stress = [[2 * (lam + G), -2 * G / r**2] for r in (free, loaded)]
         c1, c2 = np.linalg.solve(stress, [0.0, -1.0])
         return c1 * loaded + c2 / loaded
 
-    assert exact.peak * (push(hub, 45.0, 20.0) - push(shaft, 10.0, 20.0)) == pytest.approx(0.02, rel=1e-12)
+    assert exact.peak * (push(hub, 45.0, 20.0) - push(shaft, 10.0, 20.0)) == pytest.approx(
+        0.02, rel=1e-12
+    )
     with pytest.raises(InputError, match="radii must grow"):
         analytic.press_fit(0.02, 10.0, 50.0, 45.0, shaft, hub)
 
@@ -78,7 +90,9 @@ def errors(scene, **changes):
     assert result.solution.solved
     areas, x = result.problem.areas, result.problem.pairs[0].chart.places[0]
     exact = scene.reference.pressure(x - x.min() if scene.name == "pin-in-bush" else x)
-    return np.sqrt(np.sum(areas * (result.pressure - exact) ** 2) / np.sum(areas * exact**2)), result
+    return np.sqrt(
+        np.sum(areas * (result.pressure - exact) ** 2) / np.sum(areas * exact**2)
+    ), result
 
 
 def test_pin_in_bush_is_perssons():
@@ -86,7 +100,9 @@ def test_pin_in_bush_is_perssons():
     coarse, result = errors(scene, degree=2)
     fine, _ = errors(scenes.pin_in_bush(elements=24), degree=2)
     assert coarse < 0.012 and fine < 0.002
-    assert result.summary["contact_half_width"] == pytest.approx(scene.reference.half_width, rel=2e-3)
+    assert result.summary["contact_half_width"] == pytest.approx(
+        scene.reference.half_width, rel=2e-3
+    )
     assert result.summary["max_pressure"] == pytest.approx(scene.reference.peak, rel=3e-3)
     _, linear = errors(scene)
     np.testing.assert_allclose(
@@ -95,9 +111,20 @@ def test_pin_in_bush_is_perssons():
     assert linear.summary["normal_force"] > 110
 
 
-@pytest.mark.parametrize("kind,degree,order", [("plane-strain", 1, 1.6), ("plane-strain", 2, 1.9), ("axisymmetric", 1, 1.8), ("axisymmetric", 2, 3.3)])  # fmt: skip
+@pytest.mark.parametrize(
+    "kind,degree,order",
+    [
+        ("plane-strain", 1, 1.6),
+        ("plane-strain", 2, 1.9),
+        ("axisymmetric", 1, 1.8),
+        ("axisymmetric", 2, 3.3),
+    ],
+)
 def test_press_fit_converges_to_lame(kind, degree, order):
-    found = [errors(scenes.press_fit(kind, interference=1e-7, elements=e), degree=degree)[0] for e in (4, 8, 16)]
+    found = [
+        errors(scenes.press_fit(kind, interference=1e-7, elements=e), degree=degree)[0]
+        for e in (4, 8, 16)
+    ]
     assert np.log2(found[0] / found[-1]) / 2 > order and found[-1] < 0.006
 
 
@@ -107,7 +134,9 @@ def test_press_fit_of_two_materials():
 
 
 def test_press_fit_is_the_same_all_around():
-    """Nothing tells one node from another, nor the ends at the planes of symmetry, where normals lie in the plane."""
+    """Nothing tells one node from another, nor the ends at the planes of symmetry, where normals
+    lie in the plane.
+    """
     scene = scenes.press_fit(interference=1e-5, elements=6)
     _, result = errors(scene)
     np.testing.assert_allclose(result.pressure, result.pressure[0], rtol=1e-5)
@@ -138,8 +167,10 @@ def test_arch_is_in_equilibrium_and_symmetric():
     ground = forces[[0, -1]]
     np.testing.assert_allclose(ground[:, 1], 500, rtol=1e-3)  # each side half of the weight
     assert ground[0, 0] == pytest.approx(-ground[1, 0], rel=1e-6) and ground[0, 0] < 0
-    np.testing.assert_allclose(np.diff(forces[:-1, 1]), -1000 / 5, rtol=2e-3)  # each joint bears one stone less
-    np.testing.assert_allclose(forces[:-1, 0], forces[0, 0], rtol=1e-6)  # the thrust is the same all along
+    # each joint bears one stone less
+    np.testing.assert_allclose(np.diff(forces[:-1, 1]), -1000 / 5, rtol=2e-3)
+    # the thrust is the same all along
+    np.testing.assert_allclose(forces[:-1, 0], forces[0, 0], rtol=1e-6)
     with pytest.raises(InputError, match="cannot stand"):
         scenes.arch(thickness=100.0)
 
@@ -156,4 +187,6 @@ def test_shapes_are_closed_and_round():
         for name, radius in rims.items():
             nodes = mesh.p[:, np.unique(mesh.facets[:, mesh.boundaries[name]])]
             np.testing.assert_allclose(np.linalg.norm(nodes, axis=0), radius)
-        assert sum(len(facets) for facets in mesh.boundaries.values()) == len(mesh.boundary_facets())
+        assert sum(len(facets) for facets in mesh.boundaries.values()) == len(
+            mesh.boundary_facets()
+        )

@@ -1,4 +1,6 @@
-"""Several bodies and several pairs of surfaces: statics, independence of pairs, results by surface, refused input."""
+"""Several bodies and several pairs of surfaces: statics, independence of pairs, results by surface,
+refused input.
+"""
 
 from dataclasses import replace
 
@@ -37,7 +39,9 @@ SOFT = Material(1000.0, 0.3)
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("cells", [(4,), (3, 4)], ids=["matching", "mortar"])
 def test_every_interface_of_a_stack_carries_what_rests_on_it(dim, form, cells):
-    """Three blocks of weight 4 (8 in 3D), pushed sideways: force and moment of every interface are those of statics."""
+    """Three blocks of weight 4 (8 in 3D), pushed sideways: force and moment of every interface are
+    those of statics.
+    """
     width, side = 2.0, 0.2
     scene = stack(3, dim, side=side, width=width, cells=cells)
     reduction = reduce_bodies(scene, Q=form)
@@ -50,7 +54,9 @@ def test_every_interface_of_a_stack_carries_what_rests_on_it(dim, form, cells):
         force[0], force[-1] = -side * above * volume, above * volume
         centre = np.full(dim, width / 2)
         centre[-1] = i + above / 2
-        moment = np.cross(centre, force) if dim == 3 else centre[0] * force[1] - centre[1] * force[0]
+        moment = (
+            np.cross(centre, force) if dim == 3 else centre[0] * force[1] - centre[1] * force[0]
+        )
         assert np.allclose(found.force, force, atol=1e-9 * 3 * volume)
         assert np.allclose(found.moment, moment, atol=1e-9 * 3 * volume * 3)
 
@@ -63,10 +69,13 @@ def test_the_order_of_the_bodies_does_not_matter():
 
 
 def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
-    """Two blocks side by side on one rigid floor: both as if alone, each with its own friction and law."""
+    """Two blocks side by side on one rigid floor: both as if alone, each with its own friction and
+    law.
+    """
     loads = (Traction("top", (0.3, -1.0)),)
     parts = [
-        Part(n, block([x, 0], [x + 1, 1], [4, 4]), SOFT, loads=loads, contact="bottom") for n, x in (("a", 0), ("b", 3))
+        Part(n, block([x, 0], [x + 1, 1], [4, 4]), SOFT, loads=loads, contact="bottom")
+        for n, x in (("a", 0), ("b", 3))
     ]
     floor = Rigid("floor", normal=(0, 1))
     contacts = (Contact("a", "floor", 0.7), Contact("b", "floor", 0.6, law="associated"))
@@ -78,7 +87,9 @@ def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
         assert np.allclose(together.reactions[pair.contacts], own.reactions, atol=1e-10)
         problem, seen = alone(both.problem, together, pair)
         assert natural_map_residual(problem, seen.reactions, seen.multipliers) < 1e-10
-        assert type(problem.law) is type(single.problem.law) and np.array_equal(problem.mu, single.problem.mu)
+        assert type(problem.law) is type(single.problem.law) and np.array_equal(
+            problem.mu, single.problem.mu
+        )
 
 
 def test_a_pair_alone_is_solved_by_its_part_of_the_solution():
@@ -94,7 +105,9 @@ def test_a_pair_alone_is_solved_by_its_part_of_the_solution():
 
 def test_the_short_form_is_the_long_one():
     short = two_blocks("plane-strain", mu=0.3)
-    long = Scene("long", bodies=short.parts, contacts=(Contact(short.upper.name, short.lower.name, 0.3),))
+    long = Scene(
+        "long", bodies=short.parts, contacts=(Contact(short.upper.name, short.lower.name, 0.3),)
+    )
     a, b = reduce_bodies(short).problem, reduce_bodies(long).problem
     assert np.array_equal(a.Q, b.Q) and np.array_equal(a.V, b.V) and np.array_equal(a.q, b.q)
 
@@ -102,7 +115,9 @@ def test_the_short_form_is_the_long_one():
 def test_friction_by_pair_and_by_place():
     scene = stack(2, mu=0.1)
     first, second = scene.contacts
-    varied = replace(scene, contacts=(replace(first, mu=lambda x: 0.2 + x[0]), replace(second, mu=0.7)))
+    varied = replace(
+        scene, contacts=(replace(first, mu=lambda x: 0.2 + x[0]), replace(second, mu=0.7))
+    )
     reduction = reduce_bodies(varied)
     own, other = (pair.contacts for pair in reduction.problem.pairs)
     assert np.allclose(reduction.problem.mu[own], 0.2 + reduction.problem.coordinates[0, own])
@@ -111,7 +126,9 @@ def test_friction_by_pair_and_by_place():
 
 
 def test_many_bodies_have_a_sparse_q_that_grows_with_their_number():
-    few, many = (reduce_bodies(stack(count, side=0.2 / count, mu=0.3)).problem for count in (16, 32))
+    few, many = (
+        reduce_bodies(stack(count, side=0.2 / count, mu=0.3)).problem for count in (16, 32)
+    )
     assert sp.issparse(few.Q) and sp.issparse(many.Q)
     assert many.Q.nnz < 2.2 * few.Q.nnz
     steps = [solve(problem, tol=1e-10) for problem in (few, many)]
@@ -122,10 +139,24 @@ def test_many_bodies_have_a_sparse_q_that_grows_with_their_number():
 
 
 def test_a_wall_is_a_network():
-    """Two blocks carry a beam; a shared floor surface is elastic. The beam's weight is shared out by symmetry."""
-    floor = Part("floor", block([0, -1], [6, 0], [12, 2]), SOFT, (Support("bottom"),), contact="top")
-    legs = [Part(n, block([x, 0], [x + 1, 1], [2, 2]), SOFT, contact="bottom") for n, x in (("left", 1), ("right", 4))]
-    beam = Part("beam", block([1, 1], [5, 2], [8, 2]), SOFT, loads=(Traction("top", (0, -1.0)),), contact="bottom")
+    """Two blocks carry a beam; a shared floor surface is elastic.
+
+    The beam's weight is shared out by symmetry.
+    """
+    floor = Part(
+        "floor", block([0, -1], [6, 0], [12, 2]), SOFT, (Support("bottom"),), contact="top"
+    )
+    legs = [
+        Part(n, block([x, 0], [x + 1, 1], [2, 2]), SOFT, contact="bottom")
+        for n, x in (("left", 1), ("right", 4))
+    ]
+    beam = Part(
+        "beam",
+        block([1, 1], [5, 2], [8, 2]),
+        SOFT,
+        loads=(Traction("top", (0, -1.0)),),
+        contact="bottom",
+    )
     contacts = [Contact(leg, "floor", 0.5) for leg in ("left", "right")]
     contacts += [Contact("beam", f"{leg}:top", 0.5, coupling="mortar") for leg in ("left", "right")]
     reduction = reduce_bodies(Scene("wall", bodies=(floor, *legs, beam), contacts=tuple(contacts)))
@@ -138,49 +169,76 @@ def test_a_wall_is_a_network():
 
 
 def test_forces_on_every_body_are_in_balance():
-    """Loads, pairs, supports and plates: force and moment, with a plate, a support, a traction and friction."""
+    """Loads, pairs, supports and plates: force and moment, with a plate, a support, a traction and
+    friction.
+    """
     lower = Part("lower", block([0, -2], [3, 0], [6, 4]), SOFT, (Support("bottom"),), contact="top")
     middle = Part(
-        "middle", block([1, 0], [2, 1], [3, 3]), SOFT, contact="bottom", loads=(Traction("right", (-0.1, 0.0)),)
+        "middle",
+        block([1, 0], [2, 1], [3, 3]),
+        SOFT,
+        contact="bottom",
+        loads=(Traction("right", (-0.1, 0.0)),),
     )
-    upper = Part("upper", block([1, 1], [2, 2], [3, 3]), SOFT, loads=(Plate("top", {"y": -2.0}),), contact="bottom")
+    upper = Part(
+        "upper",
+        block([1, 1], [2, 2], [3, 3]),
+        SOFT,
+        loads=(Plate("top", {"y": -2.0}),),
+        contact="bottom",
+    )
     contacts = (Contact("middle", "lower", 0.4), Contact("upper", "middle:top", 0.4))
     reduction = reduce_bodies(Scene("three", bodies=(lower, middle, upper), contacts=contacts))
     solution = solve(reduction.problem, tol=1e-12)
     pairs, holders = pair_resultants(reduction, solution), holder_resultants(reduction, solution)
     on_lower, on_middle = pairs["middle-lower"], pairs["upper-middle.top"]
     plate, support = holders["body 'upper', plate 'top'"], holders["body 'lower', support 'bottom'"]
-    assert np.allclose(plate.force + on_middle.force, 0, atol=1e-9) and plate.force[1] == pytest.approx(-2.0)
+    assert np.allclose(plate.force + on_middle.force, 0, atol=1e-9) and plate.force[
+        1
+    ] == pytest.approx(-2.0)
     assert np.allclose(plate.moment + on_middle.moment, 0, atol=1e-9)
     assert np.allclose(on_lower.force - on_middle.force + [-0.1, 0.0], 0, atol=1e-9)
-    assert np.allclose(on_lower.moment - on_middle.moment + 0.1 * 0.5, 0, atol=1e-9)  # at half its height
+    # at half its height
+    assert np.allclose(on_lower.moment - on_middle.moment + 0.1 * 0.5, 0, atol=1e-9)
     assert np.allclose(support.force - on_lower.force, 0, atol=1e-9)
     assert np.allclose(support.moment - on_lower.moment, 0, atol=1e-9)
 
 
 def test_a_pin_presses_its_bush_with_its_load():
-    """Local normals go round a curved surface; the resultant does not. Mirror images and rings count once."""
+    """Local normals go round a curved surface; the resultant does not.
+
+    Mirror images and rings count once.
+    """
     for scene, load in ((scenes.cylinder(elements=8), None), (scenes.sphere(elements=8), None)):
         result = run(scene)
         (pair,) = result.summary["pairs"].values()
         plates = [h["force"] for name, h in result.summary["holders"].items() if "plate" in name]
         total = np.sum(plates, axis=0)
         assert np.allclose(np.array(pair["force"]) + total, 0, atol=1e-6 * np.abs(total).max())
-        assert pair["moment"] == pytest.approx([0.0] * len(pair["moment"]), abs=1e-6 * np.abs(total).max())
-        assert load is None and pair["force"][0] == pytest.approx(0.0, abs=1e-12 * np.abs(total).max())
+        assert pair["moment"] == pytest.approx(
+            [0.0] * len(pair["moment"]), abs=1e-6 * np.abs(total).max()
+        )
+        assert load is None and pair["force"][0] == pytest.approx(
+            0.0, abs=1e-12 * np.abs(total).max()
+        )
 
 
 def test_results_by_surface_are_written(tmp_path):
     result = run(stack(2, 3, side=0.2, width=2.0), out=tmp_path)
     names = {file.name for file in tmp_path.iterdir()}
-    assert {"contact-block0-floor.vtu", "contact-block1-block0.top.vtu", "pressure-block0-floor.png"} <= names
+    assert {
+        "contact-block0-floor.vtu",
+        "contact-block1-block0.top.vtu",
+        "pressure-block0-floor.png",
+    } <= names
     surface = meshio.read(tmp_path / "contact-block1-block0.top.vtu")
     pair = result.problem.pairs[1].contacts
     assert np.allclose(surface.points.T, result.problem.coordinates[:, pair])
     assert np.allclose(surface.point_data["contact_pressure"], result.pressure[pair])
     corners = surface.points[surface.cells_dict["quad"]]
     sides = corners - np.roll(corners, 1, axis=1)
-    assert np.allclose(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum(), 4.0)  # cells cover the surface
+    # cells cover the surface
+    assert np.allclose(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum(), 4.0)
     force = (surface.point_data["contact_traction"] * result.problem.areas[pair, None]).sum(axis=0)
     assert np.allclose(force, result.summary["pairs"]["block1-block0.top"]["force"], atol=1e-9)
     lower, upper = (meshio.read(tmp_path / f"block{i}.vtu") for i in (0, 1))
@@ -243,7 +301,13 @@ def test_wrong_input_is_refused(change, message):
 
 def test_surfaces_that_are_not_there_are_refused():
     scene = stack(2)
-    with pytest.raises(InputError, match=r"'block0'.*no boundary named 'lid'.*bottom, left, right, top"):
-        reduce_bodies(replace(scene, contacts=(scene.contacts[0], Contact("block1", "block0:lid", 0.1))))
+    with pytest.raises(
+        InputError, match=r"'block0'.*no boundary named 'lid'.*bottom, left, right, top"
+    ):
+        reduce_bodies(
+            replace(scene, contacts=(scene.contacts[0], Contact("block1", "block0:lid", 0.1)))
+        )
     with pytest.raises(InputError, match="rigid body 'floor' has no surface"):
-        reduce_bodies(replace(scene, contacts=(Contact("block0", "floor:top", 0.1), scene.contacts[1])))
+        reduce_bodies(
+            replace(scene, contacts=(Contact("block0", "floor:top", 0.1), scene.contacts[1]))
+        )

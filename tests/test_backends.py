@@ -53,7 +53,9 @@ def fake(monkeypatch, answer):
         def __init__(self, x):
             self.x = x
 
-    monkeypatch.setattr(qpsolvers, "solve_problem", lambda problem, *_, **__: Answer(answer(problem)))
+    monkeypatch.setattr(
+        qpsolvers, "solve_problem", lambda problem, *_, **__: Answer(answer(problem))
+    )
 
 
 @pytest.mark.parametrize(
@@ -73,14 +75,24 @@ def test_a_backend_that_fails_is_a_status_that_names_it(monkeypatch, punch, answ
 
 
 def test_a_backend_that_lies_is_asked_again_and_then_reported(monkeypatch, punch):
-    """Whatever it claims, what comes back is checked against the problem: here a vector that no crossover can save."""
+    """Whatever it claims, what comes back is checked against the problem: here a vector that no
+    crossover can save.
+    """
     asked = []
     fake(monkeypatch, lambda p: asked.append(p) or np.full(len(p.q), 5.0))
     monkeypatch.setattr("contactopt.methods.kernels.semismooth.STEPS", 1)
     solution = solve(punch, "alternating", max_iterations=3)
-    assert solution.status.label == "backend_failed" and "proxqp" in solution.message and "twice" in solution.message
+    assert (
+        solution.status.label == "backend_failed"
+        and "proxqp" in solution.message
+        and "twice" in solution.message
+    )
     assert len(asked) == 2
-    assert solution.residual == natural_map_residual(punch, solution.reactions, solution.multipliers) > 1e-3
+    assert (
+        solution.residual
+        == natural_map_residual(punch, solution.reactions, solution.multipliers)
+        > 1e-3
+    )
 
 
 def test_tighter_settings_are_tighter():

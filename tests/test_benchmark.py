@@ -89,7 +89,9 @@ def written(folder: Path, text: str, name: str = "experiment.toml") -> Path:
 
 
 def run(folder: Path, text: str, **options):
-    return benchmark.load(benchmark.run_campaign(written(folder, text), folder / "out", jobs=2, quiet=True, **options))
+    return benchmark.load(
+        benchmark.run_campaign(written(folder, text), folder / "out", jobs=2, quiet=True, **options)
+    )
 
 
 def test_every_run_is_a_row_with_every_column(tmp_path):
@@ -98,12 +100,20 @@ def test_every_run_is_a_row_with_every_column(tmp_path):
     assert list(table.columns[: len(COLUMNS)]) == list(COLUMNS)
     assert set(table["status"]) == {"solved"} and table["success"].all()
     assert (table["residual"] <= 1e-8).all() and (table["error"] <= 1e-6).all()
-    assert table.groupby("problem")["fingerprint"].nunique().eq(1).all() and table["fingerprint"].nunique() == 3
+    assert (
+        table.groupby("problem")["fingerprint"].nunique().eq(1).all()
+        and table["fingerprint"].nunique() == 3
+    )
     assert set(table["problem.mu"].dropna()) == {0.2, 0.5}
-    assert (table["build_seconds"] > 0).all() and (table["solve_seconds"] <= table["call_seconds"]).all()
+    assert (table["build_seconds"] > 0).all() and (
+        table["solve_seconds"] <= table["call_seconds"]
+    ).all()
     assert (table["peak_mb"] >= table["base_mb"]).all() and (table["base_mb"] > 10).all()
     residuals, seconds, iterations = json.loads(table["history"].iloc[0])
-    assert len(residuals) == len(seconds) == len(iterations) and iterations[-1] == table["iterations"].iloc[0]
+    assert (
+        len(residuals) == len(seconds) == len(iterations)
+        and iterations[-1] == table["iterations"].iloc[0]
+    )
 
 
 def test_tables_survive_parquet_and_csv(tmp_path):
@@ -148,7 +158,8 @@ def test_fakes_become_honest_rows(tmp_path):
         "honest": {"solved"},
     }
     assert set(table["status"]) <= set(STATUSES) and len(table) == len(names)
-    assert table["fingerprint"].nunique() == 1 and set(table["contacts"]) == {5}  # of those that never returned, too
+    # of those that never returned, too
+    assert table["fingerprint"].nunique() == 1 and set(table["contacts"]) == {5}
     row = {name: rows.iloc[0] for name, rows in table.groupby("name")}
     assert row["segfaults"]["message"].startswith("SIGSEGV")
     assert "SIGABRT" in row["aborts"]["message"] and "last words" in row["aborts"]["message"]
@@ -162,7 +173,18 @@ def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
     text = SMALL.replace("repeats = 2", "repeats = 30")
     path, out = written(tmp_path, text), tmp_path / "out"
     expected = {r.key for r in read_experiment(path).runs()}
-    command = [sys.executable, "-m", "contactopt", "bench", str(path), "--out", str(out), "--jobs", "2", "--resume"]
+    command = [
+        sys.executable,
+        "-m",
+        "contactopt",
+        "bench",
+        str(path),
+        "--out",
+        str(out),
+        "--jobs",
+        "2",
+        "--resume",
+    ]
     rng, counts = np.random.default_rng(3), []
     for _ in range(5):
         process = subprocess.Popen(
@@ -179,7 +201,9 @@ def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
         counts.append(count(out))
         with open(out / "rows.jsonl", "ab") as file:  # the worst a kill can leave behind
             file.write(b'{"schema": 1, "key": "to')
-    assert counts[-1] < len(expected), "the campaign ended before it was killed five times; give it more runs"
+    assert counts[-1] < len(expected), (
+        "the campaign ended before it was killed five times; give it more runs"
+    )
     assert subprocess.run(command, capture_output=True).returncode == 0
     keys = [row["key"] for row in lines(out / "rows.jsonl")]
     assert len(keys) == len(set(keys)) and set(keys) == expected
@@ -188,13 +212,28 @@ def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
 
 def test_an_interrupted_campaign_keeps_its_rows(tmp_path):
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 500")), tmp_path / "out"
-    command = [sys.executable, "-m", "contactopt", "bench", str(path), "--out", str(out), "--jobs", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "contactopt",
+        "bench",
+        str(path),
+        "--out",
+        str(out),
+        "--jobs",
+        "1",
+    ]
     heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731 (a job in the background ignores it)
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, preexec_fn=heed)
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, preexec_fn=heed
+    )
     while process.poll() is None and count(out) < 5:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    assert "--resume" in process.communicate(timeout=PATIENCE)[1].splitlines()[-1] and process.returncode == 130
+    assert (
+        "--resume" in process.communicate(timeout=PATIENCE)[1].splitlines()[-1]
+        and process.returncode == 130
+    )
     with Store(out, resume=True) as store:
         assert len(store.finished()) >= 5
 
@@ -208,9 +247,20 @@ def test_workers_die_with_their_campaign(tmp_path):
     written(tmp_path, FAKES, "fakes.py")
     path = written(
         tmp_path,
-        'name = "x"\nplugins = ["fakes.py"]\n[[problems]]\nscene = "punch-2d"\n[[methods]]\nmethod = "hangs"\n',
+        'name = "x"\nplugins = ["fakes.py"]\n[[problems]]\nscene = "punch-2d"\n[[methods]]\nmethod'
+        ' = "hangs"\n',
     )
-    command = [sys.executable, "-m", "contactopt", "bench", str(path), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "contactopt",
+        "bench",
+        str(path),
+        "--out",
+        str(tmp_path / "out"),
+        "--jobs",
+        "1",
+    ]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     children = Path(f"/proc/{process.pid}/task")
     worker = None
@@ -286,7 +336,16 @@ def test_errors_name_the_line(tmp_path, old, new, line, words):
 
 def test_the_command_line(tmp_path, capsys):
     path = written(tmp_path, SMALL)
-    arguments = ["bench", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--filter", "problem=rigid*"]
+    arguments = [
+        "bench",
+        str(path),
+        "--out",
+        str(tmp_path / "out"),
+        "--jobs",
+        "1",
+        "--filter",
+        "problem=rigid*",
+    ]
     assert main(arguments) == 0
     assert "4 runs: 4 solved" in capsys.readouterr().out
     assert main(arguments) == 2 and "--resume" in capsys.readouterr().err
@@ -312,7 +371,9 @@ def fixed_point(problem, tol=1e-8, steps=20000):
     written(tmp_path, mine, "mine.py")
     text = SMALL.replace('scene = "punch-2d"', 'family = "tangential"\nof = "punch-2d"')
     table = run(tmp_path, 'plugins = ["mine.py"]' + text.replace('"nsgs"', '"fixed_point"'))
-    ours, theirs = (table[(table["name"] == name) & (table["dim"] == 2)] for name in ("auto", "fixed_point"))
+    ours, theirs = (
+        table[(table["name"] == name) & (table["dim"] == 2)] for name in ("auto", "fixed_point")
+    )
     assert len(theirs) == len(ours) == 4 and (theirs["status"] == "solved").all()
     assert (theirs["solve_seconds"] == theirs["call_seconds"]).all()
 
@@ -353,7 +414,9 @@ def springs(contacts=2):
     """
     table = run(tmp_path, text)
     assert sorted(set(table["contacts"])) == [1, 10, 100] and set(table["status"]) == {"solved"}
-    assert set(table["method"]) == {"Mine(patience=1)", "Mine(patience=2)"} and set(table["method.patience"]) == {1, 2}
+    assert set(table["method"]) == {"Mine(patience=1)", "Mine(patience=2)"} and set(
+        table["method.patience"]
+    ) == {1, 2}
     assert (table["iterations"] >= 1).all() and table["label"].str.startswith("Mine(").all()
 
 
@@ -373,17 +436,26 @@ def test_entry_points(tmp_path, monkeypatch):
 
 def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_path, monkeypatch):
     fclib = pytest.importorskip("h5py") and __import__("contactopt").fclib
-    text = SMALL + 'optional = true\n[[methods]]\nmethod = "alternating"\nnormal = "gurobi"\noptional = true\n'
-    text = text.replace("[[methods]]", '[[problems]]\nfclib = "${SOME_FOLDER}"\noptional = true\n[[methods]]', 1)
+    text = (
+        SMALL
+        + 'optional = true\n[[methods]]\nmethod = "alternating"\nnormal = "gurobi"\noptional ='
+        " true\n"
+    )
+    text = text.replace(
+        "[[methods]]", '[[problems]]\nfclib = "${SOME_FOLDER}"\noptional = true\n[[methods]]', 1
+    )
     monkeypatch.delenv("SOME_FOLDER", raising=False)
     assert len(read_experiment(written(tmp_path, text)).problems) == 3
     with pytest.raises(InputError, match="environment variable"):
-        read_experiment(written(tmp_path, text.replace('"${SOME_FOLDER}"\noptional = true', '"${SOME_FOLDER}"')))
+        read_experiment(
+            written(tmp_path, text.replace('"${SOME_FOLDER}"\noptional = true', '"${SOME_FOLDER}"'))
+        )
     fclib.write(problems.rigid_bodies(3, 4), tmp_path / "a.hdf5")
     monkeypatch.setenv("SOME_FOLDER", str(tmp_path))
     table = run(tmp_path, text, filters=["problem=a"])
     assert set(table["problem"]) == {"a"} and set(table["status"]) == {"solved"}
-    assert str(tmp_path) not in (tmp_path / "out" / "rows.jsonl").read_text()  # no path of this machine
+    # no path of this machine
+    assert str(tmp_path) not in (tmp_path / "out" / "rows.jsonl").read_text()
 
 
 def test_problems_that_cannot_be_built_are_rows(tmp_path):
@@ -425,7 +497,15 @@ def test_associated_friction_has_its_own_certificate():
 
 def test_a_worker_stays_with_its_problem():
     experiment = [
-        Task(Run(problems.ProblemSpec("family", name), MethodSpec("auto"), "mid", 1e-6, "cold", i), "", (), 1, 1, 1, 0)
+        Task(
+            Run(problems.ProblemSpec("family", name), MethodSpec("auto"), "mid", 1e-6, "cold", i),
+            "",
+            (),
+            1,
+            1,
+            1,
+            0,
+        )
         for name in ("a", "b")
         for i in range(3)
     ]
@@ -441,22 +521,31 @@ def test_families_are_what_they_say():
     solution = solve(line)
     r, x = solution.reactions[:, 0], line.coordinates[0]
     assert solution.solved and abs(r.sum() - 0.25) < 1e-9
-    exact = np.sqrt(np.maximum(0.25 - x**2, 0)) * 2 * 0.25 / (np.pi * 0.25)  # Hertz: a = 1/2, P = 1/4
+    # Hertz: a = 1/2, P = 1/4
+    exact = np.sqrt(np.maximum(0.25 - x**2, 0)) * 2 * 0.25 / (np.pi * 0.25)
     assert np.abs(r / line.areas - exact).max() < 0.02 * exact.max()
     assert np.linalg.eigvalsh(problems.half_plane(50, coupling=0.4).Q).min() > 0
     held = problems.tangential("punch-2d", elements=4)
     r = solve(held, tol=1e-12).reactions
     np.testing.assert_allclose(r[:, 0], -held.q[:, 0] / np.diag(held.Q)[::2], rtol=1e-9)
     assert (np.abs(r[:, 1]) <= 0.5 * r[:, 0] * (1 + 1e-9)).all() and np.abs(r[:, 1]).max() > 0
-    plain, twice = problems.reduced("punch-2d", elements=4), problems.redundant("punch-2d", elements=4, copies=2)
+    plain, twice = (
+        problems.reduced("punch-2d", elements=4),
+        problems.redundant("punch-2d", elements=4, copies=2),
+    )
     shared = solve(twice, tol=1e-10).reactions.reshape(plain.contacts, 2, 2).sum(axis=1)
     np.testing.assert_allclose(shared, solve(plain, tol=1e-10).reactions, atol=1e-5)
     units = problems.in_units("punch-2d", force=1e-3, length=1e-3, elements=4)
-    np.testing.assert_allclose(solve(units).reactions, 1e-3 * solve(plain).reactions, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(
+        solve(units).reactions, 1e-3 * solve(plain).reactions, rtol=1e-6, atol=1e-9
+    )
 
 
 def test_labels_tell_numbers_apart():
-    labels = {problems.ProblemSpec("scene", "x", {"mu": mu}).label for mu in (0.1, 0.1 + 1e-12, 1e8, 1e-5, 1)}
+    labels = {
+        problems.ProblemSpec("scene", "x", {"mu": mu}).label
+        for mu in (0.1, 0.1 + 1e-12, 1e8, 1e-5, 1)
+    }
     assert labels == {"x(mu=0.1)", f"x(mu={0.1 + 1e-12})", "x(mu=1e+08)", "x(mu=1e-05)", "x(mu=1)"}
     assert MethodSpec("penalty", {"factor": 1e8, "tangential_factor": 1234567.5}).label.endswith(
         "tangential_factor=1234567.5)"
@@ -474,24 +563,33 @@ def test_a_run_past_its_time_limit_is_no_success(tmp_path, monkeypatch):
     monkeypatch.setattr(pool, "GRACE", float(PATIENCE))
     written(
         tmp_path,
-        "import time\nfrom contactopt import solve\nfrom contactopt.benchmark import method\n@method\n"
-        "def slow(problem):\n    time.sleep(0.5)\n    return solve(problem).reactions\n",
+        "import time\nfrom contactopt import solve\nfrom contactopt.benchmark import"
+        " method\n@method\ndef slow(problem):\n    time.sleep(0.5)\n    return"
+        " solve(problem).reactions\n",
         "slow.py",
     )
-    text = 'plugins = ["slow.py"]' + SMALL.replace('["auto", "nsgs"]', '"slow"').replace("limit = 10.0", "limit = 0.4")
+    text = 'plugins = ["slow.py"]' + SMALL.replace('["auto", "nsgs"]', '"slow"').replace(
+        "limit = 10.0", "limit = 0.4"
+    )
     table = run(tmp_path, text, filters=["problem=rigid*"])
-    assert set(table["status"]) == {"time_limit"} and not table["success"].any() and (table["residual"] < 1e-8).all()
+    assert (
+        set(table["status"]) == {"time_limit"}
+        and not table["success"].any()
+        and (table["residual"] < 1e-8).all()
+    )
 
 
 def test_threads_are_pinned(tmp_path):
     written(
         tmp_path,
-        "import os\nfrom contactopt.benchmark import method\n@method\ndef look(problem):\n"
-        "    raise RuntimeError(os.environ['OPENBLAS_NUM_THREADS'] + os.environ['RAYON_NUM_THREADS'])\n",
+        "import os\nfrom contactopt.benchmark import method\n@method\ndef look(problem):\n    raise"
+        " RuntimeError(os.environ['OPENBLAS_NUM_THREADS'] + os.environ['RAYON_NUM_THREADS'])\n",
         "look.py",
     )
     table = run(
-        tmp_path, 'plugins = ["look.py"]' + SMALL.replace('["auto", "nsgs"]', '"look"'), filters=["problem=rigid*"]
+        tmp_path,
+        'plugins = ["look.py"]' + SMALL.replace('["auto", "nsgs"]', '"look"'),
+        filters=["problem=rigid*"],
     )
     assert table["message"].str.endswith("11").all()
 
@@ -499,7 +597,9 @@ def test_threads_are_pinned(tmp_path):
 def test_a_worker_process_outlives_failures_that_leave_it_intact(tmp_path):
     with Worker() as worker:
         spec = problems.ProblemSpec("family", "rigid_bodies", {"bodies": 3, "contacts": 4})
-        task = Task(Run(spec, MethodSpec("lemke"), "mid", 1e-6, "cold", 0), "x", (), 5.0, 4.0, 100, 0)
+        task = Task(
+            Run(spec, MethodSpec("lemke"), "mid", 1e-6, "cold", 0), "x", (), 5.0, 4.0, 100, 0
+        )
         first = worker.run(task)
         pid = worker.solver.number
         assert first["status"] == "refused" and first["fingerprint"]

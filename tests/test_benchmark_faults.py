@@ -1,4 +1,6 @@
-"""What can go wrong around a campaign: killed processes, full disks, bad plug-ins, strange names and numbers."""
+"""What can go wrong around a campaign: killed processes, full disks, bad plug-ins, strange names
+and numbers.
+"""
 
 import contextlib
 import json
@@ -49,7 +51,9 @@ SCENE = '[[problems]]\nscene = "punch-2d"\nelements = 4\n'
 def one_line(text: str, words: str = "") -> None:
     """A sentence of the program, not a traceback."""
     rows = text.strip().splitlines()
-    assert "Traceback" not in text and rows[-1].startswith("contactopt: ") and words in rows[-1], text
+    assert "Traceback" not in text and rows[-1].startswith("contactopt: ") and words in rows[-1], (
+        text
+    )
 
 
 # Names and links
@@ -87,11 +91,20 @@ STRANGE = ["<b>bold", "x | y", "$\\frac{$ and $a$", "[a](", "`", "a\nb"]
 
 
 def test_strange_texts_are_shown_as_they_are(tmp_path):
-    """The same texts as title, text, captions, finding and names of solvers and problems, in tables and figures."""
+    """The same texts as title, text, captions, finding and names of solvers and problems, in tables
+    and figures.
+    """
     rows = [json.loads(line) for line in _rows(tmp_path)]
     for number, row in enumerate(rows):
         name = STRANGE[number % len(STRANGE)]
-        row |= {"method": name, "name": name, "label": name, "problem": name, "family": name, "machine": name}
+        row |= {
+            "method": name,
+            "name": name,
+            "label": name,
+            "problem": name,
+            "family": name,
+            "machine": name,
+        }
     folder = tmp_path / "reports" / "strange"
     folder.mkdir(parents=True)
     table = tmp_path / "rows.jsonl"
@@ -191,12 +204,18 @@ ENDS = {
 
 
 def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monkeypatch):
-    """Between them stand honest runs, which must be certified whatever the plug-in before did to their process."""
+    """Between them stand honest runs, which must be certified whatever the plug-in before did to
+    their process.
+    """
     largest = []
     whole = process.Process._wait
     monkeypatch.setattr(process, "MOST_WORDS", 1e6)
     monkeypatch.setattr(process, "BEAT", 0.02)
-    cut = lambda self, *given: largest.append(os.fstat(self.noise.fileno()).st_size) or whole(self, *given)  # noqa: E731
+
+    def cut(self, *given):
+        largest.append(os.fstat(self.noise.fileno()).st_size)
+        return whole(self, *given)
+
     monkeypatch.setattr(process.Process, "_wait", cut)
     written(tmp_path, BAD, "bad.py")
     text = """
@@ -211,7 +230,10 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
         text += f'[[methods]]\nmethod = "{name}"\n'
         text += f'[[methods]]\nmethod = "honest"\nnumber = {number}\n' if number % 2 else ""
     table = run(tmp_path, text)
-    assert len(table) == len(read_experiment(written(tmp_path, text)).methods) and table["key"].is_unique
+    assert (
+        len(table) == len(read_experiment(written(tmp_path, text)).methods)
+        and table["key"].is_unique
+    )
     ends = {name: set(rows["status"]) for name, rows in table.groupby("name")}
     assert ends == {name: {status} for name, status in ENDS.items()}
     assert table["fingerprint"].nunique() == 1
@@ -220,9 +242,14 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
 
 
 def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
-    """The first run of the method also costs its warm-up; those that follow cost their limit and a start."""
+    """The first run of the method also costs its warm-up; those that follow cost their limit and a
+    start.
+    """
     name = f"hangs_{os.getpid()}"
-    source = f"import time\nfrom contactopt.benchmark import method\n@method\ndef {name}(problem, n=0):\n    time.sleep(1e4)\n"
+    source = (
+        f"import time\nfrom contactopt.benchmark import method\n@method\ndef {name}(problem,"
+        " n=0):\n    time.sleep(1e4)\n"
+    )
     written(tmp_path, source, "mine.py")
     spec = problems.ProblemSpec("family", "rigid_bodies", {"bodies": 3, "contacts": 4})
     plugins = (str(tmp_path / "mine.py"),)
@@ -239,11 +266,16 @@ def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
         worker.solver.start()
         worker.solver.ask(100.0, "look", os.getpid)
         start = time.monotonic() - start
-    assert seconds[0] < pool.PLUGIN_WARM_UP + hard + 4 * start + 10.0 and max(seconds[1:]) < hard + 2 * start + 10.0
+    assert (
+        seconds[0] < pool.PLUGIN_WARM_UP + hard + 4 * start + 10.0
+        and max(seconds[1:]) < hard + 2 * start + 10.0
+    )
 
 
 def test_nothing_that_a_solver_started_outlives_the_campaign(tmp_path):
-    """A child in a session of its own, and its child, whose parent is gone; after a plain end and after kill -9."""
+    """A child in a session of its own, and its child, whose parent is gone; after a plain end and
+    after kill -9.
+    """
     source = """
 import os, subprocess, sys, time
 from pathlib import Path
@@ -313,7 +345,10 @@ def exits():
         "mine.py",
     )
     families = "".join(f'[[problems]]\nfamily = "{name}"\n' for name in ("is_none", "exits"))
-    table = run(tmp_path, f'name = "x"\nplugins = ["mine.py"]\n{families}{SCENE}[[methods]]\nmethod = "auto"\n')
+    table = run(
+        tmp_path,
+        f'name = "x"\nplugins = ["mine.py"]\n{families}{SCENE}[[methods]]\nmethod = "auto"\n',
+    )
     status = dict(zip(table["family"], table["status"]))
     assert status == {"is_none": "not_built", "exits": "not_built", "punch-2d": "solved"}
     assert table["message"].str.len().min() > 0
@@ -327,7 +362,13 @@ def exits():
         ("from contactopt.benchmark import method\nmethod(3)\n", "must be a function"),
         ("from contactopt.benchmark import method\nmethod(len, name=3)\n", "name"),
         ("from contactopt.benchmark import method\n@method(law='x')\ndef f(p): pass\n", "law"),
-        ("from contactopt.benchmark import problem\n@problem(name='half_plane')\ndef f(): pass\n", "half_plane"),
+        (
+            (
+                "from contactopt.benchmark import problem\n@problem(name='half_plane')\ndef f():"
+                " pass\n"
+            ),
+            "half_plane",
+        ),
         ("def (", "SyntaxError"),
     ],
 )
@@ -362,11 +403,17 @@ def test_plugin_files_that_cannot_be_loaded_are_one_sentence(tmp_path, source, w
         ("mu = [0.2, 0.5]", "mu = [[0.2], 0.5]", "'mu'"),
         ("mu = [0.2, 0.5]", "mu = 2020-01-01", "'mu'"),
         ("elements = 4", f"elements = {10**30}", "elements"),
-        ("bodies = 4", "bodies = {from = 2, to = 900, steps = 800}\nseed = {from = 1, to = 999, steps = 900}", "runs"),
+        (
+            "bodies = 4",
+            "bodies = {from = 2, to = 900, steps = 800}\nseed = {from = 1, to = 999, steps = 900}",
+            "runs",
+        ),
         ('["auto", "nsgs"]', "[3]", "name"),
     ],
 )
-def test_absurd_numbers_are_refused_in_one_sentence_before_any_work(tmp_path, capsys, old, new, words):
+def test_absurd_numbers_are_refused_in_one_sentence_before_any_work(
+    tmp_path, capsys, old, new, words
+):
     assert old in SMALL
     path = written(tmp_path, SMALL.replace(old, new))
     begin = time.process_time()
@@ -377,7 +424,19 @@ def test_absurd_numbers_are_refused_in_one_sentence_before_any_work(tmp_path, ca
 
 def test_absurd_numbers_of_workers(tmp_path, capsys):
     for jobs in ("0", "-1", "1000000000"):
-        assert main(["bench", str(written(tmp_path, SMALL)), "--jobs", jobs, "--out", str(tmp_path / "out")]) == 2
+        assert (
+            main(
+                [
+                    "bench",
+                    str(written(tmp_path, SMALL)),
+                    "--jobs",
+                    jobs,
+                    "--out",
+                    str(tmp_path / "out"),
+                ]
+            )
+            == 2
+        )
         one_line(capsys.readouterr().err, "jobs")
 
 
@@ -385,7 +444,18 @@ def test_absurd_numbers_of_workers(tmp_path, capsys):
 
 
 def bench(path: Path, out: Path, *more: str, **settings) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "contactopt", "bench", str(path), "--out", str(out), "--jobs", "2", *more]
+    command = [
+        sys.executable,
+        "-m",
+        "contactopt",
+        "bench",
+        str(path),
+        "--out",
+        str(out),
+        "--jobs",
+        "2",
+        *more,
+    ]
     return subprocess.run(command, capture_output=True, text=True, **settings)
 
 
@@ -395,7 +465,8 @@ def test_malformed_rows_are_made_again(tmp_path):
     rows = (out / "rows.jsonl").read_text().splitlines()
     first = json.loads(rows[0])
     spoilt = [
-        json.dumps(first | change) for change in ({"residual": "x"}, {"key": 3}, {"repeat": 10**30}, {"schema": None})
+        json.dumps(first | change)
+        for change in ({"residual": "x"}, {"key": 3}, {"repeat": 10**30}, {"schema": None})
     ]
     bad = ["3", "[]", "null", "{}", '"x"', "[" * 100_000, '{"key": "', "\x00", *spoilt]
     (out / "rows.jsonl").write_text("\n".join([*bad, *rows[2:], '{"torn']))
@@ -422,7 +493,9 @@ def test_answers_of_another_size_are_not_compared(tmp_path):
 
 
 def test_a_full_disk_is_one_sentence_and_loses_nothing(tmp_path):
-    """No file may grow beyond a size that ends within the rows; with room again the campaign goes on."""
+    """No file may grow beyond a size that ends within the rows; with room again the campaign goes
+    on.
+    """
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 4")), tmp_path / "out"
     expected = {r.key for r in read_experiment(path).runs()}
     for size in (10, 20_000):
@@ -441,7 +514,12 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(tmp_path):
 def test_folders_that_cannot_be_written(tmp_path, capsys):
     path = written(tmp_path, SMALL)
     (tmp_path / "file").write_text("")
-    for out in ("/proc/nothing", str(tmp_path / "file"), str(tmp_path / "file" / "below"), "/dev/full"):
+    for out in (
+        "/proc/nothing",
+        str(tmp_path / "file"),
+        str(tmp_path / "file" / "below"),
+        "/dev/full",
+    ):
         assert main(["bench", str(path), "--out", out, "--jobs", "1"]) == 2
         one_line(capsys.readouterr().err, "write")
 
@@ -454,7 +532,18 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 30")), tmp_path / "out"
     expected = {r.key for r in read_experiment(path).runs()}
     rng = np.random.default_rng(5)
-    command = [sys.executable, "-m", "contactopt", "bench", str(path), "--out", str(out), "--jobs", "2", "--resume"]
+    command = [
+        sys.executable,
+        "-m",
+        "contactopt",
+        "bench",
+        str(path),
+        "--out",
+        str(out),
+        "--jobs",
+        "2",
+        "--resume",
+    ]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     killed = 0
     for rounds in range(3):
@@ -475,12 +564,18 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
     keys = [row["key"] for row in rows]
     assert len(keys) == len(set(keys)) and set(keys) == expected
     failed = [row for row in rows if not row["success"]]
-    assert len(failed) <= killed and {row["status"] for row in failed} <= {"out_of_memory"} and killed >= 2
+    assert (
+        len(failed) <= killed
+        and {row["status"] for row in failed} <= {"out_of_memory"}
+        and killed >= 2
+    )
 
 
 @pytest.mark.parametrize("kills", [2, 3])
 def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
-    """Twice may be chance; a process that never lives to say a word ends the campaign with one sentence."""
+    """Twice may be chance; a process that never lives to say a word ends the campaign with one
+    sentence.
+    """
     starts = []
 
     def prepare(*told):
@@ -510,12 +605,18 @@ def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
 def solvers(campaign: int) -> list[int]:
     """The worker processes of a campaign."""
     with contextlib.suppress(psutil.Error):
-        return [own.pid for own in psutil.Process(campaign).children() if "popen_loky" in " ".join(own.cmdline())]
+        return [
+            own.pid
+            for own in psutil.Process(campaign).children()
+            if "popen_loky" in " ".join(own.cmdline())
+        ]
     return []
 
 
 def test_rows_that_were_not_asked_for_or_are_missing_are_told(tmp_path, monkeypatch):
-    """Whatever hands out the runs: a campaign whose rows are not those of its runs does not end with success."""
+    """Whatever hands out the runs: a campaign whose rows are not those of its runs does not end
+    with success.
+    """
     from contactopt.benchmark import campaign
 
     path = written(tmp_path, SMALL)
@@ -523,21 +624,28 @@ def test_rows_that_were_not_asked_for_or_are_missing_are_told(tmp_path, monkeypa
     monkeypatch.setattr(campaign, "run_locally", lambda tasks, jobs: whole(tasks[1:], jobs))
     with pytest.raises(InputError, match="1 of 12 runs left no row"):
         benchmark.run_campaign(path, tmp_path / "a", jobs=2, quiet=True)
-    monkeypatch.setattr(campaign, "run_locally", lambda tasks, jobs: whole([tasks[0], tasks[0]], jobs))
+    monkeypatch.setattr(
+        campaign, "run_locally", lambda tasks, jobs: whole([tasks[0], tasks[0]], jobs)
+    )
     with pytest.raises(InputError, match="twice"):
         benchmark.run_campaign(path, tmp_path / "b", jobs=1, quiet=True)
     monkeypatch.undo()
-    assert len(benchmark.load(benchmark.run_campaign(path, tmp_path / "a", resume=True, quiet=True))) == 12
+    assert (
+        len(benchmark.load(benchmark.run_campaign(path, tmp_path / "a", resume=True, quiet=True)))
+        == 12
+    )
 
 
 def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
-    """Nothing is left in the module: not by a second registry, and not by a file that is imported in a plain way."""
+    """Nothing is left in the module: not by a second registry, and not by a file that is imported
+    in a plain way.
+    """
     from contactopt.benchmark.plugins import Registry
 
     file = tmp_path / "mine.py"
     file.write_text(
-        "from contactopt.benchmark import method, problem\n@method(law='associated')\ndef mine(p): return p.q\n"
-        "@problem(name='other')\ndef family(n=1): return n\n"
+        "from contactopt.benchmark import method, problem\n@method(law='associated')\ndef mine(p):"
+        " return p.q\n@problem(name='other')\ndef family(n=1): return n\n"
     )
     first, second = Registry(), Registry()
     first.load([file, file])
@@ -546,13 +654,18 @@ def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
     assert second.find("mine") is None and not second.problems
     names = {}
     exec(compile(file.read_text(), file, "exec"), names)
-    assert callable(names["mine"]) and second.find("mine") is None and list(first.methods) == ["mine"]
+    assert (
+        callable(names["mine"]) and second.find("mine") is None and list(first.methods) == ["mine"]
+    )
 
 
 def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal():
-    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as gmsh leaves it: a broken pipe would end this process
+    # as gmsh leaves it: a broken pipe would end this process
+    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     try:
-        process = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        process = subprocess.Popen(
+            [sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
         process.stdin.write(b"word")  # stays in the buffer until the pipe is closed
         os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
         child._stop(process)

@@ -17,7 +17,10 @@ from tests.test_benchmark_faults import BAD_NAMES, one_line
 
 @pytest.mark.parametrize("name", BAD_NAMES)
 def test_bodies_have_names_that_can_be_files(name):
-    for make in (lambda: Part(name, block("plane-strain", 0, 1), Material(5.0, 0.3)), lambda: Rigid(name)):
+    for make in (
+        lambda: Part(name, block("plane-strain", 0, 1), Material(5.0, 0.3)),
+        lambda: Rigid(name),
+    ):
         with pytest.raises(InputError, match="name"):
             make()
 
@@ -31,7 +34,9 @@ def test_two_bodies_of_one_name():
 
 
 def test_a_folder_used_again_keeps_nothing_of_the_run_before(tmp_path):
-    """Files of the user's stay, also where their names look like those of a run; those of the earlier run go."""
+    """Files of the user's stay, also where their names look like those of a run; those of the
+    earlier run go.
+    """
     out, fresh, mine = tmp_path / "out", tmp_path / "fresh", {"notes.txt", "mine.vtu"}
     run(two_blocks("plane-strain"), out)
     first = {file.name for file in out.iterdir()}
@@ -53,7 +58,17 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
     """Ctrl-C at several moments from the start on: exit code 130, one last line, and no file."""
     for number, wait in enumerate((0.3, 1.0, 2.0)):
         out = tmp_path / f"out{number}" / "below"
-        command = [sys.executable, "-m", "contactopt", "run", "punch-3d", "--elements", "12", "--out", str(out)]
+        command = [
+            sys.executable,
+            "-m",
+            "contactopt",
+            "run",
+            "punch-3d",
+            "--elements",
+            "12",
+            "--out",
+            str(out),
+        ]
         heed = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
         process = subprocess.Popen(
             command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, preexec_fn=heed
@@ -68,7 +83,9 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
 
 
 def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
-    assert main(["run", "punch-2d", "--elements", "1000000000", "--out", str(tmp_path / "out")]) == 2
+    assert (
+        main(["run", "punch-2d", "--elements", "1000000000", "--out", str(tmp_path / "out")]) == 2
+    )
     one_line(capsys.readouterr().err, "elements")
     assert not (tmp_path / "out").exists()
 
@@ -84,14 +101,18 @@ def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
         (["x" * 300 + ".toml"], "does not exist"),
     ],
 )
-def test_sizes_that_numbers_lose_and_names_that_no_file_has(arguments, words, tmp_path, capsys, monkeypatch):
+def test_sizes_that_numbers_lose_and_names_that_no_file_has(
+    arguments, words, tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     assert main(["run", *arguments]) == 2
     one_line(capsys.readouterr().err, words)
 
 
 @pytest.mark.parametrize("name", ["punch-2d", "punch-3d", "sphere"])
-def test_meshes_beyond_the_memory_that_is_free_are_refused_before_they_are_made(name, tmp_path, capsys, monkeypatch):
+def test_meshes_beyond_the_memory_that_is_free_are_refused_before_they_are_made(
+    name, tmp_path, capsys, monkeypatch
+):
     monkeypatch.setattr("contactopt.checks._free_memory", lambda: 1e6)
     monkeypatch.setattr("skfem.MeshQuad.init_tensor", None)
     monkeypatch.setattr("skfem.MeshHex.init_tensor", None)
@@ -100,7 +121,9 @@ def test_meshes_beyond_the_memory_that_is_free_are_refused_before_they_are_made(
 
 
 @pytest.mark.parametrize("place", ["solve_states", "recover"])
-def test_the_end_of_memory_in_a_run_is_one_sentence_with_a_size(place, tmp_path, capsys, monkeypatch):
+def test_the_end_of_memory_in_a_run_is_one_sentence_with_a_size(
+    place, tmp_path, capsys, monkeypatch
+):
     def full(*given, **more):
         raise MemoryError
 
@@ -111,17 +134,35 @@ def test_the_end_of_memory_in_a_run_is_one_sentence_with_a_size(place, tmp_path,
 
 
 def test_a_force_beyond_all_numbers_is_one_sentence(tmp_path, capsys):
-    assert main(["run", "punch-2d", "--force", "1e308", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
+    assert (
+        main(
+            [
+                "run",
+                "punch-2d",
+                "--force",
+                "1e308",
+                "--elements",
+                "4",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 2
+    )
     one_line(capsys.readouterr().err, "1e+100")
     assert not (tmp_path / "out").exists()
 
 
-def test_hidden_folders_of_killed_programs_are_removed_and_those_in_use_are_kept(tmp_path, monkeypatch):
-    """A program is killed in the middle of writing; the next one that writes there tidies up, and nobody else is hurt."""
+def test_hidden_folders_of_killed_programs_are_removed_and_those_in_use_are_kept(
+    tmp_path, monkeypatch
+):
+    """A program is killed in the middle of writing; the next one that writes there tidies up, and
+    nobody else is hurt.
+    """
     code = (
-        "import os, signal, sys\nfrom pathlib import Path\nfrom contactopt.files.writing import whole_folder\n"
-        "with whole_folder(sys.argv[1]) as folder:\n    (folder / 'half').write_text('x')\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "import os, signal, sys\nfrom pathlib import Path\nfrom contactopt.files.writing import"
+        " whole_folder\nwith whole_folder(sys.argv[1]) as folder:\n    (folder /"
+        " 'half').write_text('x')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path)])
     (left,) = tmp_path.glob(".contactopt-*")

@@ -24,7 +24,11 @@ def test_a_campaign_ends_with_a_page_of_all_its_runs(campaign):
     rows, table = data_of(campaign / "report.html")["rows"], load(campaign)
     assert len(rows) == len(table)
     for row, (_, run) in zip(rows, table.iterrows()):
-        assert (row["method"], row["status"], row["success"]) == (run["method"], run["status"], bool(run["success"]))
+        assert (row["method"], row["status"], row["success"]) == (
+            run["method"],
+            run["status"],
+            bool(run["success"]),
+        )
         assert row["residual"] == pytest.approx(run["residual"], rel=1e-3)
     assert any(len(row.get("history", ())) == 3 for row in rows)
 
@@ -44,7 +48,9 @@ def test_an_empty_folder_is_refused(tmp_path):
 
 def test_every_reason_of_refusal_is_said_once_with_its_number():
     missing = "QP backend 'scs' is not installed; pip install scs"
-    table = pd.DataFrame({"status": ["refused"] * 3 + ["solved"], "message": [missing, missing, "no", ""]})
+    table = pd.DataFrame(
+        {"status": ["refused"] * 3 + ["solved"], "message": [missing, missing, "no", ""]}
+    )
     assert refusals(table) == [f"2 runs were refused: {missing}", "1 run was refused: no"]
 
 
@@ -52,7 +58,10 @@ def test_every_reason_of_refusal_is_said_once_with_its_number():
 def test_a_browser_sorts_and_filters_the_runs_and_draws_one(campaign):
     with Browser(campaign / "report.html", 400) as browser:
         browser.wait("document.querySelectorAll('#convergence .main-svg').length > 0")
-        cells = "[...document.querySelectorAll('#runs tbody tr')].map((row) => row.children[{}].innerText)"
+        cells = (
+            "[...document.querySelectorAll('#runs tbody tr')].map((row) =>"
+            " row.children[{}].innerText)"
+        )
         head = "[...document.querySelectorAll('#runs th button')].map((button) => button.innerText)"
         column = browser.ask(head).index("cpu seconds")
         browser.ask(f"document.querySelectorAll('#runs th button')[{column}].click()")
@@ -60,7 +69,8 @@ def test_a_browser_sorts_and_filters_the_runs_and_draws_one(campaign):
         assert times == sorted(times) and len(times) == len(load(campaign))
         method = browser.ask("document.querySelector('#filter-method').options[1].value")
         browser.ask(
-            "{const s = document.querySelector('#filter-method'); s.selectedIndex = 1; s.dispatchEvent(new Event('change'))}"
+            "{const s = document.querySelector('#filter-method'); s.selectedIndex = 1;"
+            " s.dispatchEvent(new Event('change'))}"
         )
         assert set(browser.ask(cells.format(browser.ask(head).index("method")))) == {method}
         browser.ask("document.querySelector('#runs tbody tr').focus()")

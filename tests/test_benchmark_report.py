@@ -26,8 +26,22 @@ REPORTS = Path(__file__).parents[1] / "reports"
 def table(**columns) -> pd.DataFrame:
     """Rows with the given columns; the others as in a successful run."""
     size = max(len(v) for v in columns.values())
-    usual = {"law": "coulomb", "setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True}
-    usual |= {"claimed": True, "status": "solved", "residual": 1e-7, "time_limit": 10.0, "problem": "p", "method": "m"}
+    usual = {
+        "law": "coulomb",
+        "setting": "mid",
+        "tolerance": 1e-6,
+        "start": "cold",
+        "repeat": 0,
+        "success": True,
+    }
+    usual |= {
+        "claimed": True,
+        "status": "solved",
+        "residual": 1e-7,
+        "time_limit": 10.0,
+        "problem": "p",
+        "method": "m",
+    }
     return pd.DataFrame({name: [value] * size for name, value in usual.items()} | columns)
 
 
@@ -58,7 +72,8 @@ def test_exponents_of_growth():
     n = np.array([10.0, 20, 40, 80, 160])
     assert abs(fitted_exponent(n, 3e-6 * n**1.5) - 1.5) < 1e-12
     assert np.isnan(fitted_exponent(n[:2], n[:2]))
-    late = np.where(n < 40, 1e-2, 1e-5 * n**2)  # a constant cost that hides the power at small sizes
+    # a constant cost that hides the power at small sizes
+    late = np.where(n < 40, 1e-2, 1e-5 * n**2)
     assert abs(fitted_exponent(n, late) - 2) < 1e-12
 
 
@@ -71,7 +86,9 @@ def test_the_pareto_front_is_drawn_through_what_nothing_beats():
 
 def test_time_table_counts_failures_at_the_time_limit():
     rows = table(
-        method=["a", "a", "b", "b"], solve_seconds=[0.001, 0.003, 0.001, 5.0], success=[True, True, True, False]
+        method=["a", "a", "b", "b"],
+        solve_seconds=[0.001, 0.003, 0.001, 5.0],
+        success=[True, True, True, False],
     )
     out = tables.time_table(rows).set_index("method")
     a = np.sqrt(0.002 * 0.004) - 0.001
@@ -115,12 +132,18 @@ def test_stability_map_and_its_thresholds():
     mu, ratio = np.meshgrid([0.1, 1.0, 10.0], [1.0, 100.0])
     rows = table(**{"problem.mu": mu.ravel(), "problem.stiffness_ratio": ratio.ravel()})
     rows["success"] = rows["problem.mu"] < 5
-    rows["guaranteed_mu"], rows["alternating_mu"] = np.where(rows["problem.stiffness_ratio"] == 1, 1.0, 0.1), np.inf
+    rows["guaranteed_mu"], rows["alternating_mu"] = (
+        np.where(rows["problem.stiffness_ratio"] == 1, 1.0, 0.1),
+        np.inf,
+    )
     rows["iterations"] = 7.0
     figure = figures.stability_map(rows)
-    np.testing.assert_array_equal(figure.axes[0].get_images()[0].get_array(), [[1, 1, 0], [1, 1, 0]])
+    np.testing.assert_array_equal(
+        figure.axes[0].get_images()[0].get_array(), [[1, 1, 0], [1, 1, 0]]
+    )
     (line,) = figure.axes[0].get_lines()
-    np.testing.assert_allclose(line.get_xydata(), [[1, 0], [0, 1]])  # mu = 1 in the first row, .1 in the second
+    # mu = 1 in the first row, .1 in the second
+    np.testing.assert_allclose(line.get_xydata(), [[1, 0], [0, 1]])
     shown = figures.stability_map(rows, value="iterations").axes[0].get_images()[0].get_array()
     assert np.ma.getmaskarray(np.ma.masked_invalid(shown))[:, 2].all() and shown[0, 0] == 7
 
@@ -129,7 +152,9 @@ def test_convergence_draws_the_history():
     history = json.dumps([[1e-1, 1e-3], [0.1, 0.2], [1, 2]])
     rows = table(history=[history])
     np.testing.assert_allclose(lines(figures.convergence(rows))["m"], [[1, 1e-1], [2, 1e-3]])
-    np.testing.assert_allclose(lines(figures.convergence(rows, x="seconds"))["m"], [[0.1, 1e-1], [0.2, 1e-3]])
+    np.testing.assert_allclose(
+        lines(figures.convergence(rows, x="seconds"))["m"], [[0.1, 1e-1], [0.2, 1e-3]]
+    )
 
 
 def test_profiles_compare_within_one_law():
@@ -143,7 +168,10 @@ def test_profiles_compare_within_one_law():
 
 
 EXPERIMENT = (
-    SMALL.replace("repeats = 2", 'repeats = 2\nfindings = "mine.py"\ntitle = "A small one"\ntext = "What it is."')
+    SMALL.replace(
+        "repeats = 2",
+        'repeats = 2\nfindings = "mine.py"\ntitle = "A small one"\ntext = "What it is."',
+    )
     + """
 [quick]
 repeats = 1
@@ -165,7 +193,11 @@ caption = "Who won."
 def reported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / "campaigns").mkdir()
-    written(folder / "campaigns", "def findings(table):\n    return [f'{len(table)} runs were made.']\n", "mine.py")
+    written(
+        folder / "campaigns",
+        "def findings(table):\n    return [f'{len(table)} runs were made.']\n",
+        "mine.py",
+    )
     written(folder / "campaigns", EXPERIMENT, "small.toml")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -196,17 +228,27 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     assert again == text and "1. 12 runs were made." in text and "What it is." in text
     for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
         assert Path("reports/small", name).stat().st_size > 1000
-    assert text.count("*Figure ") == 2 and text.count("*Table ") == 1 and "contactopt report --run full small" in text
+    assert (
+        text.count("*Figure ") == 2
+        and text.count("*Table ") == 1
+        and "contactopt report --run full small" in text
+    )
     quick = Path("out/quick/reports/small/report.md").read_text()
     assert "1. 6 runs were made." in quick
     csv = benchmark.load("reports/small/rows.csv")
-    assert {"versions", "machine", "backend", "history"} <= set(csv) <= set(COLUMNS) | {f for f in csv if "." in f}
+    assert (
+        {"versions", "machine", "backend", "history"}
+        <= set(csv)
+        <= set(COLUMNS) | {f for f in csv if "." in f}
+    )
 
 
 def test_the_page_stands_alone(reported):
     page = (reported / "reports" / "benchmarks.html").read_text()
     sources = re.findall(r'src="([^"]*)"', page)
-    assert len(sources) == 2 and all(source.startswith("data:image/png;base64,") for source in sources)
+    assert len(sources) == 2 and all(
+        source.startswith("data:image/png;base64,") for source in sources
+    )
     assert all(link.startswith(("#", "http")) for link in re.findall(r'href="([^"]*)"', page))
     assert "<table>" in page and "A small one" in page
 
@@ -216,7 +258,11 @@ def test_the_page_stands_alone(reported):
     [
         ('kind = "convergence"', 'kind = "pie"', "figure 2: unknown kind 'pie'"),
         ('caption = "Histories."', "", "figure 2: it needs a caption"),
-        ('where = {family = "rigid_bodies"}', 'where = {family = "none"}', "figure 2 (convergence): no row"),
+        (
+            'where = {family = "rigid_bodies"}',
+            'where = {family = "none"}',
+            "figure 2 (convergence): no row",
+        ),
         ('where = {family = "rigid_bodies"}', "colour = 1", "figure 2 (convergence)"),
         ('findings = "mine.py"', 'findings = "yours.py"', "yours.py"),
     ],
@@ -233,7 +279,10 @@ def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, 
 
 @pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
 def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch):
-    """Every experiment can be read in both versions, and its report says what its table says. Pictures are left out."""
+    """Every experiment can be read in both versions, and its report says what its table says.
+
+    Pictures are left out.
+    """
     monkeypatch.setattr(benchmark.report, "_png", lambda figure: b"")
     for quick in (False, True):
         assert benchmark.read_experiment(path, quick=quick).runs()
@@ -246,7 +295,9 @@ def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch)
     benchmark.report.build([path], tmp_path)
 
     def kept(report: Path) -> str:
-        return "\n".join(line for line in report.read_text().splitlines() if not line.startswith("Experiment:"))
+        return "\n".join(
+            line for line in report.read_text().splitlines() if not line.startswith("Experiment:")
+        )
 
     assert kept(tmp_path / name / "report.md") == kept(folder / "report.md")
     assert all(file.stat().st_size < 1_000_000 for file in folder.iterdir())
@@ -254,7 +305,9 @@ def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch)
 
 def test_sixteen_methods_have_their_own_markers_and_labels_where_their_lines_end():
     names = [f"m{i:02}" for i in range(16)]
-    rows = table(method=names, solve_seconds=[0.01 * 1.3**i for i in range(16)], residual=[1e-7] * 16)
+    rows = table(
+        method=names, solve_seconds=[0.01 * 1.3**i for i in range(16)], residual=[1e-7] * 16
+    )
     ax = figures.speed_accuracy(rows).axes[0]
     drawn = [line for line in ax.get_lines() if line.get_label() in names]
     assert len({line.get_marker() for line in drawn}) == 16
@@ -265,7 +318,11 @@ def test_sixteen_methods_have_their_own_markers_and_labels_where_their_lines_end
 
 def test_long_labels_are_shortened_and_can_be_set():
     long = "normal_qp(backend='clarabel', exact=True)"
-    rows = table(method=[long, "normal_qp(backend='clarabel', exact=False)"], solve_seconds=[1.0, 2.0], contacts=[1, 1])
+    rows = table(
+        method=[long, "normal_qp(backend='clarabel', exact=False)"],
+        solve_seconds=[1.0, 2.0],
+        contacts=[1, 1],
+    )
     curves = lines(figures.performance_profile(rows))
     assert {"normal_qp clarabel exact (1)", "normal_qp clarabel (1)"} <= set(curves)
     for draw in (figures.performance_profile, figures.speed_accuracy, figures.time_against_size):
@@ -278,29 +335,55 @@ def test_nothing_is_drawn_below_a_hundredth_of_the_tolerance():
 
 
 def test_the_cells_of_a_map_hold_their_numbers():
-    rows = table(**{"problem.nu": [0.1, 1.0], "problem.elements": [1.0, 1.0], "iterations": [1.0, 40.0]})
-    ax = figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations").axes[0]
+    rows = table(
+        **{"problem.nu": [0.1, 1.0], "problem.elements": [1.0, 1.0], "iterations": [1.0, 40.0]}
+    )
+    ax = figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations").axes[
+        0
+    ]
     assert [text.get_text() for text in ax.texts] == ["1", "40"]
     rows["success"] = [True, False]
-    ax = figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations").axes[0]
+    ax = figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations").axes[
+        0
+    ]
     assert [text.get_text() for text in ax.texts] == ["1"] and ax.patch.get_hatch()
 
 
 def test_the_axis_of_a_profile_is_called_a_ratio():
     rows = table(solve_seconds=[1.0])
     assert (
-        figures.performance_profile(rows).axes[0].get_xlabel().startswith("ratio: time of the method / the best method")
+        figures.performance_profile(rows)
+        .axes[0]
+        .get_xlabel()
+        .startswith("ratio: time of the method / the best method")
     )
 
 
-def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_may_be_missing(tmp_path):
-    main(["bench", str(written(tmp_path, SMALL)), "--out", str(tmp_path / "out"), "--jobs", "1", "-q"])
+def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_may_be_missing(
+    tmp_path,
+):
+    main(
+        [
+            "bench",
+            str(written(tmp_path, SMALL)),
+            "--out",
+            str(tmp_path / "out"),
+            "--jobs",
+            "1",
+            "-q",
+        ]
+    )
     text = (tmp_path / "out" / "report.md").read_text()
     assert text.count("*Table ") == 2 and text.count("*Figure ") == 2
-    extra = '\n[[figures]]\nkind = "success_table"\ncaption = "none"\nwhere = {setting = "nowhere"}\noptional = true\n'
+    extra = (
+        '\n[[figures]]\nkind = "success_table"\ncaption = "none"\nwhere = {setting ='
+        ' "nowhere"}\noptional = true\n'
+    )
     experiment = tmp_path / "out" / "experiment.toml"
     experiment.write_text(
-        experiment.read_text() + extra + extra.replace("nowhere", "default").replace('"none"', '"some"')
+        experiment.read_text()
+        + extra
+        + extra.replace("nowhere", "default").replace('"none"', '"some"')
     )
     assert main(["report", str(tmp_path / "out")]) == 0
     text = (tmp_path / "out" / "report.md").read_text()

@@ -15,7 +15,14 @@ KINDS = ["plane-strain", "axisymmetric", "solid"]
 def body_of(kind, **part):
     scene = two_blocks(kind)
     lower = scene.lower
-    part = Part(**(dict(name="b", mesh=lower.mesh, material=MATERIAL, supports=lower.supports, contact="top") | part))
+    part = Part(
+        **(
+            dict(
+                name="b", mesh=lower.mesh, material=MATERIAL, supports=lower.supports, contact="top"
+            )
+            | part
+        )
+    )
     return build_body(Scene("s", scene.upper, part, 0.0, kind=kind), part, 1, None)
 
 
@@ -38,7 +45,11 @@ def test_stiffness_is_the_weak_form_of_elasticity(kind, simplices):
 
     @skfem.BilinearForm
     def elasticity(u, v, w):
-        volume, volume_v, energy = trace(sym_grad(u)), trace(sym_grad(v)), ddot(sym_grad(u), sym_grad(v))
+        volume, volume_v, energy = (
+            trace(sym_grad(u)),
+            trace(sym_grad(v)),
+            ddot(sym_grad(u), sym_grad(v)),
+        )
         if kind == "axisymmetric":
             volume, volume_v = volume + u[0] / w.x[0], volume_v + v[0] / w.x[0]
             energy = energy + u[0] * v[0] / w.x[0] ** 2
@@ -56,12 +67,16 @@ def test_rigid_motions_cost_nothing(kind):
     assert np.abs(body.A @ up).max() < 1e-12 * abs(body.A).max()
     if kind == "solid":
         turn = np.zeros(body.basis.N)
-        turn[body.basis.nodal_dofs[0]], turn[body.basis.nodal_dofs[1]] = -body.basis.mesh.p[1], body.basis.mesh.p[0]
+        turn[body.basis.nodal_dofs[0]], turn[body.basis.nodal_dofs[1]] = (
+            -body.basis.mesh.p[1],
+            body.basis.mesh.p[0],
+        )
         assert np.abs(body.A @ turn).max() < 1e-12 * abs(body.A).max()
 
 
 @pytest.mark.parametrize(
-    "kind,area,volume", [("plane-strain", 1, 2), ("axisymmetric", np.pi, 2 * np.pi), ("solid", 1, 2)]
+    "kind,area,volume",
+    [("plane-strain", 1, 2), ("axisymmetric", np.pi, 2 * np.pi), ("solid", 1, 2)],
 )
 def test_areas_and_loads_add_up(kind, area, volume):
     dim = 3 if kind == "solid" else 2
@@ -77,11 +92,15 @@ def test_areas_and_loads_add_up(kind, area, volume):
 @pytest.mark.parametrize("kind", KINDS)
 def test_normals_point_outward(kind):
     assert np.allclose(body_of(kind).normals.T, np.eye(3 if kind == "solid" else 2)[-1])
-    assert np.allclose(body_of(kind, contact="bottom").normals.T, -np.eye(3 if kind == "solid" else 2)[-1])
+    assert np.allclose(
+        body_of(kind, contact="bottom").normals.T, -np.eye(3 if kind == "solid" else 2)[-1]
+    )
 
 
 def test_normals_of_a_closed_surface_sum_to_zero():
-    mesh = skfem.MeshTri.init_circle(3).with_boundaries({"all": lambda x: np.ones_like(x[0], dtype=bool)})
+    mesh = skfem.MeshTri.init_circle(3).with_boundaries(
+        {"all": lambda x: np.ones_like(x[0], dtype=bool)}
+    )
     part = Part("disc", mesh, MATERIAL, (Support("all"),), contact="all")
     body = build_body(Scene("s", part, two_blocks("plane-strain").lower, 0.0), part, 1, None)
     assert np.abs(body.normals @ body.areas).max() < 1e-12
@@ -91,18 +110,28 @@ def test_normals_of_a_closed_surface_sum_to_zero():
 @pytest.mark.parametrize(
     "kind,supports,motions",
     [
-        ("plane-strain", (), ["translation along x", "translation along y", "rotation in the x-y plane"]),
+        (
+            "plane-strain",
+            (),
+            ["translation along x", "translation along y", "rotation in the x-y plane"],
+        ),
         ("plane-strain", ("side0",), ["translation along y"]),
         ("plane-strain", ({"top": "y"},), ["translation along x"]),
         ("plane-strain", ({"bottom": "xy"},), []),
         ("solid", ("side0", "side1"), ["translation along z"]),
-        ("solid", ({"top": "z"},), ["translation along x", "translation along y", "rotation in the x-y plane"]),
+        (
+            "solid",
+            ({"top": "z"},),
+            ["translation along x", "translation along y", "rotation in the x-y plane"],
+        ),
         ("axisymmetric", ("side0",), ["translation along z"]),
         ("axisymmetric", (), ["translation along z"]),
     ],
 )
 def test_motions_that_nothing_holds_are_found(kind, supports, motions):
-    """They leave held unknowns at rest, strain nothing, and the fixing unknowns make the stiffness definite."""
+    """They leave held unknowns at rest, strain nothing, and the fixing unknowns make the stiffness
+    definite.
+    """
     components = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[kind]
     chosen = []
     for s in supports:
@@ -143,7 +172,9 @@ def test_bad_bodies_are_refused(change, message):
 
 def test_a_mesh_in_two_pieces_is_refused():
     mesh = block("plane-strain", -2, 0)
-    loose = type(mesh)(np.hstack([mesh.p, mesh.p + 9]), np.hstack([mesh.t, mesh.t + mesh.p.shape[1]]))
+    loose = type(mesh)(
+        np.hstack([mesh.p, mesh.p + 9]), np.hstack([mesh.t, mesh.t + mesh.p.shape[1]])
+    )
     loose = loose.with_boundaries(
         {"top": lambda x: x[1] == 0, "bottom": lambda x: x[1] == -2, "side0": lambda x: x[0] == 0}
     )
@@ -157,7 +188,9 @@ def test_negative_radius_is_refused():
         body_of("axisymmetric", mesh=mesh.translated((-0.5, 0.0)))
 
 
-@pytest.mark.parametrize("E,nu", [(0, 0.3), (-1, 0.3), (np.nan, 0.3), (1, 0.5), (1, -1), (1, np.inf), ("5", 0.3)])
+@pytest.mark.parametrize(
+    "E,nu", [(0, 0.3), (-1, 0.3), (np.nan, 0.3), (1, 0.5), (1, -1), (1, np.inf), ("5", 0.3)]
+)
 def test_bad_materials_are_refused(E, nu):
     with pytest.raises(InputError, match="must be a finite number"):
         Material(E, nu)

@@ -42,20 +42,26 @@ def test_deck_holds_the_mesh_and_the_load(law):
     text = deck(bodies, Contact(law, 100.0, 10.0))
     layers = 2 if law == "mortar" else 1
     nodes, quads = bodies.points.shape[1], bodies.quads.shape[1]
-    assert [row[0] for row in data(text, "*NODE, NSET")] == [str(i + 1) for i in range(layers * nodes)]
+    assert [row[0] for row in data(text, "*NODE, NSET")] == [
+        str(i + 1) for i in range(layers * nodes)
+    ]
     solids = data(text, f"*ELEMENT, TYPE={'C3D8' if layers == 2 else 'CPE4'}")
     assert [row[0] for row in solids] == [str(i + 1) for i in range(quads)]
     assert all(len(row) == 1 + 4 * layers for row in solids)
     assert {int(n) for row in solids for n in row[1:]} == set(range(1, layers * nodes + 1))
     (load,) = data(text, "*CLOAD")
     assert load[1] == "2" and float(load[2]) == -100.0 / 2  # half model
-    assert max(len(field) for _, rows in cards(text) for row in rows for field in row) <= 20  # ccx reads no more
+    # ccx reads no more
+    assert max(len(field) for _, rows in cards(text) for row in rows for field in row) <= 20
     assert all("." in row[-1] for row in data(text, "*SPRING")[1:])
 
 
 def test_elements_are_anticlockwise_and_cover_both_bodies():
     bodies = model(SCENE)
-    (x, y), (u, v) = bodies.points[:, bodies.quads], bodies.points[:, np.roll(bodies.quads, -1, axis=0)]
+    (x, y), (u, v) = (
+        bodies.points[:, bodies.quads],
+        bodies.points[:, np.roll(bodies.quads, -1, axis=0)],
+    )
     areas = np.sum(x * v - u * y, axis=0) / 2
     assert areas.min() > 0
     assert areas.sum() == pytest.approx(20 * 40 + 80 * 80)
@@ -69,7 +75,8 @@ def test_supports_plate_and_bond_hold_each_unknown_once():
     assert {(n + 1, 1) for n in top} <= held
     assert {(n + 1, c) for n in bodies.nodes(1, "bottom") for c in (1, 2)} <= held
     equations = [tuple(int(i) for i in row[:2]) for row in data(text, "*EQUATION") if len(row) == 6]
-    assert len(set(equations)) == len(equations) == len(top) - 1 + 2 * len(contact) - 1  # x of the axis is held already
+    # x of the axis is held already
+    assert len(set(equations)) == len(equations) == len(top) - 1 + 2 * len(contact) - 1
     assert not set(equations) & held
 
 
@@ -101,7 +108,10 @@ def test_what_the_deck_cannot_say_is_refused():
 
 def test_printed_tables_keep_the_last_of_each(tmp_path):
     path = tmp_path / "job.dat"
-    text = "\n displacements (vx,vy,vz) for set A and time  {}\n\n   1  {}  2.0E+00 -3.0E-10\n\n stresses (elem) x\n\n 1 1 5.\n"
+    text = (
+        "\n displacements (vx,vy,vz) for set A and time  {}\n\n   1  {}  2.0E+00 -3.0E-10\n\n"
+        " stresses (elem) x\n\n 1 1 5.\n"
+    )
     path.write_text(text.format("0.5", "9.0") + text.format("1.0", "1.5"))
     tables = printed(path)
     np.testing.assert_array_equal(tables["displacements"], [[1, 1.5, 2.0, -3e-10]])

@@ -7,7 +7,17 @@ import pytest
 import scipy.sparse as sp
 from conftest import MATERIAL, block
 
-from contactopt import InterfaceProblem, Part, Rigid, Scene, Status, Support, natural_map_residual, reduce, solve
+from contactopt import (
+    InterfaceProblem,
+    Part,
+    Rigid,
+    Scene,
+    Status,
+    Support,
+    natural_map_residual,
+    reduce,
+    solve,
+)
 from contactopt.problem import infeasibility
 from experiments.questions.coulomb_check import violations
 from experiments.questions.granular import packing
@@ -17,7 +27,9 @@ KERNEL = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2))  # two contacts that squ
 NOT_SOLVABLE = {
     "no compliance": InterfaceProblem(np.zeros((2, 2)), [[-1.0, 0.0]], 0.5),
     "squeezed from both sides": InterfaceProblem(KERNEL, [[-1.0, 0.0], [-1.0, 0.0]], 0.3),
-    "squeezed, 3D": InterfaceProblem(np.kron(KERNEL[::2, ::2], np.eye(3)), [[-1.0, 0, 0], [-1.0, 0.2, 0]], 0.3),
+    "squeezed, 3D": InterfaceProblem(
+        np.kron(KERNEL[::2, ::2], np.eye(3)), [[-1.0, 0, 0], [-1.0, 0.2, 0]], 0.3
+    ),
 }
 METHODS = ("auto", "newton", "proximal", "nsgs", "lagrangian")
 
@@ -28,12 +40,16 @@ def in_units(p, force, length):
 
 def worst(problem, solution):
     Q = problem.Q.toarray() if sp.issparse(problem.Q) else problem.Q
-    found = violations(Q, problem.q, problem.mu, problem.V, problem.s, solution.reactions, solution.multipliers)
+    found = violations(
+        Q, problem.q, problem.mu, problem.V, problem.s, solution.reactions, solution.multipliers
+    )
     return max(found.values())
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("force,length", [(1, 1), (1e12, 1), (1, 1e12), (1e-12, 1e-6), (1e-6, 1e12)])
+@pytest.mark.parametrize(
+    "force,length", [(1, 1), (1e12, 1), (1, 1e12), (1e-12, 1e-6), (1e-6, 1e12)]
+)
 @pytest.mark.parametrize("name", NOT_SOLVABLE)
 def test_a_problem_without_a_solution_ends_infeasible_in_all_units(name, force, length, method):
     problem = in_units(NOT_SOLVABLE[name], force, length)
@@ -42,7 +58,9 @@ def test_a_problem_without_a_solution_ends_infeasible_in_all_units(name, force, 
     ray = solution.proof
     e = np.zeros(problem.q.shape)
     e[:, 0] = ray.weights
-    assert np.all(ray.weights >= 0) and np.all(np.abs(problem.Q.T @ e.ravel()) <= 1e-12 * np.abs(problem.Q).max())
+    assert np.all(ray.weights >= 0) and np.all(
+        np.abs(problem.Q.T @ e.ravel()) <= 1e-12 * np.abs(problem.Q).max()
+    )
     assert np.sum(problem.q * e) < 0
 
 
@@ -79,18 +97,25 @@ def test_distant_open_contacts_change_nothing(gap, method):
     q[4:, 0] = gap
     solution = solve(InterfaceProblem(Q, q, 0.2), method, max_iterations=2000)
     assert solution.solved
-    assert np.allclose(solution.reactions[:4], alone.reactions, atol=1e-6 * np.abs(alone.reactions).max())
+    assert np.allclose(
+        solution.reactions[:4], alone.reactions, atol=1e-6 * np.abs(alone.reactions).max()
+    )
     assert np.all(solution.reactions[4:] == 0)
 
 
 @pytest.mark.parametrize("force,length", [(1e12, 1e-12), (1e-12, 1.0), (1.0, 1e12)])
 def test_residual_status_and_answer_do_not_depend_on_units(force, length):
     for problem in (packing(2, 25), packing(3, 27, mu=0.2)):
-        base, units = solve(problem, max_iterations=60), solve(in_units(problem, force, length), max_iterations=60)
+        base, units = (
+            solve(problem, max_iterations=60),
+            solve(in_units(problem, force, length), max_iterations=60),
+        )
         assert base.solved and units.solved
         r = np.abs(np.random.default_rng(0).normal(size=problem.q.shape))
         expected = natural_map_residual(problem, r)
-        assert natural_map_residual(in_units(problem, force, length), force * r) == pytest.approx(expected, rel=1e-9)
+        assert natural_map_residual(in_units(problem, force, length), force * r) == pytest.approx(
+            expected, rel=1e-9
+        )
 
 
 def test_a_support_that_pushes_a_contact_into_a_rigid_floor_is_infeasible():
@@ -135,7 +160,12 @@ def test_the_independent_check_can_fail():
 
 
 def test_no_contacts_are_solved():
-    assert natural_map_residual(InterfaceProblem(np.zeros((0, 0)), np.zeros((0, 2)), 0.3), np.zeros((0, 2))) == 0.0
+    assert (
+        natural_map_residual(
+            InterfaceProblem(np.zeros((0, 0)), np.zeros((0, 2)), 0.3), np.zeros((0, 2))
+        )
+        == 0.0
+    )
 
 
 def rigid_table(gaps, mu=0.3, push=(-100.0, 20.0)):
@@ -144,7 +174,9 @@ def rigid_table(gaps, mu=0.3, push=(-100.0, 20.0)):
     V = np.zeros((3, 2, 3))
     V[:, 0, 0], V[:, 1, 1], V[:, 0, 2] = 1.0, 1.0, places
     q = np.column_stack([gaps, np.zeros(3)])
-    return InterfaceProblem(np.zeros((6, 6)), q, mu, V.reshape(6, 3), np.array([*push, 0.1 * push[0]]))
+    return InterfaceProblem(
+        np.zeros((6, 6)), q, mu, V.reshape(6, 3), np.array([*push, 0.1 * push[0]])
+    )
 
 
 @pytest.mark.parametrize("gaps", [(0.0, 0.0, 0.0), (0.5, 0.7, 0.4), (1e-3, 2e-3, 5e-3)])
@@ -157,7 +189,9 @@ def test_rigid_bodies_without_any_compliance(gaps, unit):
     u = problem.displacements(solution.reactions, solution.multipliers) / unit
     assert np.allclose(problem.V.T @ solution.reactions.ravel(), -problem.s)
     assert np.all(u[:, 0] > -1e-9) and np.all(np.abs(u[solution.reactions[:, 0] > 1e-6, 0]) < 1e-9)
-    assert str(solve(rigid_table(unit * np.array(gaps), push=(-100.0, 40.0))).status) == "infeasible"
+    assert (
+        str(solve(rigid_table(unit * np.array(gaps), push=(-100.0, 40.0))).status) == "infeasible"
+    )
 
 
 @dataclass(eq=False)

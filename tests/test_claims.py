@@ -1,4 +1,6 @@
-"""Claims of accuracy are true: rivals are watched, nothing is exact, what does not exist is said, the best answer is kept."""
+"""Claims of accuracy are true: rivals are watched, nothing is exact, what does not exist is said,
+the best answer is kept.
+"""
 
 from dataclasses import replace
 
@@ -26,7 +28,9 @@ def block(cells=8, wide=4.0, high=2.0, **changes):
         "sides": lambda x: np.abs(x[0]) == wide / 2,
     }
     mesh = skfem.MeshTri.init_tensor(*ticks).with_boundaries(names)
-    return Part("block", mesh, MATERIAL, **{"supports": (Support("bottom"),), "contact": "top"} | changes)
+    return Part(
+        "block", mesh, MATERIAL, **{"supports": (Support("bottom"),), "contact": "top"} | changes
+    )
 
 
 def pressed(gap, turn=0.0, mu=0.0, **changes):
@@ -35,7 +39,9 @@ def pressed(gap, turn=0.0, mu=0.0, **changes):
     R = np.array([[c, -s], [s, c]])
     body = replace(body, mesh=replace(body.mesh, doflocs=R @ body.mesh.p))
     n = tuple(R[:, 1])
-    tool = Rigid("tool", n, None if gap is None else lambda x: gap(R.T @ x), force={"x": -n[0], "y": -n[1]})
+    tool = Rigid(
+        "tool", n, None if gap is None else lambda x: gap(R.T @ x), force={"x": -n[0], "y": -n[1]}
+    )
     return Scene("pressed", tool, body, mu)
 
 
@@ -52,7 +58,9 @@ def test_a_load_along_an_inclined_normal_needs_no_friction(turn):
 
 @pytest.mark.parametrize("adaptive", [True, False])
 def test_the_pressure_of_a_wedge_is_refused(adaptive):
-    _, estimate = refine([pressed(lambda x: 0.1 * np.abs(x[0]))], "pressure", 0.01, adaptive=adaptive)
+    _, estimate = refine(
+        [pressed(lambda x: 0.1 * np.abs(x[0]))], "pressure", 0.01, adaptive=adaptive
+    )
     assert not estimate.reached and estimate.error is None
 
 
@@ -67,7 +75,9 @@ def test_a_bump_between_the_nodes_is_found():
     near = problem.coordinates[0, overlooked(solved.reduction, touching, apart)]
     assert near.min() <= 0.13 <= near.max()
     _, estimate = refine([pressed(bump)], "pressure", 0.1, adaptive=True)
-    assert estimate.reached and estimate.value > 3 and abs(estimate.levels[-1].place[0] - 0.13) < 0.02
+    assert (
+        estimate.reached and estimate.value > 3 and abs(estimate.levels[-1].place[0] - 0.13) < 0.02
+    )
 
 
 def test_a_uniform_pressure_between_planes_of_symmetry_is_no_corner():
@@ -79,13 +89,21 @@ def test_a_uniform_pressure_between_planes_of_symmetry_is_no_corner():
 
 def test_no_contact_there_is_said():
     _, estimate = refine([pressed(parabola)], "pressure@1.5,0", 0.01, adaptive=True)
-    assert not estimate.reached and estimate.error is None and "there is no contact at (1.5, 0)" in estimate.message
+    assert (
+        not estimate.reached
+        and estimate.error is None
+        and "there is no contact at (1.5, 0)" in estimate.message
+    )
 
 
-@pytest.mark.parametrize("name", ["von_mises:block:topp", "von_mises:blok", "pressure:a-b", "von_mises:block@90,0"])
+@pytest.mark.parametrize(
+    "name", ["von_mises:block:topp", "von_mises:blok", "pressure:a-b", "von_mises:block@90,0"]
+)
 def test_misspelt_names_are_told_before_anything_is_solved(name, monkeypatch):
     monkeypatch.setattr(loop, "_Loop", None)
-    with pytest.raises(InputError, match=r"boundary 'topp'|body 'blok'|surfaces 'a-b'|outside body"):
+    with pytest.raises(
+        InputError, match=r"boundary 'topp'|body 'blok'|surfaces 'a-b'|outside body"
+    ):
         refine([pressed(parabola)], name, 0.01)
 
 
@@ -97,7 +115,9 @@ def test_the_best_answer_is_kept_when_refinement_fails(monkeypatch):
 
     monkeypatch.setattr(locally, "finer", broken)
     solved, estimate = refine([pressed(parabola)], "pressure", 0.01, adaptive=True)
-    assert solved.solution.solved and not estimate.reached and "cannot be divided" in estimate.message
+    assert (
+        solved.solution.solved and not estimate.reached and "cannot be divided" in estimate.message
+    )
 
 
 def test_few_contacts_know_nothing():
@@ -122,7 +142,9 @@ def test_a_narrow_bump_in_a_wide_contact_is_read_as_the_nodes_have_it():
 
 
 def test_a_wide_contact_with_an_even_pressure_converges():
-    """The largest pressure of a pin in a bush stays that of Persson; rival peaks are refined together."""
+    """The largest pressure of a pin in a bush stays that of Persson; rival peaks are refined
+    together.
+    """
     scene = make_scene("pin-in-bush")
     _, estimate = refine([scene], "pressure", 0.01, adaptive=True)
     assert estimate.reached and estimate.value == pytest.approx(scene.reference.peak, rel=0.015)
@@ -141,7 +163,12 @@ def test_friction_across_a_plane_of_symmetry_has_an_adjoint():
 
 def test_surfaces_that_face_each_other_are_divided_together():
     fine, coarse = block(16), replace(block(4), name="other", contact="bottom")
-    lifted = replace(coarse, mesh=coarse.mesh.translated((0.0, 2.0)), supports=(), loads=(Plate("top", {"y": -1.0}),))
+    lifted = replace(
+        coarse,
+        mesh=coarse.mesh.translated((0.0, 2.0)),
+        supports=(),
+        loads=(Plate("top", {"y": -1.0}),),
+    )
     scene, _ = divisible(Scene("two", lifted, fine, 0.0), True)
     marked = balanced(scene, (np.empty(0, dtype=int), np.empty(0, dtype=int)))
     assert len(marked[0]) == 4 and not len(marked[1])
@@ -179,7 +206,9 @@ def test_a_peak_is_compared_with_itself_on_larger_elements():
 
 
 def test_the_scatter_of_a_reading_is_added_to_the_error_of_the_mesh():
-    search = Locally((pressed(parabola),), find_quantity("pressure", pressed(parabola)), Options(), False)
+    search = Locally(
+        (pressed(parabola),), find_quantity("pressure", pressed(parabola)), Options(), False
+    )
     solved = search.solve()
     reading = search.quantity.read(solved.reduction, solved.solution)
     sizes = [search.judge(solved, Reading(reading.value, more), ()).size for more in (0.0, 0.25)]

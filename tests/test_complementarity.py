@@ -11,16 +11,22 @@ from contactopt.problem import dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
 
 
-def random_problem(seed: int, mu: float, plate: bool = False, contacts: int = 3) -> InterfaceProblem:
+def random_problem(
+    seed: int, mu: float, plate: bool = False, contacts: int = 3
+) -> InterfaceProblem:
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(2 * contacts, 4 * contacts))
     V = np.zeros((2 * contacts, int(plate)))
     V[::2] = 1.0
-    return InterfaceProblem(A @ A.T, rng.normal(size=(contacts, 2)) * 9, mu, V, -np.ones(int(plate)))
+    return InterfaceProblem(
+        A @ A.T, rng.normal(size=(contacts, 2)) * 9, mu, V, -np.ones(int(plate))
+    )
 
 
 def by_brute_force(problem: InterfaceProblem) -> list[np.ndarray]:
-    """Reactions of all solutions: the linear system of each of the 4^k combinations of open, stick, slip."""
+    """Reactions of all solutions: the linear system of each of the 4^k combinations of open, stick,
+    slip.
+    """
     k, p = problem.contacts, len(problem.s)
     found: list[np.ndarray] = []
     for states in itertools.product(("open", "stick", 1, -1), repeat=k):
@@ -35,7 +41,9 @@ def by_brute_force(problem: InterfaceProblem) -> list[np.ndarray]:
         A, b = np.vstack([A, np.hstack([problem.V.T, np.zeros((p, p))])]), np.append(b, -problem.s)
         x = np.linalg.lstsq(A, b, rcond=None)[0]
         r = x[: 2 * k].reshape(k, 2)
-        if natural_map_residual(problem, r, x[2 * k :]) < 1e-9 and not any(np.allclose(r, y, atol=1e-7) for y in found):
+        if natural_map_residual(problem, r, x[2 * k :]) < 1e-9 and not any(
+            np.allclose(r, y, atol=1e-7) for y in found
+        ):
             found.append(r)
     return found
 
@@ -105,12 +113,16 @@ def test_agrees_with_newton_on_the_punch(elements, mu):
 
 
 def test_two_plate_motions():
-    """A second plate column, tangential: the plate is dragged by a third of the limit, and one contact has no friction."""
+    """A second plate column, tangential: the plate is dragged by a third of the limit, and one
+    contact has no friction.
+    """
     k = 4
     A = np.random.default_rng(3).normal(size=(2 * k, 4 * k))
     V = np.zeros((2 * k, 2))
     V[::2, 0] = V[1::2, 1] = 1.0
-    problem = InterfaceProblem(A @ A.T, np.zeros((k, 2)), [0.5, 0.5, 0.0, 0.5], V, np.array([-3.0, 0.2]))
+    problem = InterfaceProblem(
+        A @ A.T, np.zeros((k, 2)), [0.5, 0.5, 0.0, 0.5], V, np.array([-3.0, 0.2])
+    )
     solution = solve(problem, Lemke(), tol=1e-10)
     assert solution.solved
     assert solution.reactions.sum(axis=0) == pytest.approx([3.0, -0.2], abs=1e-10)
@@ -120,7 +132,9 @@ def test_a_system_in_rest_and_units():
     assert not np.any(solve(InterfaceProblem(np.eye(2), [[1.0, 0.3]], 0.5), Lemke()).reactions)
     punch = reduce(scenes.flat_punch(2, elements=4))
     large = InterfaceProblem(punch.Q * 1e-9, punch.q, punch.mu, punch.V, punch.s * 1e9)
-    assert np.allclose(solve(large, Lemke()).reactions / 1e9, solve(punch, Lemke()).reactions, atol=1e-9)
+    assert np.allclose(
+        solve(large, Lemke()).reactions / 1e9, solve(punch, Lemke()).reactions, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -132,7 +146,9 @@ def test_a_system_in_rest_and_units():
     ],
 )
 def test_problems_it_cannot_take(problem):
-    with pytest.raises(InputError, match=r"needs a 2D problem of at most|does not solve the law Bilateral"):
+    with pytest.raises(
+        InputError, match=r"needs a 2D problem of at most|does not solve the law Bilateral"
+    ):
         solve(problem, Lemke())
     with pytest.raises(InputError, match="2D problem of Coulomb's law with at most"):
         all_solutions(problem)
@@ -146,7 +162,11 @@ def test_lemke_is_refused_in_3d_before_any_work():
 def test_one_contact_with_three_solutions():
     """K = [[1, 1.5], [1.5, 4]], f = (.8, 1), mu = 1: open, slip and stick."""
     found = all_solutions(one_contact((0.8, 1.0), 1.0))
-    assert sorted(tuple(np.round(s.reactions[0], 12)) for s in found) == [(0.0, 0.0), (0.4, 0.4), (1.0, 0.8)]
+    assert sorted(tuple(np.round(s.reactions[0], 12)) for s in found) == [
+        (0.0, 0.0),
+        (0.4, 0.4),
+        (1.0, 0.8),
+    ]
     assert all(s.solved and s.residual < 1e-12 for s in found)
     assert len(all_solutions(one_contact((0.8, 1.0), 1.0), limit=2)) == 2
 
@@ -158,7 +178,10 @@ def test_one_contact_with_one_solution():
 
 @pytest.mark.parametrize("nu", [0.0, 0.2, 0.3])
 def test_one_triangle_loses_uniqueness_at_three_minus_four_nu(nu):
-    """Contact node (0, 0), clamped at (1, 0) and (0, 1): K_tt / |K_tn| = 3 - 4 nu. The load is one of uniform slip."""
+    """Contact node (0, 0), clamped at (1, 0) and (0, 1): K_tt / |K_tn| = 3 - 4 nu.
+
+    The load is one of uniform slip.
+    """
     first, shear = nu / ((1 + nu) * (1 - 2 * nu)), 0.5 / (1 + nu)  # Lame's constants over E
     K = np.array([[first + 3 * shear, first + shear], [first + shear, first + 3 * shear]])
     Q = np.linalg.inv(K)
@@ -175,16 +198,25 @@ def test_one_triangle_loses_uniqueness_at_three_minus_four_nu(nu):
 
 @pytest.mark.parametrize("plate", [False, True])
 def test_the_list_is_complete(plate):
-    """Against all 64 combinations, with loads that make all contacts slip, at friction strong enough for several."""
+    """Against all 64 combinations, with loads that make all contacts slip, at friction strong
+    enough for several.
+    """
     counts = set()
     for seed in range(15):
         base = random_problem(seed, 4.0, plate)
         way = np.random.default_rng(seed).choice([-1.0, 1.0], 3)
-        r, u = np.stack([np.ones(3) / 3, -4 / 3 * way], axis=1), np.stack([np.zeros(3), 9 * way], axis=1)
-        problem = InterfaceProblem(base.Q, u - (base.Q @ r.ravel()).reshape(3, 2), base.mu, base.V, base.s)
+        r, u = (
+            np.stack([np.ones(3) / 3, -4 / 3 * way], axis=1),
+            np.stack([np.zeros(3), 9 * way], axis=1),
+        )
+        problem = InterfaceProblem(
+            base.Q, u - (base.Q @ r.ravel()).reshape(3, 2), base.mu, base.V, base.s
+        )
         expected, found = by_brute_force(problem), all_solutions(problem)
         assert len(found) == len(expected), seed
-        assert all(any(np.allclose(s.reactions, r, atol=1e-7) for r in expected) for s in found), seed
+        assert all(any(np.allclose(s.reactions, r, atol=1e-7) for r in expected) for s in found), (
+            seed
+        )
         counts.add(len(found))
     assert 1 in counts and max(counts) > 1
 
@@ -200,7 +232,8 @@ def test_the_punch_has_one_solution(mu):
 
 def test_a_point_where_states_meet_is_listed_once():
     """Grazing contact: u = 0 and r = 0 is open, stuck and slipping both ways."""
-    problem = InterfaceProblem(np.eye(4), [[0.0, 0.0], [-1.0, 0.5]], 0.5)  # the second one sticks at its limit
+    # the second one sticks at its limit
+    problem = InterfaceProblem(np.eye(4), [[0.0, 0.0], [-1.0, 0.5]], 0.5)
     (only,) = all_solutions(problem)
     assert only.reactions == pytest.approx(np.array([[0.0, 0.0], [1.0, -0.5]]))
 

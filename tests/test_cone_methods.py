@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    fclib,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.errors import BackendError
 from contactopt.methods.backends.direct import CoulombSOCP
 from contactopt.methods.cone import AcaryCadoux, Relaxation, cone_program
@@ -13,19 +21,31 @@ from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative
 from contactopt.problem.laws.bilateral import Bilateral
 
 FCLIB = Path(__file__).parents[2] / "shared" / "fclib"
-FILES = ["Box_Stacks-i0035-31-0", "CubeH8", "LMGC_100_PR_PerioBox-i00361-60-03000", "local_problem_test"]
+FILES = [
+    "Box_Stacks-i0035-31-0",
+    "CubeH8",
+    "LMGC_100_PR_PerioBox-i00361-60-03000",
+    "local_problem_test",
+]
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_derivative_of_the_cone_projection(dim):
-    """Against difference quotients, in the cone, in its polar and between; mu = 0 among the coefficients."""
+    """Against difference quotients, in the cone, in its polar and between; mu = 0 among the
+    coefficients.
+    """
     rng = np.random.default_rng(0)
-    y, mu = rng.normal(size=(60, dim)), np.where(np.arange(60) % 5 == 0, 0.0, rng.uniform(0.1, 1.5, 60))
+    y, mu = (
+        rng.normal(size=(60, dim)),
+        np.where(np.arange(60) % 5 == 0, 0.0, rng.uniform(0.1, 1.5, 60)),
+    )
     P, D = coulomb_cone_derivative(y, mu)
     assert np.array_equal(P, coulomb_cone(y, mu))
     for j in range(dim):
         step = 1e-7 * np.eye(dim)[j]
-        assert np.allclose(D[:, :, j], (coulomb_cone(y + step, mu) - coulomb_cone(y - step, mu)) / 2e-7, atol=1e-6)
+        assert np.allclose(
+            D[:, :, j], (coulomb_cone(y + step, mu) - coulomb_cone(y - step, mu)) / 2e-7, atol=1e-6
+        )
     ranks = np.linalg.matrix_rank(D)
     assert {0, 1, dim} <= set(ranks.tolist())
 
@@ -41,7 +61,9 @@ def mixed(dim: int) -> InterfaceProblem:
     A = rng.normal(size=(k * dim, k * dim))
     V = np.kron(np.ones((k, 1)), np.eye(dim)[:, :1])
     mu = np.array([0.0, 0.2, 0.4, 0.7, 0.0])
-    return InterfaceProblem(A @ A.T / (k * dim) + np.eye(k * dim), rng.normal(size=(k, dim)), mu, V, [-8.0])
+    return InterfaceProblem(
+        A @ A.T / (k * dim) + np.eye(k * dim), rng.normal(size=(k, dim)), mu, V, [-8.0]
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -50,7 +72,10 @@ def test_both_bridges_agree(dim):
     s = np.linspace(0, 0.5, problem.contacts)
     c = problem.q + np.outer(problem.mu * s, np.eye(dim)[0])
     raw = CoulombSOCP.using(problem.Q, problem.mu, problem.V, problem.s).solve(c.ravel())
-    a, b = (cone_program(problem, bridge, "clarabel")(problem.mu * s) for bridge in ("clarabel", "cvxpy"))
+    a, b = (
+        cone_program(problem, bridge, "clarabel")(problem.mu * s)
+        for bridge in ("clarabel", "cvxpy")
+    )
     assert np.allclose(a[0], b[0], atol=1e-10) and np.allclose(a[1], b[1], atol=1e-10)
     assert np.allclose(raw[0], a[0].ravel(), atol=1e-5) and np.allclose(raw[1], a[1], atol=1e-5)
 
@@ -67,7 +92,9 @@ def test_direct_bridge_keeps_nothing_of_the_last_linear_term(dim):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_relaxation_solves_associated_friction(dim):
-    """r = proj(r - u) on the cones: pressed contacts that slip open by mu |u_t|, which is not Coulomb's law."""
+    """r = proj(r - u) on the cones: pressed contacts that slip open by mu |u_t|, which is not
+    Coulomb's law.
+    """
     problem = mixed(dim)
     solution = solve(problem, Relaxation())
     assert solution.iterations == 1 and solution.status.label == "settled"
@@ -114,7 +141,9 @@ def test_scenes(dim):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("bridge", ["clarabel", "cvxpy"])
 def test_without_friction(dim, bridge):
-    solution = solve(reduce(scenes.flat_punch(dim, elements=3, mu=0.0)), AcaryCadoux(bridge), tol=1e-12)
+    solution = solve(
+        reduce(scenes.flat_punch(dim, elements=3, mu=0.0)), AcaryCadoux(bridge), tol=1e-12
+    )
     assert solution.solved and solution.iterations == 1 and not np.any(solution.reactions[:, 1:])
 
 
@@ -132,11 +161,16 @@ def test_other_conic_backends_through_cvxpy():
 @pytest.mark.parametrize("method", [AcaryCadoux(), Relaxation(), AcaryCadoux("cvxpy")])
 def test_contact_without_separation_names_methods_that_handle_it(method):
     problem = InterfaceProblem(np.eye(2), np.ones((1, 2)), Bilateral(0.3))
-    with pytest.raises(InputError, match="does not solve the law Bilateral; these do: auto, newton, proximal, tresca"):
+    with pytest.raises(
+        InputError,
+        match="does not solve the law Bilateral; these do: auto, newton, proximal, tresca",
+    ):
         solve(problem, method)
 
 
-@pytest.mark.parametrize("settings,words", [(("mosek",), "bridge"), (("clarabel", "scs"), "needs bridge='cvxpy'")])
+@pytest.mark.parametrize(
+    "settings,words", [(("mosek",), "bridge"), (("clarabel", "scs"), "needs bridge='cvxpy'")]
+)
 def test_settings_are_checked(settings, words):
     with pytest.raises(InputError, match=words):
         AcaryCadoux(*settings)

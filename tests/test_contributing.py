@@ -1,4 +1,6 @@
-"""What CONTRIBUTING.md says of the project is so; its page of plug-ins is run by tests/test_plugins.py."""
+"""What CONTRIBUTING.md says of the project is so; its page of plug-ins is run by
+tests/test_plugins.py.
+"""
 
 import re
 import subprocess
@@ -37,12 +39,22 @@ def examples() -> list[str]:
 def test_the_map_shows_every_room_in_the_order_of_the_layers():
     """Read from the top: cli first, errors last."""
     shown = [name for cells in rows("room") for name in re.findall(r"`(\w+)(?:/|\.py)`", cells[0])]
-    present = {p.stem for p in (ROOT / "contactopt").iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()}
+    present = {
+        p.stem
+        for p in (ROOT / "contactopt").iterdir()
+        if p.suffix == ".py" or (p / "__init__.py").exists()
+    }
     assert set(shown) == present - {"__init__", "__main__"} and len(set(shown)) == len(shown)
     layers = re.findall(
-        r'^    "((?:contactopt\.\w+)(?: \| contactopt\.\w+)*)",$', (ROOT / "pyproject.toml").read_text(), re.M
+        r'^    "((?:contactopt\.\w+)(?: \| contactopt\.\w+)*)",$',
+        (ROOT / "pyproject.toml").read_text(),
+        re.M,
     )
-    place = {room.removeprefix("contactopt."): i for i, layer in enumerate(layers) for room in layer.split(" | ")}
+    place = {
+        room.removeprefix("contactopt."): i
+        for i, layer in enumerate(layers)
+        for room in layer.split(" | ")
+    }
     assert [place[name] for name in shown] == sorted(place.values())
 
 
@@ -52,7 +64,9 @@ def test_tables_that_are_named_are_there():
         for table in re.findall(r"`(\w+)`", tables):
             place = ROOT / folder[1]
             files = [place] if place.is_file() else place.glob("*.py")
-            assert any(re.search(rf"^{table}\b.*=", file.read_text(), re.M) for file in files), table
+            assert any(re.search(rf"^{table}\b.*=", file.read_text(), re.M) for file in files), (
+                table
+            )
 
 
 def test_links_lead_to_sections_of_their_page():

@@ -1,4 +1,6 @@
-"""Newton's method on contact forces and displacements at once: the same answers, for the price of a few solves."""
+"""Newton's method on contact forces and displacements at once: the same answers, for the price of a
+few solves.
+"""
 
 from dataclasses import replace
 
@@ -29,21 +31,29 @@ def test_the_answer_is_that_of_the_dense_method(name):
     dense, coupled = both(make_scene(name), SMALL[name])
     expected, found = solve(dense, "newton", tol=1e-10), solve(coupled, "newton", tol=1e-9)
     assert found.solved and coupled.Q.coupled.cycles > 0
-    assert np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    assert (
+        np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    )
     assert natural_map_residual(dense, found.reactions, found.multipliers) < 1e-8
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_it_solves_every_law(law):
-    dense, coupled = both(replace(scenes.flat_punch(3), law=law, mu=0.02 if law == "tresca" else 0.3), 4)
+    dense, coupled = both(
+        replace(scenes.flat_punch(3), law=law, mu=0.02 if law == "tresca" else 0.3), 4
+    )
     expected, found = solve(dense, "newton", tol=1e-9), solve(coupled, "newton", tol=1e-9)
     assert found.solved
-    assert np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    assert (
+        np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    )
 
 
 @pytest.mark.parametrize("scene, elements", [(scenes.flat_punch(3), 4), (make_scene("stack"), 4)])
 def test_displacements_come_with_the_forces(scene, elements, monkeypatch):
-    """Plates, supports and bodies that float: what the method carried along is what solves with the bodies give."""
+    """Plates, supports and bodies that float: what the method carried along is what solves with the
+    bodies give.
+    """
     reduction = reduce_bodies(scene, elements, solver="multigrid")
     solution = solve(reduction.problem, "newton", tol=1e-9)
     assert solution.solved
@@ -58,7 +68,9 @@ def test_friction_costs_no_more_cycles_than_four_products(mu):
     reduction = reduce_bodies(scenes.flat_punch(3), 8, solver="multigrid")
     r = np.random.default_rng(0).normal(size=reduction.problem.q.size)
     product = [
-        conjugate_gradients(body.solver.A, body.solver.cycle, (B.T @ r)[body.body.free], 1e-8).cycles
+        conjugate_gradients(
+            body.solver.A, body.solver.cycle, (B.T @ r)[body.body.free], 1e-8
+        ).cycles
         for body, B in zip(reduction.bodies, reduction.maps)
     ]
     form = reduction.problem.Q.coupled
@@ -106,7 +118,9 @@ def test_the_stated_accuracy_is_the_error_of_the_displacements():
         error = X - exact
         true = np.sqrt(error.dot(form.stiffness(error)) / X.dot(form.stiffness(X)))
         assert 0.5 * true < judged.accuracy < 1.5 * true
-        assert np.linalg.norm(judged.value - problem.Q @ r.ravel()) < np.linalg.norm(form.moved(error, 0 * r.ravel()))
+        assert np.linalg.norm(judged.value - problem.Q @ r.ravel()) < np.linalg.norm(
+            form.moved(error, 0 * r.ravel())
+        )
 
 
 def _bare(form):
@@ -143,10 +157,17 @@ def test_flexible_gmres_bears_a_preconditioner_that_changes():
 def test_long_solves_say_what_they_reached(monkeypatch):
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     said: list[str] = []
-    solved = solve_scene(scenes.flat_punch(3), 4, options=Options(solver="multigrid", note=said.append))
+    solved = solve_scene(
+        scenes.flat_punch(3), 4, options=Options(solver="multigrid", note=said.append)
+    )
     steps = [line for line in said if line.startswith("step")]
     assert len(steps) == solved.solution.iterations
-    assert "V-cycles" in steps[0] and "GiB" in steps[0] and "s left" in steps[1] and "s left" not in steps[-1]
+    assert (
+        "V-cycles" in steps[0]
+        and "GiB" in steps[0]
+        and "s left" in steps[1]
+        and "s left" not in steps[-1]
+    )
 
 
 def test_time_left_goes_on_as_the_last_step():

@@ -1,4 +1,6 @@
-"""The coupling of bodies: which contacts are partners, the charts of contact surfaces, and what others can add."""
+"""The coupling of bodies: which contacts are partners, the charts of contact surfaces, and what
+others can add.
+"""
 
 import threading
 from dataclasses import dataclass, replace
@@ -9,7 +11,18 @@ import scipy.sparse as sp
 import turned
 from conftest import MATERIAL, block, two_blocks
 
-from contactopt import InputError, InterfaceProblem, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Part,
+    Rigid,
+    Scene,
+    Support,
+    reduce,
+    reduce_bodies,
+    scenes,
+    solve,
+)
 from contactopt.bodies import BODIES
 from contactopt.bodies.rigid import RigidBody
 from contactopt.coupling import coupling, matching
@@ -29,29 +42,40 @@ def renumbered(mesh, seed: int):
     t = new[mesh.t][:, rng.permutation(mesh.t.shape[1])]
     ends = {name: mesh.p[:, mesh.facets[:, f]].mean(axis=1) for name, f in mesh.boundaries.items()}
     names = {
-        name: lambda x, m=middles: np.array([np.abs(m - y[:, None]).sum(axis=0).min() < 1e-9 for y in x.T])
+        name: lambda x, m=middles: np.array(
+            [np.abs(m - y[:, None]).sum(axis=0).min() < 1e-9 for y in x.T]
+        )
         for name, middles in ends.items()
     }
     return type(mesh)(p, t, sort_t=mesh.sort_t).with_boundaries(names)
 
 
-@pytest.mark.parametrize("make", [turned.punch, turned.pin_in_bush, scenes.cattaneo], ids=["punch", "pin", "cattaneo"])
+@pytest.mark.parametrize(
+    "make", [turned.punch, turned.pin_in_bush, scenes.cattaneo], ids=["punch", "pin", "cattaneo"]
+)
 def test_the_numbering_of_the_meshes_does_not_matter(make):
     scene = make(elements=6) if make is not turned.pin_in_bush else make()
     meshes = [part.build_mesh(scene.elements, None) for part in scene.parts]
-    upper, lower = (replace(part, mesh=renumbered(m, i)) for i, (part, m) in enumerate(zip(scene.parts, meshes)))
+    upper, lower = (
+        replace(part, mesh=renumbered(m, i)) for i, (part, m) in enumerate(zip(scene.parts, meshes))
+    )
     a, b = reduce_bodies(scene), reduce_bodies(replace(scene, upper=upper, lower=lower))
     places = a.problem.coordinates, b.problem.coordinates
     order = [int(np.argmin(np.abs(places[1] - x[:, None]).sum(axis=0))) for x in places[0].T]
     if a.problem.chart.period is None:
         assert order == list(range(len(order)))
     rows = (2 * np.array(order)[:, None] + np.arange(2)).ravel()
-    assert np.abs(b.problem.Q[np.ix_(rows, rows)] - a.problem.Q).max() < 1e-9 * np.abs(a.problem.Q).max()
+    assert (
+        np.abs(b.problem.Q[np.ix_(rows, rows)] - a.problem.Q).max()
+        < 1e-9 * np.abs(a.problem.Q).max()
+    )
     assert np.abs(b.problem.V[rows] - a.problem.V).max() < 1e-12
 
 
 def test_a_path_makes_its_maps_once(monkeypatch):
-    """One map for each body, however many states the path has: reduction, recovery and energies use the same."""
+    """One map for each body, however many states the path has: reduction, recovery and energies use
+    the same.
+    """
     made = []
     counted = lambda *arguments: made.append(1) or coupling.local_map(*arguments)  # noqa: E731
     monkeypatch.setattr(matching, "local_map", counted)
@@ -62,7 +86,9 @@ def test_a_path_makes_its_maps_once(monkeypatch):
 
 
 def sector(scene, degrees):
-    """A pin in a bush cut to a sector of the bush about the lowest point, where the mean normal still has a meaning."""
+    """A pin in a bush cut to a sector of the bush about the lowest point, where the mean normal
+    still has a meaning.
+    """
     reach = np.cos(np.deg2rad(degrees / 2))
 
     def cut(part, radius):
@@ -72,7 +98,9 @@ def sector(scene, degrees):
         return replace(
             part,
             contact="contact",
-            mesh=mesh.with_boundaries({"contact": facets[-middle[1] / np.linalg.norm(middle, axis=0) > reach]}),
+            mesh=mesh.with_boundaries(
+                {"contact": facets[-middle[1] / np.linalg.norm(middle, axis=0) > reach]}
+            ),
         )
 
     return replace(scene, upper=cut(scene.upper, 19.5), lower=cut(scene.lower, 20.0))
@@ -84,11 +112,14 @@ def test_a_sector_of_a_bush_matches_along_the_radius(degrees):
     assert np.allclose(reduction.coupling.gap, 2.0, rtol=0.02)
     assert reduction.problem.chart.period is None and len(reduction.coupling.gap) > 4
     places = reduction.problem.chart.places[0]
-    assert np.all(np.diff(places) > 0) and places[0] == pytest.approx(-places[-1])  # arc length from the middle
+    # arc length from the middle
+    assert np.all(np.diff(places) > 0) and places[0] == pytest.approx(-places[-1])
 
 
 def test_two_curved_bodies_may_match_along_the_mean_normal():
-    """Nodes at the same x on a hill and a valley with a clear gap: partners across, not along the slope's normal."""
+    """Nodes at the same x on a hill and a valley with a clear gap: partners across, not along the
+    slope's normal.
+    """
     x = np.linspace(-1.0, 1.0, 9)
 
     def body(low, high, curve):
@@ -99,19 +130,25 @@ def test_two_curved_bodies_may_match_along_the_mean_normal():
     lower = Part("lower", body(-1.0, 0.0, 0.2), MATERIAL, (Support("bottom"),), (), "top")
     reduction = reduce_bodies(Scene("hill", upper, lower, 0.3))
     n, at = reduction.coupling.frames[:, 0], reduction.coupling.positions[0]
-    assert np.allclose(at, x) and np.allclose(reduction.coupling.gap, 0.4 * x**2 * n[:, 1], atol=1e-12)
+    assert np.allclose(at, x) and np.allclose(
+        reduction.coupling.gap, 0.4 * x**2 * n[:, 1], atol=1e-12
+    )
 
 
 def test_partners_half_a_sector_off_are_refused():
     scene = turned.pin_in_bush(clearance=0.5, sectors=40)
     wrong = turned.moved(scene, turned.turn(180 / 40)).upper
-    with pytest.raises(InputError, match=r"interface nodes do not match.*lies .* off the normal.*same nodes"):
+    with pytest.raises(
+        InputError, match=r"interface nodes do not match.*lies .* off the normal.*same nodes"
+    ):
         reduce_bodies(replace(scene, upper=wrong), coupling="matching")
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_half_and_quarter_models_are_mirrored_at_their_planes(dim):
-    """The charts of named scenes are their coordinates, whichever side of the plane the model lies on."""
+    """The charts of named scenes are their coordinates, whichever side of the plane the model lies
+    on.
+    """
     scene = scenes.flat_punch(dim, elements=3)
     problem = reduce(scene)
     assert problem.chart.mirrored == (True,) * (dim - 1)
@@ -148,7 +185,9 @@ def test_a_clamped_end_is_no_plane_of_symmetry():
 
 
 def test_an_arc_is_measured_along_itself():
-    """A rigid punch on a quarter of a ring: the chart is radius times angle, to the accuracy of chords."""
+    """A rigid punch on a quarter of a ring: the chart is radius times angle, to the accuracy of
+    chords.
+    """
     sectors = 64
     mesh = turned.ring(1.0, 2.0, 2, sectors)
     facets = mesh.boundaries["outside"]
@@ -172,7 +211,11 @@ def test_friction_may_be_a_function_of_the_place():
     same = solve(reduce(replace(scene, mu=lambda x: np.full(x.shape[1], 0.4))))
     assert np.allclose(same.reactions, solve(reduce(scene)).reactions, atol=1e-9)
     assert reduce_bodies(scene).loaded(varied).problem.mu.min() == 0.1
-    for wrong in (lambda x: -np.ones(x.shape[1]), lambda x: np.ones(2), lambda x: np.full(x.shape[1], np.nan)):
+    for wrong in (
+        lambda x: -np.ones(x.shape[1]),
+        lambda x: np.ones(2),
+        lambda x: np.full(x.shape[1], np.nan),
+    ):
         with pytest.raises(InputError, match="friction"):
             reduce(replace(scene, mu=wrong))
 
@@ -223,14 +266,18 @@ def assemble_sprung(scene, part, elements, zone):
 
 @pytest.mark.parametrize("form", ["explicit", "implicit"])
 def test_a_kind_of_body_is_added_by_one_line(monkeypatch, form):
-    """A block on a sprung floor: the springs add to the approach, and to the energy, what the force asks of them."""
+    """A block on a sprung floor: the springs add to the approach, and to the energy, what the force
+    asks of them.
+    """
     monkeypatch.setitem(BODIES, Sprung, (__name__, "assemble_sprung", "a rigid body on springs"))
     scene = replace(two_blocks("plane-strain", force=3.0), lower=Sprung("floor", k=2.0))
     reduction = reduce_bodies(scene, Q=form)
     solution = solve(reduction.problem, tol=1e-11)
     block_alone = 3.0 * (1 - 0.3**2) / 5
     assert -solution.multipliers[0] == pytest.approx(block_alone + 3.0 / 2.0, rel=1e-8)
-    assert elastic_energy(reduction, solution) == pytest.approx(3.0 * block_alone / 2 + 9.0 / (2 * 2.0), rel=1e-8)
+    assert elastic_energy(reduction, solution) == pytest.approx(
+        3.0 * block_alone / 2 + 9.0 / (2 * 2.0), rel=1e-8
+    )
     u = sum(B @ U for B, U in zip(reduction.maps, reduction.displaced(solution)))
     expected = reduction.problem.displacements(solution.reactions, solution.multipliers).ravel()
     assert np.allclose(u, expected, atol=1e-9)
@@ -263,11 +310,14 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     assert "10 x 10 entries: 800 bytes" in caplog.text and "solver superlu" in caplog.text
     assert "explicit Q of 10 unknowns" in caplog.text
     monkeypatch.setattr(operators, "MOST_BYTES", 799)
-    with pytest.raises(InputError, match="would take 800 bytes, more than 799; take Q = 'implicit'"):
+    with pytest.raises(
+        InputError, match="would take 800 bytes, more than 799; take Q = 'implicit'"
+    ):
         reduce(scene, Q="explicit")
     assert reduce(scene, Q="implicit").contacts == 5
     rows = sp.csr_array(np.eye(10))
-    with pytest.raises(InputError, match="would take 800 bytes, more than 799"):  # the same limit for sparse rows
+    # the same limit for sparse rows
+    with pytest.raises(InputError, match="would take 800 bytes, more than 799"):
         InterfaceProblem(rows, np.zeros((5, 2)), 0.3).explicit()
 
 
@@ -288,7 +338,10 @@ def test_bodies_work_at_the_same_time_where_they_can():
         return item**2, threading.get_ident() == here
 
     assert each(act, range(3), [True, True, False]) == ((0, False), (1, False), (4, True))
-    assert each(lambda item: threading.get_ident() == here, range(3), [False, True, False]) == (True,) * 3
+    assert (
+        each(lambda item: threading.get_ident() == here, range(3), [False, True, False])
+        == (True,) * 3
+    )
     with pytest.raises(ZeroDivisionError):
         each(lambda item: 1 / item, [1, 0])
 
@@ -299,12 +352,16 @@ def test_a_surface_is_asked_for_by_its_name():
     scene = two_blocks("plane-strain")
     body = assemble(scene, scene.lower, 1, None)
     assert np.array_equal(body.surface("top").points, body.surface().points) and body.meshed
-    with pytest.raises(InputError, match="body 'lower' has no contact surface 'bottom'; it has top"):
+    with pytest.raises(
+        InputError, match="body 'lower' has no contact surface 'bottom'; it has top"
+    ):
         body.surface("bottom")
 
 
 def test_a_pin_in_a_bush_in_space():
-    """Extruded rings in any position: gaps along the radius, frames that are orthonormal and right-handed."""
+    """Extruded rings in any position: gaps along the radius, frames that are orthonormal and
+    right-handed.
+    """
     from contactopt.meshes.discs import extrude
 
     def body(inner, outer, contact, support, R):
@@ -315,7 +372,9 @@ def test_a_pin_in_a_bush_in_space():
             "outside": lambda x: np.hypot(*x[:2]) > 0.95 * outer,
         }
         mesh = mesh.with_boundaries(names)
-        return Part(contact, replace(mesh, doflocs=R @ mesh.p), MATERIAL, (Support(support),), (), contact)
+        return Part(
+            contact, replace(mesh, doflocs=R @ mesh.p), MATERIAL, (Support(support),), (), contact
+        )
 
     R = turned.turn_about((1.0, 2.0, -0.5), 67.0)
     pin, bush = body(1.0, 2.0, "outside", "inside", R), body(2.1, 4.0, "inside", "outside", R)

@@ -1,4 +1,6 @@
-"""The chapters run, their exercises grade themselves, and the solutions pass the grades that wrong answers fail."""
+"""The chapters run, their exercises grade themselves, and the solutions pass the grades that wrong
+answers fail.
+"""
 
 import json
 import re
@@ -14,7 +16,9 @@ from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider, check
 
 ROOT = Path(__file__).parents[1]
-CHAPTERS = {path.stem: path for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))}
+CHAPTERS = {
+    path.stem: path for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))
+}
 
 
 @pytest.fixture
@@ -55,7 +59,10 @@ def test_there_are_twenty_exercises_and_some_need_pen_and_paper_only():
 @pytest.mark.parametrize("name", list(CHAPTERS))
 def test_readers_get_questions_without_answers(name, generate):
     text = CHAPTERS[name].read_text()
-    asked, solved = generate.without_cells(text, "solution"), generate.without_cells(text, "exercise")
+    asked, solved = (
+        generate.without_cells(text, "solution"),
+        generate.without_cells(text, "exercise"),
+    )
     for cell in re.split(r"^(?=# %%)", text, flags=re.M)[1:]:
         assert (cell in asked) == ('tags=["solution"]' not in cell.splitlines()[0])
         assert (cell in solved) == ('tags=["exercise"]' not in cell.splitlines()[0])
@@ -75,12 +82,18 @@ def test_a_chapter_has_all_its_parts_and_folds_what_only_draws(name, generate):
         "## What fails",
     ):
         assert part in text, part
-    (notebook,) = (page for path, page in generate.notebook("course", name, text) if path.suffix == ".ipynb")
+    (notebook,) = (
+        page for path, page in generate.notebook("course", name, text) if path.suffix == ".ipynb"
+    )
     folded = [
-        cell for cell in json.loads(notebook)["cells"] if cell["metadata"].get("jupyter", {}).get("source_hidden")
+        cell
+        for cell in json.loads(notebook)["cells"]
+        if cell["metadata"].get("jupyter", {}).get("source_hidden")
     ]
     assert len(folded) == text.count('tags=["hide-input"]') > 0
-    assert all(re.search(r"\b(ax|plt)\.", "".join(cell["source"])) for cell in folded), "only drawings are folded"
+    assert all(re.search(r"\b(ax|plt)\.", "".join(cell["source"])) for cell in folded), (
+        "only drawings are folded"
+    )
 
 
 def test_answers_are_graded(capsys):
@@ -92,7 +105,10 @@ def test_answers_are_graded(capsys):
     assert check("0.1", 1.01 * right, problem) is False
     assert check("0.1", right[:, :1], problem) is False
     assert check("0.2", 2.0, 2.0) is True and check("0.2", 2.01, 2.0) is False
-    assert check("0.2", (0.0, 3.0), (0.0, 3.0)) is True and check("0.2", (3.0, 0.0), (0.0, 3.0)) is False
+    assert (
+        check("0.2", (0.0, 3.0), (0.0, 3.0)) is True
+        and check("0.2", (3.0, 0.0), (0.0, 3.0)) is False
+    )
     assert check("0.2", 3.0, (3.0, 3.0)) is False
     assert check("0.3", 5, lambda n: n == 5) is True and check("0.3", 4, lambda n: n == 5) is False
     assert capsys.readouterr().out.splitlines()[0] == "Exercise 0.1: not answered yet."

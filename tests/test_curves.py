@@ -67,7 +67,9 @@ def test_a_flank_stays_flat_beside_a_fillet_that_is_round(chords, graded, digits
         fine = split(split(moved, {"flank": curve}), {"flank": curve})
         nodes = np.unique(fine.facets[:, fine.boundaries["flank"]])
         x, y = turn.T @ (fine.p[:, nodes] - shift) / scale
-        off = np.where(x < 0, np.abs(y), np.where(y > 1, np.abs(x - 1), np.abs(np.hypot(x, y - 1) - 1)))
+        off = np.where(
+            x < 0, np.abs(y), np.where(y > 1, np.abs(x - 1), np.abs(np.hypot(x, y - 1) - 1))
+        )
         assert not curve.known and off.max() < 10 * rounding / scale
         again = curve(curve(fine.p[:, nodes]))
         assert np.abs(again - curve(fine.p[:, nodes])).max() < 1e-14 * np.abs(places).max()
@@ -108,26 +110,38 @@ def test_halved_meshes_converge_to_the_ring(kind):
     """The boundaries have no names but one: those without a name are curved as well."""
     mesh = ring(np.array([1.0, 1.5, 2.0]), ANGLES)
     mesh = {"quadrilaterals": straight, "triangles": simplices}.get(kind, lambda mesh: mesh)(mesh)
-    mesh = mesh.with_boundaries({"inner": mesh.boundaries["inner"]}) if kind != "second order" else mesh
+    mesh = (
+        mesh.with_boundaries({"inner": mesh.boundaries["inner"]})
+        if kind != "second order"
+        else mesh
+    )
     curves, exact, errors = boundary_curves(mesh), np.pi / 4 * 3, []
     for _ in range(3):
         errors.append(abs(volume(mesh) / exact - 1))
         mesh = split(mesh, curves)
     order = 4 if kind == "second order" else 2
-    assert np.log2(errors[0] / errors[1]) > order - 0.1 and np.log2(errors[1] / errors[2]) > order - 0.1
+    assert (
+        np.log2(errors[0] / errors[1]) > order - 0.1
+        and np.log2(errors[1] / errors[2]) > order - 0.1
+    )
     assert curves["inner"].known == (kind == "second order")
     nodes = np.unique(mesh.facets[:, mesh.boundaries["inner"]])
     assert np.abs(np.hypot(*mesh.p[:, nodes]) - 1).max() < 1e-13
 
 
 def cylinder_sector(n=4):
-    flat = skfem.MeshHex.init_tensor(np.linspace(0, np.pi / 2, n + 1), np.linspace(1, 2, 3), np.linspace(0, 1, 3))
+    flat = skfem.MeshHex.init_tensor(
+        np.linspace(0, np.pi / 2, n + 1), np.linspace(1, 2, 3), np.linspace(0, 1, 3)
+    )
     a, r, z = flat.p
     names = {"inner": flat.p[1] == 1, "end": flat.p[2] == 0}
     mesh = skfem.MeshHex(np.stack([r * np.cos(a), r * np.sin(a), z]), flat.t)
     facets = mesh.boundary_facets()
     return mesh.with_boundaries(
-        {name: facets[np.all(there[mesh.facets[:, facets]], axis=0)] for name, there in names.items()}
+        {
+            name: facets[np.all(there[mesh.facets[:, facets]], axis=0)]
+            for name, there in names.items()
+        }
     )
 
 
@@ -146,7 +160,9 @@ def test_solids_converge_to_the_cylinder_with_flat_ends(kind):
     inner, end = (np.unique(fine.facets[:, fine.boundaries[name]]) for name in ("inner", "end"))
     assert np.abs(np.hypot(x, y)[inner] - 1).max() < 1e-12 and np.abs(z[end]).max() < 1e-13
     curved = bent(mesh, curves)
-    assert abs(volume(curved) / exact - 1) < 2e-3 and np.all(np.ptp(np.sign(volumes(curved)), axis=1) == 0)
+    assert abs(volume(curved) / exact - 1) < 2e-3 and np.all(
+        np.ptp(np.sign(volumes(curved)), axis=1) == 0
+    )
     assert boundary_curves(curved)["inner"].known and boundary_curves(curved)["end"] is None
 
 
@@ -168,9 +184,13 @@ def test_balls_of_either_order_and_patches_that_are_none():
 
 def test_refinement_towards_a_point_ends_with_a_sentence():
     mesh = skfem.MeshTri().with_boundaries({"low": lambda x: x[1] == 0})
-    with pytest.raises(TooSmall, match="cannot be divided further: they are as small as rounding allows"):
+    with pytest.raises(
+        TooSmall, match="cannot be divided further: they are as small as rounding allows"
+    ):
         for _ in range(80):
-            mesh = divide(mesh, np.flatnonzero(np.any(np.all(mesh.p[:, mesh.t] == 0, axis=0), axis=0)), {})
+            mesh = divide(
+                mesh, np.flatnonzero(np.any(np.all(mesh.p[:, mesh.t] == 0, axis=0), axis=0)), {}
+            )
     assert np.abs(volumes(mesh)).min() > 0
 
 
@@ -196,7 +216,9 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
     given = roller(lambda x: 20 * x / np.hypot(*x))
     fine = split_scene(given, 8, 2)
     mesh = fine.upper.build_mesh(8, None)
-    assert mesh.nelements == 16 * given.upper.mesh.nelements and type(mesh) is type(given.upper.mesh)
+    assert mesh.nelements == 16 * given.upper.mesh.nelements and type(mesh) is type(
+        given.upper.mesh
+    )
     assert part_curves(given.upper, given.upper.mesh)["outer"].known
     nodes = mesh.dofs.get_facet_dofs(mesh.boundaries["outer"]).flatten()
     assert np.abs(np.hypot(*mesh.doflocs[:, nodes]) - 20).max() < 1e-12
@@ -204,8 +226,13 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
-    """Near the long facets of the floor lie hundreds of small ones of the walls, with nearer centres."""
-    heights, kind = np.array([0.0, *np.geomspace(1e-6, 1, 25)]), skfem.MeshTri if dim == 2 else skfem.MeshTet
+    """Near the long facets of the floor lie hundreds of small ones of the walls, with nearer
+    centres.
+    """
+    heights, kind = (
+        np.array([0.0, *np.geomspace(1e-6, 1, 25)]),
+        skfem.MeshTri if dim == 2 else skfem.MeshTet,
+    )
     mesh = kind.init_tensor(*[np.array([0.0, 1.0])] * (dim - 1), heights)
     sides = {"floor": (dim - 1, 0.0), "wall": (0, 0.0)}
     mesh = mesh.with_boundaries(

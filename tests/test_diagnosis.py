@@ -15,21 +15,29 @@ from contactopt.problem.laws.bilateral import Bilateral
 BOTH = (("alternating", Alternating()), ("tresca", Tresca()))
 
 
-def random_problem(seed: int, dim: int = 2, plate: bool = False, mu: float = 0.5) -> InterfaceProblem:
+def random_problem(
+    seed: int, dim: int = 2, plate: bool = False, mu: float = 0.5
+) -> InterfaceProblem:
     rng = np.random.default_rng(seed)
     k = int(rng.integers(2, 5))
     A = rng.normal(size=(k * dim, 2 * k * dim))
     V = np.zeros((k * dim, int(plate)))
     V[::dim] = 1.0
-    return InterfaceProblem(A @ A.T / len(A), rng.normal(size=(k, dim)), mu, V, np.full(int(plate), -float(k)))
+    return InterfaceProblem(
+        A @ A.T / len(A), rng.normal(size=(k, dim)), mu, V, np.full(int(plate), -float(k))
+    )
 
 
 def changed(problem: InterfaceProblem, mu, q: np.ndarray | None = None) -> InterfaceProblem:
     return InterfaceProblem(problem.Q, problem.q if q is None else q, mu, problem.V, problem.s)
 
 
-def slipping(problem: InterfaceProblem, mu: float, way: float = 1.0) -> tuple[InterfaceProblem, Solution]:
-    """The 2D problem with the load under which all contacts slip the same way, and that solution; normal forces one."""
+def slipping(
+    problem: InterfaceProblem, mu: float, way: float = 1.0
+) -> tuple[InterfaceProblem, Solution]:
+    """The 2D problem with the load under which all contacts slip the same way, and that solution;
+    normal forces one.
+    """
     k = problem.contacts
     r = np.stack([np.ones(k), np.full(k, -mu * way)], axis=1)
     u = np.stack([np.zeros(k), np.full(k, way)], axis=1)
@@ -45,7 +53,8 @@ def rate(problem: InterfaceProblem, solution: Solution, method, steps: int = 150
     noise = np.random.default_rng(0).normal(size=solution.reactions.shape) * 1e-5
     start = Solution(solution.reactions + noise, solution.multipliers, Status.SETTLED, 1.0, 0, "")
     ends = [
-        solve(problem, method, start=start, max_iterations=n, tol=1e-14).reactions - solution.reactions
+        solve(problem, method, start=start, max_iterations=n, tol=1e-14).reactions
+        - solution.reactions
         for n in (steps - 50, steps)
     ]
     return float((np.linalg.norm(ends[1]) / np.linalg.norm(ends[0])) ** (1 / 50))
@@ -55,9 +64,11 @@ def test_one_contact_is_exact():
     """K = [[1, 1.5], [1.5, 4]]: mu* = K_tt / |K_tn| = 2/3, for both iterations and for uniqueness."""
     report = diagnose(one_contact((-10.0, 1.0), 1.0))
     assert report.exact and report.guaranteed == report.uniform_slip
-    assert [report.guaranteed.unique, report.guaranteed.tresca, report.guaranteed.alternating] == pytest.approx(
-        [2 / 3] * 3, abs=1e-12
-    )
+    assert [
+        report.guaranteed.unique,
+        report.guaranteed.tresca,
+        report.guaranteed.alternating,
+    ] == pytest.approx([2 / 3] * 3, abs=1e-12)
     assert "if and only if mu < 0.6667" in str(report)
 
 
@@ -68,21 +79,30 @@ def test_one_contact_against_the_iterations(name, method, way):
     problem = one_contact((0.0, 0.0), 1.0)
     threshold = getattr(diagnose(problem).guaranteed, name)
     for factor in (0.999, 1.001):
-        assert rate(*slipping(problem, factor * threshold, way), method) == pytest.approx(factor, abs=1e-4)
+        assert rate(*slipping(problem, factor * threshold, way), method) == pytest.approx(
+            factor, abs=1e-4
+        )
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.2, 0.3, 0.45])
 def test_one_triangle(nu):
-    """Constant-strain triangle, contact node (0, 0), clamped at (1, 0) and (0, 1), plane strain: mu* = 3 - 4 nu."""
-    D = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]]) / ((1 + nu) * (1 - 2 * nu))
-    B = np.array([[-1.0, 0.0], [0.0, -1.0], [-1.0, -1.0]])  # strain of the unit displacements of the node
+    """Constant-strain triangle, contact node (0, 0), clamped at (1, 0) and (0, 1), plane strain:
+    mu* = 3 - 4 nu.
+    """
+    D = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]]) / (
+        (1 + nu) * (1 - 2 * nu)
+    )
+    # strain of the unit displacements of the node
+    B = np.array([[-1.0, 0.0], [0.0, -1.0], [-1.0, -1.0]])
     report = diagnose(InterfaceProblem(np.linalg.inv(B.T @ D @ B / 2), np.zeros((1, 2)), 0.3))
     assert report.exact and report.guaranteed.unique == pytest.approx(3 - 4 * nu, abs=1e-10)
 
 
 def test_a_plate_that_determines_the_normal_force_leaves_no_threshold():
     Q = one_contact((0.0, 0.0), 1.0).Q
-    report = diagnose(InterfaceProblem(Q, np.zeros((1, 2)), 5.0, np.array([[1.0], [0.0]]), np.array([-1.0])))
+    report = diagnose(
+        InterfaceProblem(Q, np.zeros((1, 2)), 5.0, np.array([[1.0], [0.0]]), np.array([-1.0]))
+    )
     assert report.exact and report.guaranteed.unique == report.guaranteed.alternating == np.inf
 
 
@@ -101,7 +121,9 @@ def test_guarantees_hold(dim, plate):
             assert solve(loaded, method, max_iterations=3000, tol=1e-7).solved, (seed, name)
         assert 0 < report.guaranteed.unique <= report.uniform_slip.unique
         if dim == 2:
-            loaded = changed(problem, 0.98 * report.guaranteed.unique, rng.normal(size=problem.q.shape))
+            loaded = changed(
+                problem, 0.98 * report.guaranteed.unique, rng.normal(size=problem.q.shape)
+            )
             assert len(all_solutions(loaded)) == 1
 
 
@@ -113,7 +135,10 @@ def test_uniform_slip_loses_uniqueness_at_its_threshold(plate):
         problem = random_problem(seed, plate=plate)
         threshold = diagnose(problem).uniform_slip.unique
         if np.isfinite(threshold):
-            counts = [len(all_solutions(slipping(problem, 1.001 * threshold, way)[0])) for way in (1.0, -1.0)]
+            counts = [
+                len(all_solutions(slipping(problem, 1.001 * threshold, way)[0]))
+                for way in (1.0, -1.0)
+            ]
             assert max(counts) > 1, seed
             tested += 1
     assert tested > 1
@@ -125,7 +150,9 @@ def test_uniform_slip_stops_the_iterations_at_its_threshold(name, method):
     problem = reduce(scenes.flat_punch(2, elements=5))
     threshold = getattr(diagnose(problem).uniform_slip, name)
     for factor in (0.999, 1.001):
-        assert rate(*slipping(problem, factor * threshold), method) == pytest.approx(factor, abs=2e-4)
+        assert rate(*slipping(problem, factor * threshold), method) == pytest.approx(
+            factor, abs=2e-4
+        )
 
 
 def test_contraction_and_uniqueness_are_two_conditions():
@@ -136,7 +163,10 @@ def test_contraction_and_uniqueness_are_two_conditions():
     Q[1::2, 1::2] = 4 * np.eye(2)
     Q[::2, 1::2], Q[1::2, ::2] = coupling, coupling.T
     report = diagnose(InterfaceProblem(Q, np.zeros((2, 2)), 0.5))
-    assert report.uniform_slip.alternating == pytest.approx(1.0) and report.uniform_slip.unique == np.inf
+    assert (
+        report.uniform_slip.alternating == pytest.approx(1.0)
+        and report.uniform_slip.unique == np.inf
+    )
     loaded, solution = slipping(InterfaceProblem(Q, np.zeros((2, 2)), 0.5), 1.1)
     assert len(all_solutions(loaded)) == 1
     assert rate(loaded, solution, Alternating(), 60) == pytest.approx(1.1, rel=1e-3)
@@ -150,7 +180,9 @@ def test_coefficients_are_scaled_together():
     assert a.guaranteed.unique == pytest.approx(b.guaranteed.unique)
     assert a.guaranteed.unique >= diagnose(base).guaranteed.unique
     smooth = np.zeros(base.contacts)
-    assert diagnose(changed(base, smooth)).guaranteed.unique == pytest.approx(diagnose(base).guaranteed.unique)
+    assert diagnose(changed(base, smooth)).guaranteed.unique == pytest.approx(
+        diagnose(base).guaranteed.unique
+    )
 
 
 @pytest.mark.parametrize("dim,elements,mu", [(2, 8, 0.2), (2, 16, 0.5), (3, 4, 0.5)])
@@ -160,12 +192,16 @@ def test_rates_at_a_solution_are_those_of_the_iterations(dim, elements, mu):
     assert local.stick + local.slip + local.open == problem.contacts and local.slip > 0
     for predicted, (_, method) in zip((local.alternating_rate, local.tresca_rate), BOTH):
         history = [h["residual"] for h in solve(problem, method, tol=1e-11).history]
-        measured = (history[-2] / history[len(history) // 2]) ** (1 / (len(history) - 2 - len(history) // 2))
+        measured = (history[-2] / history[len(history) // 2]) ** (
+            1 / (len(history) - 2 - len(history) // 2)
+        )
         assert measured == pytest.approx(predicted, rel=0.03)
 
 
 def test_local_thresholds_of_one_contact():
-    """Slip backwards: eigenvalue -mu / mu*, so that the iterations fail where the solution stays isolated."""
+    """Slip backwards: eigenvalue -mu / mu*, so that the iterations fail where the solution stays
+    isolated.
+    """
     problem = one_contact((-10.0, 1.0), 1.0)
     local = diagnose(problem, solve(problem)).local
     assert (local.stick, local.slip, local.open) == (0, 1, 0)
@@ -183,14 +219,18 @@ def test_all_open():
 
 
 def test_local_turns_with_the_direction_of_slip_in_3d():
-    """One contact in 3D whose tangential compliance is not isotropic: the rates of both iterations, by differences."""
+    """One contact in 3D whose tangential compliance is not isotropic: the rates of both iterations,
+    by differences.
+    """
     Q = np.array([[1.0, 0.5, 0.3], [0.5, 2.0, 0.4], [0.3, 0.4, 1.0]])
     problem = InterfaceProblem(Q, [[-1.0, 0.9, -1.2]], 0.4)
     solution = solve(problem, tol=1e-13)
     local = diagnose(problem, solution).local
     assert local.slip == 1
     for predicted, (_, method) in zip((local.alternating_rate, local.tresca_rate), BOTH):
-        history = [h["residual"] for h in solve(problem, method, tol=1e-12, max_iterations=60).history]
+        history = [
+            h["residual"] for h in solve(problem, method, tol=1e-12, max_iterations=60).history
+        ]
         steps = [b / a for a, b in pairwise(history) if b > 1e-9]
         assert steps[-1] == pytest.approx(predicted, rel=1e-2)
 
@@ -201,11 +241,17 @@ def test_rank_condition_and_symmetry():
     Q = A @ np.diag([4.0, 3.0, 2.0, 1.0, 0.5, 0.0]) @ A.T
     report = diagnose(InterfaceProblem(Q, np.zeros((3, 2)), 0.5))
     assert (report.rank, report.size, report.held) == (5, 6, 0)
-    assert report.condition == pytest.approx(8.0) and abs(report.least) < 1e-15 and report.asymmetry < 1e-15
+    assert (
+        report.condition == pytest.approx(8.0)
+        and abs(report.least) < 1e-15
+        and report.asymmetry < 1e-15
+    )
     Q[0, 1] += 0.01
     skew = diagnose(InterfaceProblem(Q, np.zeros((3, 2)), 0.5))
     assert skew.asymmetry == pytest.approx(0.01 * np.sqrt(2) / np.linalg.norm(Q))
-    indefinite = diagnose(InterfaceProblem(np.array([[1.0, 1.5], [1.5, 1.0]]), np.zeros((1, 2)), 0.5))
+    indefinite = diagnose(
+        InterfaceProblem(np.array([[1.0, 1.5], [1.5, 1.0]]), np.zeros((1, 2)), 0.5)
+    )
     assert "not positive semidefinite" in str(indefinite)
 
 
@@ -233,9 +279,11 @@ def test_the_punch_prints_in_a_few_lines(punch):
         (one_contact((-10.0, 1.0), 0.0), "tight"),  # no friction
         (one_contact((-10.0, 1.0), 1.0), "not tight"),  # slips
         (InterfaceProblem(np.eye(2), [[-1.0, 0.2]], 0.5), "tight"),  # sticks
-        (InterfaceProblem(np.eye(2), [[-1.0, 5.0]], 0.5), "not tight"),  # slips, without any coupling in Q
+        # slips, without any coupling in Q
+        (InterfaceProblem(np.eye(2), [[-1.0, 5.0]], 0.5), "not tight"),
         (InterfaceProblem(np.eye(2), [[1.0, 0.2]], 0.5), "tight"),  # opens wide
-        (InterfaceProblem(np.eye(2), [[0.1, 5.0]], 0.5), "not tight"),  # opens, by less than mu |u_t|
+        # opens, by less than mu |u_t|
+        (InterfaceProblem(np.eye(2), [[0.1, 5.0]], 0.5), "not tight"),
         (InterfaceProblem(np.eye(2), [[-1.0, 0.2]], Bilateral(0.5)), "none"),
     ],
 )

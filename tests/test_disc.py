@@ -19,7 +19,8 @@ def test_half_disc(sectors, count):
     rim = np.linalg.norm(p[:, -(n + 1) :], axis=0)
     np.testing.assert_allclose(rim, 2.0)
     mesh = MeshQuad(p, t)
-    assert mesh.boundary_facets().size == n + 2 * (count - 1)  # the rim and the diameter: nothing else is open
+    # the rim and the diameter: nothing else is open
+    assert mesh.boundary_facets().size == n + 2 * (count - 1)
     assert np.sum(np.abs(p[1]) < 1e-12) == 2 * count - 1
     mirrored = np.round(p * [[-1], [1]], 9)
     assert {tuple(c) for c in mirrored.T + 0.0} == {tuple(c) for c in np.round(p, 9).T + 0.0}

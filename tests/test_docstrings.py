@@ -50,7 +50,9 @@ class Package:
         return None
 
     def uses(self) -> Iterator[tuple[str, tuple[str, str]]]:
-        """(module, definition that it uses), by an import or as an attribute of a module that it imports."""
+        """(module, definition that it uses), by an import or as an attribute of a module that it
+        imports.
+        """
         for module, nodes in self.nodes.items():
             modules = {}
             for here, source, name in self.imports[module]:
@@ -71,15 +73,25 @@ class Package:
             for row in self.nodes[module]:
                 if not isinstance(row, ast.Tuple) or len(row.elts) < 2:
                     continue
-                texts = [one.value if isinstance(one, ast.Constant) else None for one in row.elts[:2]]
+                texts = [
+                    one.value if isinstance(one, ast.Constant) else None for one in row.elts[:2]
+                ]
                 for home in (f"{texts[0]}", f"{module}.{texts[0]}"):
                     if (home, texts[1]) in self.definitions:
                         yield home, str(texts[1])
 
     def shared(self) -> set[tuple[str, str]]:
         """Public definitions that another room uses or that an `__init__` names."""
-        across = {found for user, found in self.uses() if room(user) != room(found[0]) or user in self.initial}
-        return {(module, name) for module, name in across | set(self.tables()) if not name.startswith("_")}
+        across = {
+            found
+            for user, found in self.uses()
+            if room(user) != room(found[0]) or user in self.initial
+        }
+        return {
+            (module, name)
+            for module, name in across | set(self.tables())
+            if not name.startswith("_")
+        }
 
 
 def imported(nodes: list[ast.AST]) -> Iterator[tuple[str, str, str]]:
@@ -98,9 +110,18 @@ def missing(function: Function) -> set[str]:
     """The sections that the docstring of a function lacks."""
     said = set(re.findall(r"^(\w+)\n-+$", ast.get_docstring(function) or "", re.MULTILINE))
     arguments = function.args
-    given = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs, arguments.vararg, arguments.kwarg]
+    given = [
+        *arguments.posonlyargs,
+        *arguments.args,
+        *arguments.kwonlyargs,
+        arguments.vararg,
+        arguments.kwarg,
+    ]
     takes = any(one is not None and one.arg not in ("self", "cls") for one in given)
-    returns = function.returns is not None and ast.unparse(function.returns) not in ("None", "NoReturn")
+    returns = function.returns is not None and ast.unparse(function.returns) not in (
+        "None",
+        "NoReturn",
+    )
     lacks = {"Parameters"} if takes and "Parameters" not in said else set()
     return lacks | ({"Returns"} if returns and not said & {"Returns", "Yields"} else set())
 
@@ -117,14 +138,16 @@ def methods(node: ast.ClassDef) -> Iterator[Function]:
 def unexplained(folder: Path) -> list[str]:
     """Functions and methods that other rooms use and whose docstrings lack sections.
 
-    A method may be explained in any of the classes that define it: in the protocol or in the base class.
+    A method may be explained in any of the classes that define it: in the protocol or in the base
+    class.
     """
     package = Package(folder)
     shared = package.shared()
     found = [
         f"{module}.{name} lacks {' and '.join(sorted(lacks))}"
         for module, name in shared
-        if isinstance(node := package.definitions[module, name], Function) and (lacks := missing(node))
+        if isinstance(node := package.definitions[module, name], Function)
+        and (lacks := missing(node))
     ]
     attributes: dict[str, set[str]] = {}
     for module, nodes in package.nodes.items():
@@ -137,7 +160,9 @@ def unexplained(folder: Path) -> list[str]:
         node = package.definitions[module, name]
         for method in methods(node) if isinstance(node, ast.ClassDef) else ():
             if method.name not in explained and attributes.get(method.name, set()) - {room(module)}:
-                found.append(f"{module}.{name}.{method.name} lacks {' and '.join(sorted(missing(method)))}")
+                found.append(
+                    f"{module}.{name}.{method.name} lacks {' and '.join(sorted(missing(method)))}"
+                )
     return sorted(found)
 
 
@@ -183,7 +208,10 @@ def test_a_function_without_sections_is_found(tmp_path, doc, user, complaints):
 @pytest.mark.parametrize(("doc", "complaints"), [(SHORT, 1), (EXPLAINED, 0)])
 def test_a_method_is_explained_in_the_class_or_in_its_base(tmp_path, doc, complaints):
     base = f"class Base:\n    def double(self, x: float) -> float:\n{indent(doc, ' ' * 8)}\n"
-    code = f"{base}\nclass Stairs(Base):\n    def double(self, x: float) -> float:\n        return 2 * x\n"
+    code = (
+        f"{base}\nclass Stairs(Base):\n    def double(self, x: float) -> float:\n        return 2"
+        " * x\n"
+    )
     user = "from house.cellar import Stairs\nStairs().double(1.0)\n"
     assert_found(tmp_path, {"__init__.py": "", "cellar.py": code, "attic.py": user}, complaints)
 

@@ -38,7 +38,10 @@ def test_solved_is_the_certificates_word():
 
 def test_limits_are_kept_and_the_last_iterate_survives():
     solution = solve(PROBLEM, Scripted(WRONG), max_iterations=7)
-    assert solution.status is Status.ITERATION_LIMIT and solution.iterations == len(solution.history) == 7
+    assert (
+        solution.status is Status.ITERATION_LIMIT
+        and solution.iterations == len(solution.history) == 7
+    )
     assert solution.reactions[0, 0] == pytest.approx(WRONG[6][0] * FORCE)
     slow = solve(PROBLEM, Scripted(WRONG, pause=0.02), time_limit=0.05)
     assert slow.status is Status.TIME_LIMIT and slow.iterations < 10
@@ -56,27 +59,39 @@ class Endless:
 
 def test_the_time_limit_ends_inner_iterations():
     solution = solve(PROBLEM, Endless(), time_limit=0.1)
-    assert solution.status is Status.TIME_LIMIT and solution.iterations == 0 and solution.seconds["solve"] > 0.05
+    assert (
+        solution.status is Status.TIME_LIMIT
+        and solution.iterations == 0
+        and solution.seconds["solve"] > 0.05
+    )
 
 
 @pytest.mark.parametrize("method", ["apg", "lagrangian"])
 def test_a_load_that_nothing_balances_does_not_outlast_the_time_limit(method):
-    """Contact pushes upwards only, and the second plate is drawn along the contacts, which carry no friction."""
+    """Contact pushes upwards only, and the second plate is drawn along the contacts, which carry no
+    friction.
+    """
     rng = np.random.default_rng(3)
-    problem = InterfaceProblem(np.eye(6), rng.normal(size=(2, 3)), 1e-3, rng.normal(size=(6, 3)), [1.0, -1.0, 1.0])
+    problem = InterfaceProblem(
+        np.eye(6), rng.normal(size=(2, 3)), 1e-3, rng.normal(size=(6, 3)), [1.0, -1.0, 1.0]
+    )
     solution = solve(problem, method, time_limit=0.5, max_iterations=10**9)
     assert not solution.solved and solution.seconds["solve"] < 5.0
 
 
 def test_a_method_that_repeats_itself_is_stopped():
     assert solve(PROBLEM, Scripted(((0.5, 0.0),) * 9)).status is Status.STALLED
-    assert solve(PROBLEM, Scripted(((0.5, 0.0), (0.6, 0.0), (0.7, 0.0)) * 9)).status is Status.CYCLING
+    assert (
+        solve(PROBLEM, Scripted(((0.5, 0.0), (0.6, 0.0), (0.7, 0.0)) * 9)).status is Status.CYCLING
+    )
     assert solve(PROBLEM, Scripted(WRONG[:3])).status is Status.SETTLED  # ended by itself
 
 
 def test_the_papers_criterion_is_recorded_and_can_stop_but_not_certify():
     exact = solve(one_contact((-10.0, 1.0), 0.6), "alternating", max_iterations=2000)
-    loose = solve(one_contact((-10.0, 1.0), 0.6), "alternating", change_tol=1e-5, max_iterations=2000)
+    loose = solve(
+        one_contact((-10.0, 1.0), 0.6), "alternating", change_tol=1e-5, max_iterations=2000
+    )
     assert exact.solved and loose.status is Status.SETTLED
     assert loose.iterations < exact.iterations
     assert loose.history[-1]["change"] <= 1e-5 < loose.history[-2]["change"]
@@ -96,7 +111,9 @@ def test_unloaded_and_open_contacts():
     assert not np.any(at_rest.reactions) and not np.any(apart.reactions)
 
 
-@pytest.mark.parametrize("bad", [dict(tol=0), dict(tol=np.nan), dict(max_iterations=0), dict(change_tol=-1.0)])
+@pytest.mark.parametrize(
+    "bad", [dict(tol=0), dict(tol=np.nan), dict(max_iterations=0), dict(change_tol=-1.0)]
+)
 def test_bad_arguments(bad):
     with pytest.raises(InputError, match="must be a finite number"):
         solve(PROBLEM, **bad)
@@ -113,7 +130,12 @@ def test_unknown_methods_and_settings():
 
 def test_progress_is_reported():
     seen = []
-    solve(PROBLEM, Scripted(WRONG), max_iterations=3, progress=lambda i, residual: seen.append((i, residual)))
+    solve(
+        PROBLEM,
+        Scripted(WRONG),
+        max_iterations=3,
+        progress=lambda i, residual: seen.append((i, residual)),
+    )
     assert [i for i, _ in seen] == [1, 2, 3] and all(residual > 0 for _, residual in seen)
 
 
@@ -161,16 +183,23 @@ def test_a_tolerance_below_rounding_ends_without_an_exception():
 
 
 def test_fallbacks_are_told(caplog):
-    """Contacts at random places have no grid for a preconditioner; the answer says so, and so does the log."""
+    """Contacts at random places have no grid for a preconditioner; the answer says so, and so does
+    the log.
+    """
     rng = np.random.default_rng(1)
     A = rng.normal(size=(36, 36))
     problem = InterfaceProblem(
-        A @ A.T / 36 + np.eye(36), rng.normal(size=(12, 3)) - 0.5, 0.3, coordinates=rng.random((3, 12))
+        A @ A.T / 36 + np.eye(36),
+        rng.normal(size=(12, 3)) - 0.5,
+        0.3,
+        coordinates=rng.random((3, 12)),
     )
     assert solve(problem).notes == ()
     with caplog.at_level("INFO"):
         solution = solve(problem, "newton", linear="krylov")
-    assert solution.solved and any("no preconditioner fits" in sentence for sentence in solution.notes)
+    assert solution.solved and any(
+        "no preconditioner fits" in sentence for sentence in solution.notes
+    )
     assert "no preconditioner fits" in caplog.text
     assert solve(problem).notes == ()  # the notes of one solve are its own
 
@@ -178,7 +207,9 @@ def test_fallbacks_are_told(caplog):
 def test_the_default_says_when_it_changes_its_method():
     """Rigid bodies that share forces among too many contacts: Newton's first steps get nowhere."""
     solution = solve(rigid_bodies(bodies=4, contacts=12, mu=0.8, seed=0))
-    assert solution.solved and any("the proximal loop take over" in sentence for sentence in solution.notes)
+    assert solution.solved and any(
+        "the proximal loop take over" in sentence for sentence in solution.notes
+    )
 
 
 def test_seconds_are_those_of_the_method_and_of_the_certificate(punch):
@@ -191,7 +222,9 @@ def test_a_q_that_does_not_fit_into_memory_is_not_formed():
     n = 40_000
     Q = InterfaceOperator(lambda X, accuracy: X, np.ones(n))
     problem = InterfaceProblem(Q, np.full((n // 2, 2), -1.0), 0.3)
-    with pytest.raises(InputError, match="would take 12,800,000,000 bytes, more than 8,000,000,000"):
+    with pytest.raises(
+        InputError, match="would take 12,800,000,000 bytes, more than 8,000,000,000"
+    ):
         solve(problem, "nsgs")
     solution = solve(problem)
     assert solution.solved and np.allclose(solution.reactions[:, 0], 1.0)

@@ -14,7 +14,11 @@ PART = Part("body", None, Material(1.0, 0.3))
 def contact(x: np.ndarray, kind: str, areas: np.ndarray) -> tuple[Scene, InterfaceProblem]:
     dim = 3 if kind == "solid" else 2
     problem = InterfaceProblem(
-        np.eye(dim * x.shape[1]), np.zeros((x.shape[1], dim)), np.full(x.shape[1], 0.5), areas=areas, coordinates=x
+        np.eye(dim * x.shape[1]),
+        np.zeros((x.shape[1], dim)),
+        np.full(x.shape[1], 0.5),
+        areas=areas,
+        coordinates=x,
     )
     return Scene("s", PART, Rigid("floor"), 0.5, kind=kind), problem
 
@@ -87,7 +91,9 @@ def test_a_stick_zone_off_the_centre_of_contact():
 def test_several_patches_add_up():
     x = np.linspace(-2.0, 2.0, 401)
     scene, problem = contact(x[None], "plane-strain", np.full(401, 0.01))
-    p = sum(np.sqrt(np.maximum(0.0, 1 - ((x - c) / a) ** 2)) for c, a in ((-1.1, 0.413), (0.9, 0.718)))
+    p = sum(
+        np.sqrt(np.maximum(0.0, 1 - ((x - c) / a) ** 2)) for c, a in ((-1.1, 0.413), (0.9, 0.718))
+    )
     r = 0.01 * np.stack([p, 0 * p], axis=1)
     assert contact_edge(scene, problem, r) == pytest.approx(0.413 + 0.718, rel=1e-9)
 
@@ -96,7 +102,8 @@ def test_a_zone_that_ends_at_a_corner_on_one_side():
     """Contact from the end of the surface to 0.4: the half-width is half the distance of the two."""
     x = np.linspace(-1.0, 1.0, 101)
     scene, problem = contact(x[None], "plane-strain", np.full(101, 0.02))
-    p = np.sqrt(np.maximum(0.0, 0.403 - x) * np.maximum(0.0, x + 1.597))  # zero at .403, its mirror image at -1.597
+    # zero at .403, its mirror image at -1.597
+    p = np.sqrt(np.maximum(0.0, 0.403 - x) * np.maximum(0.0, x + 1.597))
     r = 0.02 * np.stack([p, 0 * p], axis=1)
     assert contact_edge(scene, problem, r) == pytest.approx((1 + 0.403) / 2, rel=2e-3)
 
@@ -119,7 +126,9 @@ def test_a_half_model_is_read_as_the_whole(sign):
 
 @pytest.mark.parametrize("centre", [0.0, 1.0, 3.1, 5.9])
 def test_a_zone_across_the_seam_of_a_closed_line(centre):
-    """The same zone anywhere on a closed line of length 2 pi, also across the place where its numbering begins."""
+    """The same zone anywhere on a closed line of length 2 pi, also across the place where its
+    numbering begins.
+    """
     angle = np.linspace(0.0, 2 * np.pi, 240, endpoint=False)
     space = np.stack([np.cos(angle), np.sin(angle)])
     scene, problem = contact(space, "plane-strain", np.full(240, 2 * np.pi / 240))
@@ -147,7 +156,8 @@ def test_all_or_nothing_sticks():
     x = np.linspace(0.0, 1.0, 11)
     scene, problem = contact(x[None], "plane-strain", np.full(11, 0.2))
     full = np.stack([np.ones(11), np.full(11, 0.1)], axis=1)
-    assert stick_edge(scene, problem, full)[0] == pytest.approx(1.1)  # areas of the nodes: 2.2, half of it
+    # areas of the nodes: 2.2, half of it
+    assert stick_edge(scene, problem, full)[0] == pytest.approx(1.1)
     slipping = np.stack([np.ones(11), np.full(11, 0.5)], axis=1)
     assert stick_edge(scene, problem, slipping)[0] == 0.0
 
@@ -175,7 +185,9 @@ def test_stick_edge_of_exact_slack_and_slip(c):
 def test_stick_edge_is_the_mean_of_what_slack_and_slip_read():
     c = 0.613
     scene, problem, distance, r, slip = punch(c)
-    moved = np.where(distance > c, np.maximum(0.0, distance - c + 0.004) ** 1.5, 0.0)[:, None] * np.sign(slip)
+    moved = np.where(distance > c, np.maximum(0.0, distance - c + 0.004) ** 1.5, 0.0)[
+        :, None
+    ] * np.sign(slip)
     assert stick_edge(scene, problem, r, moved)[0] == pytest.approx(c - 0.002, rel=1e-9)
 
 

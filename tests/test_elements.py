@@ -1,4 +1,6 @@
-"""Shape and degree of the elements: patch test, weights of the contact surface, exactness, no ripple in Hertz."""
+"""Shape and degree of the elements: patch test, weights of the contact surface, exactness, no
+ripple in Hertz.
+"""
 
 from dataclasses import replace
 
@@ -66,7 +68,11 @@ def test_stiffness_is_the_weak_form_of_elasticity(kind, degree, cut):
 
     @skfem.BilinearForm
     def elasticity(u, v, w):
-        volume, volume_v, energy = trace(sym_grad(u)), trace(sym_grad(v)), ddot(sym_grad(u), sym_grad(v))
+        volume, volume_v, energy = (
+            trace(sym_grad(u)),
+            trace(sym_grad(v)),
+            ddot(sym_grad(u), sym_grad(v)),
+        )
         if kind == "axisymmetric":
             volume, volume_v = volume + u[0] / w.x[0], volume_v + v[0] / w.x[0]
             energy = energy + u[0] * v[0] / w.x[0] ** 2
@@ -80,14 +86,18 @@ def test_stiffness_is_the_weak_form_of_elasticity(kind, degree, cut):
 
 @pytest.mark.parametrize("kind,degree,cut", SHAPES)
 def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
-    """Rows of W add up to 1; A' W is the force of unit pressure on every node; contacts stay on their plane."""
+    """Rows of W add up to 1; A' W is the force of unit pressure on every node; contacts stay on
+    their plane.
+    """
     body = body_of(kind, degree, cut)
     W = body.weights
     assert np.allclose(W.sum(axis=1), 1, atol=1e-12)
     up = (0.0,) * (len(body.unknowns) - 1) + (1.0,)
     scene = with_elements(two_blocks(kind), degree, cut)
     loaded = build_body(scene, replace(scene.lower, loads=(Traction("top", up),)), 1, None)
-    assert np.allclose(body.areas @ W, loaded.load[body.unknowns[-1]], atol=1e-13 * body.areas.sum())
+    assert np.allclose(
+        body.areas @ W, loaded.load[body.unknowns[-1]], atol=1e-13 * body.areas.sum()
+    )
     if degree == 1:
         assert np.array_equal(body.nodes, W.indices) and np.allclose(W.data, 1)
     mean = W @ body.locations.T
@@ -97,12 +107,19 @@ def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_quadratic_displacement_has_no_error(kind, cut):
-    """A clamped-free bar under its own weight: the displacement is quadratic, the reaction is its weight."""
+    """A clamped-free bar under its own weight: the displacement is quadratic, the reaction is its
+    weight.
+    """
     scene = with_elements(two_blocks(kind), 2, cut)
     up = scene.components[-1]
     sides = tuple(s for s in scene.lower.supports if s.boundary != "bottom")
     weight = BodyForce((0.0,) * (scene.dim - 1) + (-2.0,))
-    part = replace(scene.lower, supports=(*sides, Support("bottom", {up: 0.0})), loads=(weight,), material=MATERIAL)
+    part = replace(
+        scene.lower,
+        supports=(*sides, Support("bottom", {up: 0.0})),
+        loads=(weight,),
+        material=MATERIAL,
+    )
     part = replace(part, material=Material(5.0, 0.0))
     body = build_body(scene, part, 1, None)
     U = np.zeros(body.basis.N)
@@ -133,16 +150,21 @@ def test_cutting_into_simplices_keeps_volume_and_boundaries(kind):
     assert set(cut.boundaries) == set(mesh.boundaries)
     for name in mesh.boundaries:
         shapes = (
-            (skfem.ElementHex1, skfem.ElementTetP1) if kind == "solid" else (skfem.ElementQuad1, skfem.ElementTriP1)
+            (skfem.ElementHex1, skfem.ElementTetP1)
+            if kind == "solid"
+            else (skfem.ElementQuad1, skfem.ElementTriP1)
         )
         areas = [
-            float(np.sum(skfem.FacetBasis(m, e(), facets=m.boundaries[name]).dx)) for m, e in zip((mesh, cut), shapes)
+            float(np.sum(skfem.FacetBasis(m, e(), facets=m.boundaries[name]).dx))
+            for m, e in zip((mesh, cut), shapes)
         ]
         assert areas[0] == pytest.approx(areas[1])
 
 
 def test_cells_that_cannot_be_cut_alike_are_refused():
-    mesh = skfem.MeshHex.init_tensor(np.linspace(0, 1, 3), np.linspace(0, 1, 2), np.linspace(0, 1, 2))
+    mesh = skfem.MeshHex.init_tensor(
+        np.linspace(0, 1, 3), np.linspace(0, 1, 2), np.linspace(0, 1, 2)
+    )
     t = mesh.t.copy()
     t[:, 0] = t[[1, 4, 5, 0, 7, 2, 3, 6], 0]  # the first cell turned by a quarter
     assert skfem.MeshHex(mesh.p, t).is_valid()
@@ -157,9 +179,13 @@ def test_other_degrees_are_refused(degree):
 
 
 def test_a_half_model_is_half_of_the_whole():
-    """The tangential component on the plane of symmetry belongs to the support, without its neighbours."""
+    """The tangential component on the plane of symmetry belongs to the support, without its
+    neighbours.
+    """
     x = np.array([0.0, 0.3, 0.7, 1.0])
-    whole, half = (tensor_mesh(grid, np.linspace(0, 1, 4)) for grid in (np.concatenate([-x[:0:-1], x]), x))
+    whole, half = (
+        tensor_mesh(grid, np.linspace(0, 1, 4)) for grid in (np.concatenate([-x[:0:-1], x]), x)
+    )
     both = []
     for mesh, copies in ((whole, 1), (half, 2)):
         mesh = rename(mesh, contact="y-", top="y+")
@@ -180,7 +206,9 @@ def test_a_half_model_is_half_of_the_whole():
 
 @pytest.mark.parametrize("cut", [False, True])
 def test_hertz_does_not_ripple_in_3d(cut):
-    """Within .6 a the error of the pressure is nearly the same at all nodes; contacts at all nodes of P2 would fail."""
+    """Within .6 a the error of the pressure is nearly the same at all nodes; contacts at all nodes
+    of P2 would fail.
+    """
     row = experiment.measure("sphere 3D", 2, 2, "P" if cut else "Q")
     assert row["ripple"] < 0.03
     if cut:
@@ -191,16 +219,24 @@ def test_hertz_does_not_ripple_in_3d(cut):
 
 @pytest.mark.parametrize("cut", [False, True])
 def test_quadratic_elements_need_fewer_unknowns_for_hertz(cut):
-    """Peak pressure and approach: closer on a quadratic mesh half as fine, of about as many unknowns."""
+    """Peak pressure and approach: closer on a quadratic mesh half as fine, of about as many
+    unknowns.
+    """
     shape = "P" if cut else "Q"
-    linear, quadratic = experiment.measure("sphere", 8, 1, shape), experiment.measure("sphere", 4, 2, shape)
+    linear, quadratic = (
+        experiment.measure("sphere", 8, 1, shape),
+        experiment.measure("sphere", 4, 2, shape),
+    )
     assert quadratic["unknowns"] < 1.3 * linear["unknowns"]
     for quantity in ("peak", "approach"):
         assert abs(quadratic[quantity]) < 0.9 * abs(linear[quantity])
 
 
 def test_the_gap_of_a_curved_body_does_not_alternate():
-    """Edges are straight, the sphere is not: Part.curve knows. Without it the middles of edges would touch too late."""
+    """Edges are straight, the sphere is not: Part.curve knows.
+
+    Without it the middles of edges would touch too late.
+    """
     scene = scenes.make_scene("sphere", degree=2, elements=8, mu=0.0)
     a = scene.reference.half_width
     ripple = []
@@ -225,7 +261,9 @@ def test_scenes_run_with_quadratic_elements(name, elements, cut, tmp_path):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_stress_below_hertz_contact(degree):
-    """On the axis sigma_z = -p0 / (1 + z^2/a^2): at the surface too where the displacement is quadratic."""
+    """On the axis sigma_z = -p0 / (1 + z^2/a^2): at the surface too where the displacement is
+    quadratic.
+    """
     scene = scenes.make_scene("sphere", degree=degree, elements=32 // degree**2, mu=0.0)
     a, p0 = scene.reference.half_width, scene.reference.peak
     reduction = reduce_bodies(scene, zone=a)
@@ -253,10 +291,14 @@ def test_quadratic_bodies_by_products(solver, cut):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_small_elements_far_from_the_origin_keep_their_areas(dim, degree):
-    near = tensor_mesh(*[np.linspace(0.0, 1.0, 5)] * dim).with_boundaries({"contact": lambda x: x[-1] > 1 - 1e-6})
+    near = tensor_mesh(*[np.linspace(0.0, 1.0, 5)] * dim).with_boundaries(
+        {"contact": lambda x: x[-1] > 1 - 1e-6}
+    )
     far = replace(near, doflocs=near.p + 1e5)
     found = [
-        contact_trace(make_basis(mesh, degree, False), degree, mesh.boundaries["contact"], (1.0, False))
+        contact_trace(
+            make_basis(mesh, degree, False), degree, mesh.boundaries["contact"], (1.0, False)
+        )
         for mesh in (near, far)
     ]
     for here, there in zip(*found):

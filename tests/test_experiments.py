@@ -11,7 +11,9 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 QUESTIONS = ROOT / "experiments" / "questions"
-MODULES = sorted(path.relative_to(ROOT).with_suffix("").as_posix() for path in QUESTIONS.rglob("*.py"))
+MODULES = sorted(
+    path.relative_to(ROOT).with_suffix("").as_posix() for path in QUESTIONS.rglob("*.py")
+)
 REPORTS = sorted(path for path in (ROOT / "reports").glob("*/report.md"))
 
 
@@ -51,20 +53,27 @@ def test_a_report_names_the_command_that_writes_it(tmp_path, monkeypatch, capsys
 
 
 def test_a_question_runs_as_a_command_and_measures_what_it_says():
-    """The patch test is the quickest: its report is exact to rounding. It runs in a process, and writes nothing here."""
+    """The patch test is the quickest: its report is exact to rounding.
+
+    It runs in a process, and writes nothing here.
+    """
     code = (
-        "import runpy, experiments.report as report\n"
-        "from unittest.mock import patch\n"
-        "def show(name, title, text, tables, figures): print(name, [row for rows in tables.values() for row in rows])\n"
-        "with patch.object(report, 'write', show):\n"
-        "    runpy.run_module('experiments.questions.patch_test', run_name='__main__')\n"
+        "import runpy, experiments.report as report\nfrom unittest.mock import patch\ndef"
+        " show(name, title, text, tables, figures): print(name, [row for rows in tables.values()"
+        " for row in rows])\nwith patch.object(report, 'write', show):\n   "
+        " runpy.run_module('experiments.questions.patch_test', run_name='__main__')\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr
     name, rows = done.stdout.split(" ", 1)
     assert name == "patch_test"
     errors = [
-        value for row in eval(rows, {"np": __import__("numpy")}) for value in row.values() if isinstance(value, float)
+        value
+        for row in eval(rows, {"np": __import__("numpy")})
+        for value in row.values()
+        if isinstance(value, float)
     ]
     assert errors and max(errors) < 1e-6
 
@@ -88,7 +97,9 @@ def test_the_comparison_without_crossover_goes_without_it():
 
 
 def test_the_picture_of_the_readme_shows_what_its_caption_says():
-    """Computed dots on exact curves, slip and stick named; away from the corners of the curves, where elements blur them."""
+    """Computed dots on exact curves, slip and stick named; away from the corners of the curves,
+    where elements blur them.
+    """
     import numpy as np
 
     from experiments.questions.contact_picture import picture
@@ -119,7 +130,9 @@ def test_every_command_that_is_named_somewhere_exists():
     named = {
         (match[1], str(path.relative_to(ROOT)))
         for path in files
-        for match in re.finditer(r"python -m\s+(experiments(?:\.\w+)+)", path.read_text(encoding="utf-8"))
+        for match in re.finditer(
+            r"python -m\s+(experiments(?:\.\w+)+)", path.read_text(encoding="utf-8")
+        )
     }
     assert len(named) > 5
     assert not [(module, path) for module, path in sorted(named) if find_spec(module) is None]
@@ -130,4 +143,7 @@ def test_what_is_called_exact_of_nearly_symmetric_scenes_is_right():
 
     checks = [nearly.checked(number) for number in (4, 13, 17, 31, 1, 3)]
     assert [bool(row["exact"]) for row in checks] == [row["spoilt by"] == 0 for row in checks]
-    assert max(row["certificate"] for row in checks) < 1e-8 and sum(row["wrong"] for row in nearly.table(checks)) == 0
+    assert (
+        max(row["certificate"] for row in checks) < 1e-8
+        and sum(row["wrong"] for row in nearly.table(checks)) == 0
+    )

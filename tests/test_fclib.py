@@ -70,7 +70,12 @@ def store(group, matrix, storage):
         p, i, nz = np.searchsorted(rows, np.arange(matrix.shape[0] + 1)), columns, -2
     else:
         p, i, nz = columns, rows, len(values)
-    for key, value in (("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", nz), ("nzmax", len(values))):
+    for key, value in (
+        ("m", matrix.shape[0]),
+        ("n", matrix.shape[1]),
+        ("nz", nz),
+        ("nzmax", len(values)),
+    ):
         group[key] = np.array([value], dtype=np.int32)
     group["p"], group["i"], group["x"] = p.astype(np.int32), i.astype(np.int32), values
 
@@ -79,7 +84,9 @@ def store(group, matrix, storage):
 def test_global_form_is_condensed(storage, tmp_path):
     W, q = global_file(tmp_path / "g.hdf5", storage)
     problem = fclib.read(tmp_path / "g.hdf5")
-    assert np.allclose(dense(problem.Q), W, atol=1e-15) and np.allclose(problem.q.ravel(), q, atol=1e-15)
+    assert np.allclose(dense(problem.Q), W, atol=1e-15) and np.allclose(
+        problem.q.ravel(), q, atol=1e-15
+    )
     assert solve(problem, tol=1e-12).solved
 
 
@@ -100,7 +107,10 @@ def damaged(change):
         (lambda path: h5py.File(path, "w").close(), "neither"),
         (damaged(lambda f: f["fclib_global"].__delitem__("M")), "usable FCLib file"),
         (damaged(lambda f: f["fclib_global/spacedim"].__setitem__(0, 5)), "spacedim is 5"),
-        (damaged(lambda f: f["fclib_global/vectors/mu"].__setitem__(0, -1.0)), "must not be negative"),
+        (
+            damaged(lambda f: f["fclib_global/vectors/mu"].__setitem__(0, -1.0)),
+            "must not be negative",
+        ),
         (damaged(lambda f: f["fclib_global/vectors/w"].__setitem__(0, np.nan)), "not finite"),
         (damaged(lambda f: f["fclib_global/H/i"].__setitem__(0, 77)), "usable FCLib file"),
         (damaged(lambda f: f["fclib_global/M/nz"].__setitem__(0, -7)), "storage"),

@@ -8,7 +8,13 @@ from conftest import one_contact
 from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
 from contactopt.methods.admm import ADMM, Balanced
 from contactopt.methods.apg import APG, disc_qp
-from contactopt.methods.kernels.mprgp import box_qp, largest_eigenvalue, mprgp, projected_gradient, smalbe
+from contactopt.methods.kernels.mprgp import (
+    box_qp,
+    largest_eigenvalue,
+    mprgp,
+    projected_gradient,
+    smalbe,
+)
 from contactopt.problem.cones import disc
 
 LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
@@ -21,7 +27,9 @@ def spd(n: int, seed: int = 0, condition: float = 1e3) -> np.ndarray:
 
 
 def active_set_by_enumeration(P, c):
-    """The exact solution of a small QP with x >= 0: the only set of free unknowns that satisfies the conditions."""
+    """The exact solution of a small QP with x >= 0: the only set of free unknowns that satisfies
+    the conditions.
+    """
     n = len(c)
     for size in range(n + 1):
         for free in map(list, combinations(range(n), size)):
@@ -50,7 +58,9 @@ def test_box_qp_holds_its_word_in_all_units(solver, scale):
     low = np.where(np.arange(n) % 3, 0.0, -np.inf)  # some unknowns are free
     result = solver(P, c, low, tol=1e-9)
     assert result.met and result.x[1] >= 0 and 0 < np.sum(result.x == low) < n
-    assert np.linalg.norm(projected_gradient(result.x, P @ result.x + c, low)) <= 1.01e-9 * np.linalg.norm(c)
+    assert np.linalg.norm(
+        projected_gradient(result.x, P @ result.x + c, low)
+    ) <= 1.01e-9 * np.linalg.norm(c)
     again = solver(P, c, low, result.x, tol=1e-9)
     assert again.iterations <= 1 and again.met
 
@@ -97,7 +107,9 @@ def test_largest_eigenvalue():
 
 @pytest.mark.parametrize("d", [1, 2])
 def test_disc_qp_finds_the_forces_it_was_made_from(d):
-    """Stick, slip and zero radius prescribed: the linear term follows from u = 0 in stick and u against t in slip."""
+    """Stick, slip and zero radius prescribed: the linear term follows from u = 0 in stick and u
+    against t in slip.
+    """
     k = 60
     rng = np.random.default_rng(7)
     radius = np.where(np.arange(k) % 5, rng.uniform(0.2, 1, k), 0.0)
@@ -127,7 +139,9 @@ def test_they_find_the_solution_of_the_default_method(name, scene, request):
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("options", [{"mu": 0.0}, {"bilateral": True}, {"mu": 0.1}])
 def test_scenes(name, options):
-    assert solve(reduce(scenes.flat_punch(2, elements=5, **options)), METHODS[name], max_iterations=1000).solved
+    assert solve(
+        reduce(scenes.flat_punch(2, elements=5, **options)), METHODS[name], max_iterations=1000
+    ).solved
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -138,7 +152,9 @@ def test_strong_friction_where_the_alternation_cycles(name):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_plate_pressed_and_dragged(name):
-    """Six equal springs under 6 and a pull of 1 share both equally; lambda is the plate's motion, -1 and 1/6."""
+    """Six equal springs under 6 and a pull of 1 share both equally; lambda is the plate's motion,
+    -1 and 1/6.
+    """
     V = np.tile(np.eye(2), (6, 1))
     problem = InterfaceProblem(np.eye(12), np.zeros((6, 2)), 0.5, V, np.array([-6.0, 1.0]))
     solution = solve(problem, METHODS[name], tol=1e-10)
@@ -155,7 +171,9 @@ def test_warm_start_saves_iterations(name, cube):
 
 
 def test_a_bad_first_weight_is_balanced(cube):
-    counts = [solve(cube, ADMM(rho), tol=1e-8, max_iterations=5000).iterations for rho in (1e-4, 1.0, 1e4)]
+    counts = [
+        solve(cube, ADMM(rho), tol=1e-8, max_iterations=5000).iterations for rho in (1e-4, 1.0, 1e4)
+    ]
     assert max(counts) < 40 * counts[1] and max(counts) < 3000
 
 
@@ -163,7 +181,9 @@ def test_system_with_balance_rows(cube):
     rng = np.random.default_rng(9)
     right, s = rng.normal(size=cube.q.shape), np.array([3.0])
     r, lam = Balanced(cube, 0.7).solve(right, s)
-    assert np.allclose((cube.Q @ r.ravel() + 0.7 * r.ravel() + cube.V @ lam), right.ravel(), atol=1e-10)
+    assert np.allclose(
+        (cube.Q @ r.ravel() + 0.7 * r.ravel() + cube.V @ lam), right.ravel(), atol=1e-10
+    )
     assert cube.V.T @ r.ravel() == pytest.approx(-s)
 
 

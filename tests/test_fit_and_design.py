@@ -1,4 +1,6 @@
-"""Calibration recovers what made the data and says what it cannot know; design finds the profile of uniform pressure."""
+"""Calibration recovers what made the data and says what it cannot know; design finds the profile of
+uniform pressure.
+"""
 
 import numpy as np
 import pytest
@@ -24,7 +26,9 @@ def shift(loop):
 
 def test_clean_data_give_back_their_parameters(loop, shift):
     found = contactopt.fit(loop, {"shift": shift}, ("E", "mu"), start={"E": 7.0, "mu": 0.8})
-    assert found.values["E"] == pytest.approx(5.0, rel=1e-6) and found.values["mu"] == pytest.approx(0.5, rel=1e-6)
+    assert found.values["E"] == pytest.approx(5.0, rel=1e-6) and found.values[
+        "mu"
+    ] == pytest.approx(0.5, rel=1e-6)
     assert found.converged and all(found.identifiable.values()) and max(found.certificates) <= 1e-10
     assert "E = 5" in found.sentence
     ax = plots.fit(found)
@@ -48,7 +52,10 @@ def test_the_interval_is_that_of_linear_regression_at_the_solution(loop, shift):
         fitted = [parameter(other, s).put(s, found.values[other]) for s in loop for other in ("E",)]
         fitted = [parameter("mu", s).put(s, found.values["mu"]) for s in fitted]
         at = found.values[name]
-        ends = [follow([which.put(s, at + t) for s in fitted], tol=1e-12).history["shift"] for t in (h, -h)]
+        ends = [
+            follow([which.put(s, at + t) for s in fitted], tol=1e-12).history["shift"]
+            for t in (h, -h)
+        ]
         columns.append((ends[0] - ends[1]) / (2 * h) / sigma)
     J = np.stack(columns, axis=1)
     assert np.allclose(found.covariance, np.linalg.inv(J.T @ J), rtol=1e-4)
@@ -62,7 +69,10 @@ def test_friction_cannot_be_identified_where_everything_sticks(loop):
     row = follow(loop[:1], tol=1e-12).history
     data = {"approach": row["approach"], "energy": row["elastic_energy"], "normal_force": 100.0}
     found = contactopt.fit(loop[0], data, ("E", "mu"), noise=0.01, start={"E": 5.5})
-    assert found.values["E"] == pytest.approx(5.0) and found.identifiable == {"E": True, "mu": False}
+    assert found.values["E"] == pytest.approx(5.0) and found.identifiable == {
+        "E": True,
+        "mu": False,
+    }
     assert found.intervals["mu"] == (-np.inf, np.inf) and np.isfinite(found.intervals["E"]).all()
     assert "mu cannot be identified" in found.sentence
 
@@ -93,7 +103,10 @@ def punch(cells=24, mu=0.0, **changes):
     h = 2 * HALF / cells
     x = -HALF + h * (np.arange(cells) + 0.5)
     return Scene(
-        "punch", Rigid("punch", normal=(0, 1), force={"y": -FORCE}), HalfSpace("flat", MATERIAL, x, **changes), mu
+        "punch",
+        Rigid("punch", normal=(0, 1), force={"y": -FORCE}),
+        HalfSpace("flat", MATERIAL, x, **changes),
+        mu,
     )
 
 
@@ -105,7 +118,9 @@ def test_the_designed_profile_is_the_exact_one_of_uniform_pressure():
     modulus = MATERIAL.E / (1 - MATERIAL.nu**2)
     exact = (1 + x) * np.log((1 + x) ** 2) + (1 - x) * np.log((1 - x) ** 2)
     exact *= FORCE / (2 * HALF) / (np.pi * modulus) * HALF
-    assert np.abs((found.gap - found.gap.mean()) - (exact - exact.mean())).max() < 1e-6 * np.ptp(exact)
+    assert np.abs((found.gap - found.gap.mean()) - (exact - exact.mean())).max() < 1e-6 * np.ptp(
+        exact
+    )
     assert all(visit.certificate <= 1e-9 for visit in found.visits)
     assert found.visits[0].peak > 2 * found.peak
     assert len(plots.design(found).lines) >= 1
@@ -120,11 +135,15 @@ def test_bounds_and_convex_constraints_are_kept():
     boxed = contactopt.design(punch(mu=0.2), shapes, bounds=(-limit, limit))
     assert np.abs(boxed.profile).max() <= limit * (1 + 1e-6) and boxed.peak > free.peak
     tied = contactopt.design(punch(mu=0.2), shapes, constraints=lambda c: [c[0] + c[1] + c[2] == 0])
-    assert abs(tied.profile.sum()) < 1e-6 * np.abs(tied.profile).max() and tied.peak >= free.peak * (1 - 1e-4)
+    assert abs(tied.profile.sum()) < 1e-6 * np.abs(
+        tied.profile
+    ).max() and tied.peak >= free.peak * (1 - 1e-4)
 
 
 def test_a_free_load_goes_to_its_bound():
-    found = contactopt.design(punch(), free="force:punch:y", bounds={"force:punch:y": (-120.0, -80.0)})
+    found = contactopt.design(
+        punch(), free="force:punch:y", bounds={"force:punch:y": (-120.0, -80.0)}
+    )
     assert found.values["force:punch:y"] == pytest.approx(-80.0, rel=1e-6)
 
 

@@ -1,4 +1,6 @@
-"""Bodies that only contact holds: exact states, independence of how they are fixed, and loads that nothing balances."""
+"""Bodies that only contact holds: exact states, independence of how they are fixed, and loads that
+nothing balances.
+"""
 
 from dataclasses import replace
 
@@ -34,13 +36,17 @@ FLOOR = Rigid("floor", normal=(0, 1))
 
 
 def alone(part, floor=FLOOR, mu=0.5, **more):
-    return Scene("alone", bodies=(part, floor), contacts=(Contact(part.name, floor.name, mu),), **more)
+    return Scene(
+        "alone", bodies=(part, floor), contacts=(Contact(part.name, floor.name, mu),), **more
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_block_under_its_own_weight_without_friction(dim, degree):
-    """Confined sideways it stands in uniaxial strain: pressure = weight, and its mean sinks by rho g h^2 / 3 E_oed."""
+    """Confined sideways it stands in uniaxial strain: pressure = weight, and its mean sinks by rho
+    g h^2 / 3 E_oed.
+    """
     sides = {"left": "x-", "right": "x+"} | ({"front": "y-", "back": "y+"} if dim == 3 else {})
     mesh = block([0.0] * dim, [1.0] * dim, [4] * dim)
     axes = {name: ("xy".index(side[0]), float(side[1] == "+")) for name, side in sides.items()}
@@ -49,7 +55,9 @@ def test_a_block_under_its_own_weight_without_friction(dim, degree):
     load = BodyForce((0.0,) * (dim - 1) + (-2.0,))
     part = Part("b", mesh.with_boundaries(named), SOFT, supports, (load,), contact="bottom")
     floor = Rigid("floor", normal=(0.0,) * (dim - 1) + (1.0,))
-    reduction = reduce_bodies(alone(part, floor, 0.0, kind="plane-strain" if dim == 2 else "solid", degree=degree))
+    reduction = reduce_bodies(
+        alone(part, floor, 0.0, kind="plane-strain" if dim == 2 else "solid", degree=degree)
+    )
     problem = reduction.problem
     solution = solve(problem, tol=1e-12)
     assert problem.motions == (f"body 'b': translation along {'xyz'[dim - 1]}",)
@@ -57,12 +65,16 @@ def test_a_block_under_its_own_weight_without_friction(dim, degree):
     stiffness = 1000.0 * 0.7 / (1.3 * 0.4)
     if degree == 2:  # the displacement is quadratic
         assert solution.multipliers[0] == pytest.approx(-2.0 / (3 * stiffness), rel=1e-9)
-        assert elastic_energy(reduction, solution) == pytest.approx(2.0**2 / (6 * stiffness), rel=1e-9)
+        assert elastic_energy(reduction, solution) == pytest.approx(
+            2.0**2 / (6 * stiffness), rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_a_traction_holds_a_block_as_a_plate_does(mu):
-    """Uniform compression, once under a plate that may slide, once by a traction on a body that floats."""
+    """Uniform compression, once under a plate that may slide, once by a traction on a body that
+    floats.
+    """
     mesh = block([0, 0], [2, 1], [6, 4])
     pressed = Part("b", mesh, SOFT, loads=(Traction("top", (0.0, -3.0)),), contact="bottom")
     plate = Plate("top", {"y": -6.0}, glued=False)
@@ -76,7 +88,9 @@ def test_a_traction_holds_a_block_as_a_plate_does(mu):
 
 
 def test_a_roller_between_two_plates():
-    """A disc that touches a floor and a plate: both carry the force, and the tractions mirror each other."""
+    """A disc that touches a floor and a plate: both carry the force, and the tractions mirror each
+    other.
+    """
     circle = skfem.MeshTri.init_circle(4)
     disc = circle.with_boundaries({"below": lambda x: x[1] < -0.5, "above": lambda x: x[1] > 0.5})
     roller = Part("roller", disc, SOFT, contact="below")
@@ -96,7 +110,13 @@ def test_a_roller_between_two_plates():
 
 
 def test_a_ring_that_is_free_along_its_axis():
-    tube = Part("tube", block([1, 0], [2, 3], [4, 6]), SOFT, loads=(BodyForce((0.0, -2.0)),), contact="bottom")
+    tube = Part(
+        "tube",
+        block([1, 0], [2, 3], [4, 6]),
+        SOFT,
+        loads=(BodyForce((0.0, -2.0)),),
+        contact="bottom",
+    )
     reduction = reduce_bodies(alone(tube, mu=0.2, kind="axisymmetric"))
     solution = solve(reduction.problem, tol=1e-11)
     assert reduction.problem.motions == ("body 'tube': translation along z",)
@@ -123,7 +143,9 @@ def test_floating_bodies_are_in_equilibrium_inside(solver):
 def test_the_compliance_does_not_depend_on_the_fixing_unknowns():
     scene = stack(1, cells=(5,))
     made = assemble(scene, scene.parts[1], 1, None).body
-    corner, opposite = (int(choose(made.locations.sum(axis=0))) for choose in (np.argmin, np.argmax))
+    corner, opposite = (
+        int(choose(made.locations.sum(axis=0))) for choose in (np.argmin, np.argmax)
+    )
     fixing = np.sort([*made.unknowns[:, corner], made.unknowns[0, opposite]])
     other = replace(made, rigid_motions=replace(made.rigid_motions, fixing=fixing))
     T = reduce_bodies(scene).maps[1]
@@ -134,7 +156,9 @@ def test_the_compliance_does_not_depend_on_the_fixing_unknowns():
 
 
 def test_the_compliance_of_a_floating_body_converges_with_the_mesh():
-    """A uniform pressure on the bottom of a free block moves it against its inertia: the same on every mesh."""
+    """A uniform pressure on the bottom of a free block moves it against its inertia: the same on
+    every mesh.
+    """
     values = []
     for n in (8, 16, 32):
         problem = reduce_bodies(stack(1, cells=(n,))).problem
@@ -161,7 +185,10 @@ def test_a_scene_that_is_turned_has_the_same_answer(angle):
     part, floor = plain.parts[1], plain.parts[0]
     mesh = replace(part.mesh, doflocs=R @ part.mesh.p)
     force = tuple(R @ np.array(part.loads[0].value))
-    other = alone(replace(part, mesh=mesh, loads=(BodyForce(force),)), replace(floor, normal=tuple(R @ [0.0, 1.0])))
+    other = alone(
+        replace(part, mesh=mesh, loads=(BodyForce(force),)),
+        replace(floor, normal=tuple(R @ [0.0, 1.0])),
+    )
     a, b = (solve(reduce_bodies(scene).problem, tol=1e-12) for scene in (plain, other))
     if np.linalg.norm(a.reactions - b.reactions) > 1e-9:
         assert np.allclose(a.reactions, b.reactions[::-1], atol=1e-9)
@@ -184,7 +211,10 @@ def test_units_do_not_matter():
             stack(8, side=0.3, width=1.0),
             "more than the contacts can hold: body 'block.' tips over .rotation in the x-y plane",
         ),
-        (stack(2, kind="axisymmetric", weight=-1.0), "no contact holds body 'block.' .translation along z"),
+        (
+            stack(2, kind="axisymmetric", weight=-1.0),
+            "no contact holds body 'block.' .translation along z",
+        ),
     ],
     ids=["slides", "slides-3d", "lifts", "tips", "axis"],
 )
@@ -203,7 +233,9 @@ def test_friction_holds_up_to_its_limit(side, holds):
 
 @pytest.mark.parametrize("side,holds", [(0.32, True), (0.35, False)])
 def test_a_tower_stands_up_to_its_limit(side, holds):
-    """Three blocks of width one: the resultant leaves the base at side / weight = width / height = 1 / 3."""
+    """Three blocks of width one: the resultant leaves the base at side / weight = width / height =
+    1 / 3.
+    """
     problem = reduce_bodies(stack(3, side=side, mu=5.0)).problem
     assert (escape(problem) is None) == holds
 
@@ -211,7 +243,9 @@ def test_a_tower_stands_up_to_its_limit(side, holds):
 def test_plates_that_are_pulled_off_are_named():
     scene = scenes.flat_punch(2, elements=6)
     lifted = replace(scene, upper=replace(scene.upper, loads=(Plate("top", {"y": 10.0}),)))
-    with pytest.raises(InputError, match=r"pulls the bodies apart.*body 'punch' .plate 'top' along y"):
+    with pytest.raises(
+        InputError, match=r"pulls the bodies apart.*body 'punch' .plate 'top' along y"
+    ):
         solve(reduce_bodies(lifted).problem)
 
 
@@ -226,7 +260,9 @@ def test_a_body_far_from_the_origin_floats_as_well():
 
 @pytest.mark.parametrize("side,holds", [(0.08, True), (0.09, False), (0.6, False)])
 def test_a_tall_tower_of_many_bodies_stands_up_to_its_limit(side, holds):
-    """Twelve blocks, 36 motions: it topples at a side force of width / height = 1 / 12 of its weight, and slides at mu."""
+    """Twelve blocks, 36 motions: it topples at a side force of width / height = 1 / 12 of its
+    weight, and slides at mu.
+    """
     scene = stack(12, side=side, cells=(1,), mu=0.5)
     if holds:
         problem = reduce_bodies(scene).problem
@@ -240,7 +276,16 @@ def test_a_tall_tower_of_many_bodies_stands_up_to_its_limit(side, holds):
 
 def test_a_rigid_normal_on_the_wrong_side_is_refused():
     """A floor whose normal points down would hold a block that is pulled up."""
-    part = Part("b", block([0.0, 0.0], [1.0, 1.0], [2, 2]), SOFT, loads=(BodyForce((0.0, 2.0)),), contact="bottom")
-    for floor in (Rigid("floor", normal=(0, -1)), Rigid("floor", normal=(0, -2), gap=lambda x: x[1] + x[0] ** 2)):
+    part = Part(
+        "b",
+        block([0.0, 0.0], [1.0, 1.0], [2, 2]),
+        SOFT,
+        loads=(BodyForce((0.0, 2.0)),),
+        contact="bottom",
+    )
+    for floor in (
+        Rigid("floor", normal=(0, -1)),
+        Rigid("floor", normal=(0, -2), gap=lambda x: x[1] + x[0] ** 2),
+    ):
         with pytest.raises(InputError, match="points away from body 'b'"):
             reduce_bodies(alone(part, floor))

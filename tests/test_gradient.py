@@ -1,4 +1,6 @@
-"""Gradients of quantities of scenes by the parameters of the scenes, against differences of solved scenes."""
+"""Gradients of quantities of scenes by the parameters of the scenes, against differences of solved
+scenes.
+"""
 
 from dataclasses import replace
 
@@ -43,7 +45,11 @@ CASES = {
         ("nu", "mu", "force:sphere:x"),
         ("shift", "energy"),
     ),
-    "several bodies": (lambda: scenes.make_scene("stack"), ("E", "nu"), ("energy", "pressure:block-2-block-1.top")),
+    "several bodies": (
+        lambda: scenes.make_scene("stack"),
+        ("E", "nu"),
+        ("energy", "pressure:block-2-block-1.top"),
+    ),
 }
 
 
@@ -90,7 +96,10 @@ def test_the_gradient_by_the_gap_and_the_friction_of_every_contact():
             ends.append(
                 replace(base.reduction, problem=there),
             )
-        values = [value("shift", Solved(end, solve(end.problem, tol=1e-13, start=base.solution))) for end in ends]
+        values = [
+            value("shift", Solved(end, solve(end.problem, tol=1e-13, start=base.solution)))
+            for end in ends
+        ]
         wanted = (values[0] - values[1]) / (2 * h)
         assert abs(one.by[name] @ direction - wanted) < 1e-6 * abs(wanted)
         assert abs(one.onesided({name: direction}) - wanted) < 1e-6 * abs(wanted)
@@ -115,7 +124,10 @@ def test_gradients_along_a_load_path_forward_and_adjoint():
     found = {quantity: contactopt.gradient(result, quantity, names) for quantity in read}
     for name in names:
         which = parameter(name, states[0])
-        ends = [follow([which.put(s, which.read(s) + t) for s in states], tol=1e-13).history for t in (h, -h)]
+        ends = [
+            follow([which.put(s, which.read(s) + t) for s in states], tol=1e-13).history
+            for t in (h, -h)
+        ]
         for quantity, one in found.items():
             assert one.value == pytest.approx(read[quantity](result.history), rel=1e-9)
             wanted = (read[quantity](ends[0]) - read[quantity](ends[1])) / (2 * h)
@@ -123,7 +135,9 @@ def test_gradients_along_a_load_path_forward_and_adjoint():
             assert abs(one.by[name] - wanted) < 1e-6 * size, (quantity, name)
     shift = found["shift"]
     assert shift.onesided({"mu": 1.0}) == pytest.approx(shift.by["mu"], rel=1e-9)
-    assert contactopt.gradient(result, "shift", "mu", state=1).value == pytest.approx(result.history["shift"][1])
+    assert contactopt.gradient(result, "shift", "mu", state=1).value == pytest.approx(
+        result.history["shift"][1]
+    )
 
 
 def test_resultants_and_functionals():

@@ -1,4 +1,6 @@
-"""Half-spaces: kernels against quadrature and equilibrium, solutions against exact ones, one answer by every road."""
+"""Half-spaces: kernels against quadrature and equilibrium, solutions against exact ones, one answer
+by every road.
+"""
 
 from itertools import pairwise
 
@@ -7,7 +9,17 @@ import pytest
 from scipy.integrate import dblquad, quad
 
 import contactopt
-from contactopt import HalfSpace, InputError, Material, Part, Rigid, Scene, Support, natural_map_residual, scenes
+from contactopt import (
+    HalfSpace,
+    InputError,
+    Material,
+    Part,
+    Rigid,
+    Scene,
+    Support,
+    natural_map_residual,
+    scenes,
+)
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.bodies.subsurface import boussinesq_cerruti, flamant
 from contactopt.coupling.reduction import reduce_bodies
@@ -37,13 +49,21 @@ def ball(n=20, law="coulomb", mu=0.3, shear=0.4, m=None, lower=STEEL, upper=None
     force = {"z": -3.0} | ({"x": shear} if shear else {})
     above = Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, force=force)
     if upper is not None:
-        above = HalfSpace("ball", upper, points, height=lambda x: -np.sum(x**2, axis=0) / 20, force=force)
-    return Scene("ball", above, HalfSpace("base", lower, points, **changes), mu, kind="solid", law=law)
+        above = HalfSpace(
+            "ball", upper, points, height=lambda x: -np.sum(x**2, axis=0) / 20, force=force
+        )
+    return Scene(
+        "ball", above, HalfSpace("base", lower, points, **changes), mu, kind="solid", law=law
+    )
 
 
-@pytest.mark.parametrize("dim,periodic,lower", [(2, False, True), (2, True, False), (3, False, False), (3, True, True)])
+@pytest.mark.parametrize(
+    "dim,periodic,lower", [(2, False, True), (2, True, False), (3, False, False), (3, True, True)]
+)
 def test_the_height_counts_beside_a_flat_rigid_body(dim, periodic, lower):
-    """It gives the answer of the same shape as a gap, whichever body it is on, and of a rigid half-space."""
+    """It gives the answer of the same shape as a gap, whichever body it is on, and of a rigid
+    half-space.
+    """
     points, axis = (ticks(12),) * (dim - 1), "xyz"[dim - 1]
     force = {axis: -3.0}
 
@@ -51,7 +71,9 @@ def test_the_height_counts_beside_a_flat_rigid_body(dim, periodic, lower):
         return 0.02 * np.cos(x[0]) - np.sum(x**2, axis=0) / 20
 
     def largest(rigid, **shape):
-        own = HalfSpace("base", STEEL, points, periodic=periodic, force=None if lower else force, **shape)
+        own = HalfSpace(
+            "base", STEEL, points, periodic=periodic, force=None if lower else force, **shape
+        )
         bodies = (rigid, own) if lower else (own, rigid)
         scene = Scene("s", *bodies, 0.3, kind="plane-strain" if dim == 2 else "solid")
         return contactopt.run(scene, figures=()).summary["max_pressure"]
@@ -65,12 +87,17 @@ def test_the_height_counts_beside_a_flat_rigid_body(dim, periodic, lower):
         largest(Rigid("top", gap=lambda x: -height(x[:-1]), **held), height=height)
 
 
-PLACES = [((1.0, 0.7), place) for place in [(0, 0), (1, 0), (0, 1), (3, 2), (12, 5), (13, 13), (40, 2), (70, 66)]]
+PLACES = [
+    ((1.0, 0.7), place)
+    for place in [(0, 0), (1, 0), (0, 1), (3, 2), (12, 5), (13, 13), (40, 2), (70, 66)]
+]
 
 
 @pytest.mark.parametrize("cell,place", [*PLACES, ((1.0, 50.0), (13, 0)), ((50.0, 1.0), (0, 65))])
 def test_coefficients_are_integrals_of_point_forces(cell, place):
-    """Boussinesq's and Cerruti's displacements, integrated by adaptive quadrature over the cell in quarters."""
+    """Boussinesq's and Cerruti's displacements, integrated by adaptive quadrature over the cell in
+    quarters.
+    """
     (hx, hy), nu = cell, STEEL.nu
     G = STEEL.E / 2.6
     made = half_space_influence(STEEL, (hx, hy), tuple(np.array([p]) for p in place))
@@ -111,19 +138,28 @@ def test_coefficients_of_strips(place):
 
 
 def test_flamants_reference_point_is_johnsons():
-    """Hertz's line contact: the surface sinks against a point at depth d by P (1 - nu^2)/(pi E) (2 ln(2 d/a) - nu/(1 - nu))."""
+    """Hertz's line contact: the surface sinks against a point at depth d by P (1 - nu^2)/(pi E) (2
+    ln(2 d/a) - nu/(1 - nu)).
+    """
     a, n, depth, P = 1.0, 2000, 500.0, 1.0
     x = (np.arange(n) + 0.5) * 2 * a / n - a
     made = half_plane_influence(STEEL, 2 * a / n, np.arange(n), depth)[1, 1]
     force = 2 * P / (np.pi * a) * np.sqrt(1 - x**2) * (2 * a / n)
     middle = np.sum(made[np.abs(np.arange(n) - n // 2)] * force)
-    exact = P * (1 - STEEL.nu**2) / (np.pi * STEEL.E) * (2 * np.log(2 * depth / a) - STEEL.nu / (1 - STEEL.nu))
+    exact = (
+        P
+        * (1 - STEEL.nu**2)
+        / (np.pi * STEEL.E)
+        * (2 * np.log(2 * depth / a) - STEEL.nu / (1 - STEEL.nu))
+    )
     assert middle == pytest.approx(exact, rel=1e-4)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 def test_point_force_stresses_are_in_equilibrium_and_compatible(nu):
-    """Divergence zero, Beltrami and Michell's equations, and the force through a plane below is the force applied."""
+    """Divergence zero, Beltrami and Michell's equations, and the force through a plane below is the
+    force applied.
+    """
     place, h, unit = np.array([0.7, -0.4, 0.9]), 2e-3, np.eye(3)
 
     def tensor(p):
@@ -135,9 +171,14 @@ def test_point_force_stresses_are_in_equilibrium_and_compatible(nu):
 
     def second(i, j, f):
         e, d = h * unit[i], h * unit[j]
-        return (f(place + e + d) - f(place + e - d) - f(place - e + d) + f(place - e - d)) / (4 * h**2)
+        return (f(place + e + d) - f(place + e - d) - f(place - e + d) + f(place - e - d)) / (
+            4 * h**2
+        )
 
-    divergence = sum((tensor(place + h * unit[i])[i] - tensor(place - h * unit[i])[i]) / (2 * h) for i in range(3))
+    divergence = sum(
+        (tensor(place + h * unit[i])[i] - tensor(place - h * unit[i])[i]) / (2 * h)
+        for i in range(3)
+    )
     assert np.abs(divergence).max() < 1e-4 * np.abs(tensor(place)).max()
     laplacian = sum(second(i, i, tensor) for i in range(3))
     for i in range(3):
@@ -156,7 +197,9 @@ def test_line_force_stresses_balance_the_force():
     np.testing.assert_allclose(through, -np.eye(2), atol=1e-3)
 
 
-@pytest.mark.parametrize("changes", [{}, {"upper": SOFT}, {"upper": STEEL}, {"m": 12}, {"periodic": True}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"upper": SOFT}, {"upper": STEEL}, {"m": 12}, {"periodic": True}]
+)
 def test_operator_is_symmetric_positive_and_equal_to_its_entries(changes):
     reduction = reduce_bodies(ball(16, **changes))
     Q = reduction.problem.Q
@@ -168,10 +211,13 @@ def test_operator_is_symmetric_positive_and_equal_to_its_entries(changes):
     assert np.linalg.eigvalsh(entries).min() > -1e-13
     np.testing.assert_allclose(Q.loosened(1e-3) @ x, entries @ x, atol=1e-5)
     by_bodies = sum(
-        B @ body.displacement(B.T @ x, 0 * body.resultants) for B, body in zip(reduction.maps, reduction.bodies)
+        B @ body.displacement(B.T @ x, 0 * body.resultants)
+        for B, body in zip(reduction.maps, reduction.bodies)
     )
     np.testing.assert_allclose(by_bodies, entries @ x, atol=1e-12)
-    np.testing.assert_allclose(contactopt.reduce(ball(16, **changes), Q="explicit").Q, entries, atol=1e-14)
+    np.testing.assert_allclose(
+        contactopt.reduce(ball(16, **changes), Q="explicit").Q, entries, atol=1e-14
+    )
 
 
 def test_equal_materials_do_not_couple_normal_and_tangential_forces():
@@ -180,7 +226,9 @@ def test_equal_materials_do_not_couple_normal_and_tangential_forces():
     assert np.abs(Q[np.ix_(normal, normal + 1)]).max() < 1e-15 * np.abs(Q).max() * 10
     alone = reduce_bodies(ball(8)).problem.Q.to_dense()
     assert np.abs(alone[np.ix_(normal, normal + 1)]).max() > 0.03 * np.abs(alone).max()
-    np.testing.assert_allclose(Q[np.ix_(normal, normal)], 2 * alone[np.ix_(normal, normal)], rtol=1e-12)
+    np.testing.assert_allclose(
+        Q[np.ix_(normal, normal)], 2 * alone[np.ix_(normal, normal)], rtol=1e-12
+    )
 
 
 def test_coarse_kernel_lumps_contacts():
@@ -196,12 +244,16 @@ def test_coarse_kernel_lumps_contacts():
 @pytest.mark.parametrize("law", LAWS)
 def test_nested_grids_give_the_answer_of_the_dense_method(law):
     mu = 0.01 if law == "tresca" else 0.3
-    problem = contactopt.reduce(ball(26, law=law, mu=mu, shear=0.0 if law == "frictionless" else 0.4))
+    problem = contactopt.reduce(
+        ball(26, law=law, mu=mu, shear=0.0 if law == "frictionless" else 0.4)
+    )
     nested = contactopt.solve(problem, Nested(), tol=1e-9)
     dense = contactopt.solve(problem.explicit(), tol=1e-9)
     assert nested.solved and dense.solved and nested.products > 0
     assert natural_map_residual(problem.explicit(), nested.reactions, nested.multipliers) < 1e-9
-    np.testing.assert_allclose(nested.reactions, dense.reactions, atol=1e-6 * np.abs(dense.reactions).max())
+    np.testing.assert_allclose(
+        nested.reactions, dense.reactions, atol=1e-6 * np.abs(dense.reactions).max()
+    )
 
 
 def test_odd_grids_and_strips():
@@ -240,7 +292,9 @@ def test_depth_of_a_half_plane_moves_the_approach_only():
 
     near, far = solved(50.0), solved(500.0)
     np.testing.assert_allclose(near.reactions, far.reactions, atol=1e-8)
-    assert near.multipliers[0] - far.multipliers[0] == pytest.approx(3.0 * 2 / (np.pi * E_STAR) * np.log(10), rel=1e-8)
+    assert near.multipliers[0] - far.multipliers[0] == pytest.approx(
+        3.0 * 2 / (np.pi * E_STAR) * np.log(10), rel=1e-8
+    )
 
 
 def approach_error(n):
@@ -258,7 +312,8 @@ def approach_error(n):
 def test_hertz_point_contact_converges():
     sizes = np.array([8, 16, 32, 64])
     errors = [approach_error(n) for n in sizes]
-    assert errors[-1] < 1e-4 and np.polyfit(np.log(sizes), np.log(errors), 1)[0] < -1.8  # second order in the mean
+    # second order in the mean
+    assert errors[-1] < 1e-4 and np.polyfit(np.log(sizes), np.log(errors), 1)[0] < -1.8
 
 
 def test_hertz_scene_below_the_surface():
@@ -266,10 +321,14 @@ def test_hertz_scene_below_the_surface():
     exact, problem = result.scene.reference, result.problem
     assert result.summary["approach"] == pytest.approx(exact.approach, rel=1e-3)
     assert result.summary["max_pressure"] == pytest.approx(exact.peak, rel=1e-3)
-    assert np.sqrt(surface_contact(problem, result.solution).area / np.pi) == pytest.approx(exact.half_width, rel=5e-3)
+    assert np.sqrt(surface_contact(problem, result.solution).area / np.pi) == pytest.approx(
+        exact.half_width, rel=5e-3
+    )
     depths = exact.half_width * np.linspace(0.4, 0.56, 5)
     stress, mises = subsurface_stress(result.reduction, result.solution, depths)
-    on_axis = mises.reshape(len(depths), -1)[:, np.argmin(np.linalg.norm(problem.chart.places, axis=0))]
+    on_axis = mises.reshape(len(depths), -1)[
+        :, np.argmin(np.linalg.norm(problem.chart.places, axis=0))
+    ]
     assert on_axis.max() == pytest.approx(0.6200 * exact.peak, rel=2e-3)
     assert depths[on_axis.argmax()] == pytest.approx(0.481 * exact.half_width, rel=0.05)
     assert np.all(stress[..., 2, 2].reshape(len(depths), -1)[:, 0] <= 0)
@@ -293,13 +352,17 @@ def test_upper_half_space_mirrors_the_lower():
         0.3,
         kind="solid",
     )
-    first, second = (contactopt.solve(contactopt.reduce(s), tol=1e-10).reactions for s in (down, up))
+    first, second = (
+        contactopt.solve(contactopt.reduce(s), tol=1e-10).reactions for s in (down, up)
+    )
     np.testing.assert_allclose(first[:, 0], second[:, 0], atol=1e-8)
     np.testing.assert_allclose(first[:, 1:], -second[:, 1:], atol=1e-8)
 
 
 def oval(turned=False, away=0.0, length=1.0, force=1.0):
-    """A sheared oval on cells that are longer than wide, possibly turned by a right angle, far away, or in other units."""
+    """A sheared oval on cells that are longer than wide, possibly turned by a right angle, far
+    away, or in other units.
+    """
     rows = [ticks(20) * length + away, ticks(14) * length - away]
     along = {"x": 0.4 * force}
     if turned:
@@ -307,7 +370,9 @@ def oval(turned=False, away=0.0, length=1.0, force=1.0):
     centre = np.array([-away, away] if turned else [away, -away])[:, None]
     radii = np.array([25.0, 20.0] if turned else [20.0, 25.0])[:, None] * length
     rigid = Rigid(
-        "oval", gap=lambda x: np.sum((x[:2] - centre) ** 2 / radii, axis=0), force={"z": -3.0 * force} | along
+        "oval",
+        gap=lambda x: np.sum((x[:2] - centre) ** 2 / radii, axis=0),
+        force={"z": -3.0 * force} | along,
     )
     material = Material(STEEL.E * force / length**2, STEEL.nu)
     scene = Scene("oval", rigid, HalfSpace("base", material, rows), 0.3, kind="solid")
@@ -317,7 +382,9 @@ def oval(turned=False, away=0.0, length=1.0, force=1.0):
 
 
 def test_turned_by_a_right_angle_it_is_the_same():
-    np.testing.assert_allclose(oval(turned=True).transpose(1, 0, 2)[..., [0, 2, 1]], oval(), atol=1e-8)
+    np.testing.assert_allclose(
+        oval(turned=True).transpose(1, 0, 2)[..., [0, 2, 1]], oval(), atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("changes", [{"away": 1e3}, {"length": 1e-3, "force": 1e5}])
@@ -355,7 +422,8 @@ def test_shear_cycle_loses_what_mindlin_says():
     modulus = 5.0 / 2
     tangential = contactopt.analytic.tangential_modulus(Material(5.0, 0.0), Material(5.0, 0.0))
     exact = contactopt.analytic.cycle_loss_point(100.0, 400.0, modulus, tangential, 0.5, 25.0)
-    assert work[4] - work[1] == pytest.approx(exact, rel=0.05)  # three large steps; many converge to the loop
+    # three large steps; many converge to the loop
+    assert work[4] - work[1] == pytest.approx(exact, rel=0.05)
 
 
 def test_stiffness_of_hertz_contact_is_its_width():
@@ -377,13 +445,17 @@ def test_prescribed_approach_is_the_total_force_turned_round():
         HalfSpace("ball", Material(1e9, 0.3), points, lambda x: -np.sum(x**2, axis=0) / 20,
                   displacement={"z": pressed.multipliers[0]}),
     ):  # fmt: skip
-        scene = Scene("given", above, HalfSpace("base", STEEL, points), 0.0, kind="solid", law="frictionless")
+        scene = Scene(
+            "given", above, HalfSpace("base", STEEL, points), 0.0, kind="solid", law="frictionless"
+        )
         moved = contactopt.solve(contactopt.reduce(scene), tol=1e-11)
         np.testing.assert_allclose(moved.reactions, pressed.reactions, atol=1e-7)
 
 
 def test_half_space_meets_finite_elements():
-    """A block of finite elements, thick and wide beside its contact, is nearly the half-space of the same points."""
+    """A block of finite elements, thick and wide beside its contact, is nearly the half-space of
+    the same points.
+    """
     from contactopt.meshes.structured import graded, rename, tensor_mesh
 
     x = np.linspace(-1.0, 1.0, 33)
@@ -397,7 +469,12 @@ def test_half_space_meets_finite_elements():
     lower = Part("block", block, STEEL, (Support("bottom"),))
     height = lambda p: -(p[0] ** 2) / 8  # noqa: E731
     pairs = [
-        Scene("pair", HalfSpace("ball", STEEL, x, height=height, force={"y": -0.3}, depth=40.0), below, 0.3)
+        Scene(
+            "pair",
+            HalfSpace("ball", STEEL, x, height=height, force={"y": -0.3}, depth=40.0),
+            below,
+            0.3,
+        )
         for below in (lower, HalfSpace("flat", STEEL, x, depth=40.0))
     ]
     mixed, pure = (contactopt.solve(contactopt.reduce(pair)) for pair in pairs)
@@ -407,7 +484,9 @@ def test_half_space_meets_finite_elements():
 
 
 def test_periodic_wavy_surface_is_westergaards():
-    """Mean pressure p on a rigid wave of amplitude h: contact of half-width a with p = pi E* h / L sin^2(pi a / L)."""
+    """Mean pressure p on a rigid wave of amplitude h: contact of half-width a with p = pi E* h / L
+    sin^2(pi a / L).
+    """
     n, length, amplitude = 512, 8.0, 0.05
     x = ticks(n, length)
     flat = np.pi * E_STAR * amplitude / length
@@ -420,9 +499,17 @@ def test_periodic_wavy_surface_is_westergaards():
     problem = contactopt.reduce(scene)
     solution = contactopt.solve(problem)
     a = length / np.pi * np.arcsin(np.sqrt(0.3))
-    exact = 2 * flat * np.cos(np.pi * x / length) * np.sqrt(np.maximum(0.3 - np.sin(np.pi * x / length) ** 2, 0.0))
+    exact = (
+        2
+        * flat
+        * np.cos(np.pi * x / length)
+        * np.sqrt(np.maximum(0.3 - np.sin(np.pi * x / length) ** 2, 0.0))
+    )
     assert surface_contact(problem, solution).area / 2 == pytest.approx(a, rel=0.01)
-    assert np.sqrt(np.mean((solution.reactions[:, 0] / problem.areas - exact) ** 2)) < 0.01 * exact.max()
+    assert (
+        np.sqrt(np.mean((solution.reactions[:, 0] / problem.areas - exact) ** 2))
+        < 0.01 * exact.max()
+    )
 
 
 def test_rough_scene_slides_in_the_end():
@@ -433,8 +520,14 @@ def test_rough_scene_slides_in_the_end():
     assert history["shear_force"][-1] == pytest.approx(0.3 * history["normal_force"][-1], rel=1e-3)
     assert np.all(np.diff(history["friction_work"]) > 0) and history["energy_error"].max() < 1e-9
     maps = surface_maps(result.reduction, result.solution)
-    assert maps["pressure"].shape == maps["gap"].shape == (48, 48) and maps["slip"].shape == (48, 48, 2)
-    np.testing.assert_allclose(np.minimum(maps["pressure"] / maps["pressure"].max(), maps["gap"]), 0, atol=1e-7)
+    assert maps["pressure"].shape == maps["gap"].shape == (48, 48) and maps["slip"].shape == (
+        48,
+        48,
+        2,
+    )
+    np.testing.assert_allclose(
+        np.minimum(maps["pressure"] / maps["pressure"].max(), maps["gap"]), 0, atol=1e-7
+    )
 
 
 def test_self_affine_surface():
@@ -443,7 +536,9 @@ def test_self_affine_surface():
     assert rms_slope(made, lengths) == pytest.approx(0.2, rel=1e-12)
     finer = self_affine((128, 256), lengths, shortest=1.0, slope=0.2, seed=3)
     np.testing.assert_allclose(finer[::2, ::4], made, atol=1e-14)  # the same waves on every grid
-    power = np.abs(np.fft.fft2(self_affine((256, 256), lengths, shortest=0.2, hurst=0.6, seed=1))) ** 2
+    power = (
+        np.abs(np.fft.fft2(self_affine((256, 256), lengths, shortest=0.2, hurst=0.6, seed=1))) ** 2
+    )
     k = np.hypot(*np.meshgrid(*[np.fft.fftfreq(256, 1 / 256)] * 2, indexing="ij"))
     rings = np.geomspace(2, 48, 8)
     mean = [power[(k >= low) & (k < high)].mean() for low, high in pairwise(rings)]

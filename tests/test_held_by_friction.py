@@ -1,11 +1,22 @@
-"""Bodies that nothing but friction holds: certified in the plane and in space, alike in other units and turned."""
+"""Bodies that nothing but friction holds: certified in the plane and in space, alike in other units
+and turned.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from contactopt import HalfSpace, InterfaceProblem, Material, Rigid, Scene, Status, reduce_bodies, solve
+from contactopt import (
+    HalfSpace,
+    InterfaceProblem,
+    Material,
+    Rigid,
+    Scene,
+    Status,
+    reduce_bodies,
+    solve,
+)
 from contactopt.derivatives.interface import sensitivity
 from contactopt.methods import Repeated
 from contactopt.methods.kernels.balance import project_balanced
@@ -13,14 +24,19 @@ from contactopt.problem.cones import disc_derivative
 
 
 def held(dim, mu, seed=0, turn=0.0, unit=1.0, slope=0.0):
-    """A rigid paraboloid on compliances of smooth decay; V holds its translations, turned by an angle."""
+    """A rigid paraboloid on compliances of smooth decay; V holds its translations, turned by an
+    angle.
+    """
     rng = np.random.default_rng(seed)
     side = 15 if dim == 2 else 5
-    x = np.stack(np.meshgrid(*[np.linspace(-1, 1, side)] * (dim - 1), indexing="ij"), -1).reshape(-1, dim - 1)
+    x = np.stack(np.meshgrid(*[np.linspace(-1, 1, side)] * (dim - 1), indexing="ij"), -1).reshape(
+        -1, dim - 1
+    )
     far = np.linalg.norm(x[:, None] - x[None], axis=-1)
     k = len(x)
     Q = np.kron(np.exp(-3 * far), np.eye(dim))
-    across = 0.3 * (x[:, None] - x[None]) * np.exp(-3 * far)[:, :, None]  # pressed points draw others near
+    # pressed points draw others near
+    across = 0.3 * (x[:, None] - x[None]) * np.exp(-3 * far)[:, :, None]
     for i in range(dim - 1):
         Q[1 + i :: dim, 0::dim] += across[:, :, i]
         Q[0::dim, 1 + i :: dim] += across[:, :, i].T
@@ -54,13 +70,17 @@ def test_the_same_answer_as_by_pivoting_turned_and_in_other_units():
 
 
 def test_a_weighted_median_is_found_exactly():
-    """sum g_i |c_i - x| is least at the weighted median, where one interval alone is not at its end."""
+    """sum g_i |c_i - x| is least at the weighted median, where one interval alone is not at its
+    end.
+    """
     rng = np.random.default_rng(4)
     c, g = rng.normal(size=21), 1e-8 * rng.uniform(1, 2, 21)
     order = np.argsort(c)
     median = c[order[np.searchsorted(np.cumsum(g[order]), g.sum() / 2)]]
     V = np.ones((21, 1))
-    r, x = project_balanced(lambda y: disc_derivative(y, g), c[:, None], V, np.zeros(1), 1.0, np.zeros(1))
+    r, x = project_balanced(
+        lambda y: disc_derivative(y, g), c[:, None], V, np.zeros(1), 1.0, np.zeros(1)
+    )
     assert x[0] == pytest.approx(median, abs=1e-7) and abs(r.sum()) < 1e-14
     assert np.sum(np.abs(r[:, 0]) < g) == 1
 
@@ -98,18 +118,27 @@ def periodic(dim, mu, gap, side=0.0, n=24):
 def test_flat_on_a_flat_periodic_half_space(dim, mu, n):
     """The pressure is uniform and moves nothing: all displacements are zero but for rounding."""
     solution = solve(reduce_bodies(periodic(dim, mu, None, 0.01, n)).problem)
-    assert solution.solved and np.allclose(solution.reactions[:, 0] * n ** (dim - 1), 0.1, rtol=1e-6)
+    assert solution.solved and np.allclose(
+        solution.reactions[:, 0] * n ** (dim - 1), 0.1, rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 def test_gradients_on_a_periodic_half_plane_are_those_of_differences(mu):
-    problem = reduce_bodies(periodic(2, mu, lambda x: 1e-4 * np.cos(2 * np.pi * x[0] + 0.3), 0.005)).problem
+    problem = reduce_bodies(
+        periodic(2, mu, lambda x: 1e-4 * np.cos(2 * np.pi * x[0] + 0.3), 0.005)
+    ).problem
     solution, rng = solve(problem, tol=1e-11), np.random.default_rng(0)
     closed = np.count_nonzero(solution.reactions[:, 0])
     assert 2 < closed < problem.contacts
     change, weights = 1e-6 * rng.normal(size=problem.q.shape), rng.normal(size=problem.q.shape)
-    ends = [solve(replace(problem, q=problem.q + h * change), tol=1e-11).reactions for h in (0.01, -0.01)]
+    ends = [
+        solve(replace(problem, q=problem.q + h * change), tol=1e-11).reactions
+        for h in (0.01, -0.01)
+    ]
     slopes = (ends[0] - ends[1]) / 0.02
     made = sensitivity(problem, solution)
     assert np.allclose(made.forward(q=change).reactions, slopes, atol=1e-6 * np.abs(slopes).max())
-    assert np.sum(made.adjoint(reactions=weights).q * change) == pytest.approx(np.sum(weights * slopes), rel=1e-5)
+    assert np.sum(made.adjoint(reactions=weights).q * change) == pytest.approx(
+        np.sum(weights * slopes), rel=1e-5
+    )

@@ -1,4 +1,6 @@
-"""The how-to pages run as they stand: files are written, commands executed, Python run with its own assertions."""
+"""The how-to pages run as they stand: files are written, commands executed, Python run with its own
+assertions.
+"""
 
 import inspect
 import re
@@ -57,7 +59,9 @@ def test_every_key_of_an_experiment_file_is_explained_with_an_example_that_is_re
     assert set(EXPERIMENT) == {field.name for field in fields(Experiment)} - {"path", "skipped"}
     drawn = FIGURES | TABLES
     assert set(KINDS) == set(drawn)
-    arguments = {name for draw in drawn.values() for name in inspect.signature(draw).parameters} - {"table"}
+    arguments = {name for draw in drawn.values() for name in inspect.signature(draw).parameters} - {
+        "table"
+    }
     assert set(FIGURE) == arguments | {"kind", "caption", "where", "optional"}
     for key, (_, example) in (EXPERIMENT | FIGURE).items():
         assert key in tomllib.loads(f"{key} = {example}") and f"{key} = {example}" in help_text()

@@ -1,14 +1,31 @@
-"""Everything that solves from products with Q alone: operators, Newton steps, subproblems, nested meshes."""
+"""Everything that solves from products with Q alone: operators, Newton steps, subproblems, nested
+meshes.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, reduce_bodies, run, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    natural_map_residual,
+    reduce,
+    reduce_bodies,
+    run,
+    scenes,
+    solve,
+)
 from contactopt.bodies.solvers.superlu import SuperLUSolver
 from contactopt.coupling.costs import form_of
-from contactopt.linear.operators import InterfaceOperator, block, estimate_diagonal, loosened, shifted
+from contactopt.linear.operators import (
+    InterfaceOperator,
+    block,
+    estimate_diagonal,
+    loosened,
+    shifted,
+)
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.krylov import krylov_step, model_of
 from contactopt.methods.kernels.subproblems import KrylovSubproblem
@@ -37,14 +54,24 @@ def test_both_forms_are_the_same_operator_with_the_same_blocks(name):
     assert np.abs(operator @ np.eye(n) - Q).max() < tolerance
     assert np.abs(operator.to_dense() - Q).max() < tolerance
     active = np.flatnonzero(np.random.default_rng(0).random(n) < 0.4)
-    for unknowns in (np.arange(0, n, dim), np.setdiff1d(np.arange(n), np.arange(0, n, dim)), active):
+    for unknowns in (
+        np.arange(0, n, dim),
+        np.setdiff1d(np.arange(n), np.arange(0, n, dim)),
+        active,
+    ):
         part = block(operator, unknowns)
-        assert np.abs(part @ np.eye(len(unknowns)) - Q[np.ix_(unknowns, unknowns)]).max() < tolerance
+        assert (
+            np.abs(part @ np.eye(len(unknowns)) - Q[np.ix_(unknowns, unknowns)]).max() < tolerance
+        )
         assert np.abs(part.to_dense() - Q[np.ix_(unknowns, unknowns)]).max() < tolerance
     normal, tangential = np.arange(0, n, dim), np.arange(1, n, dim)
     coupling = (operator @ np.eye(n)[:, tangential])[normal]
     assert np.abs(coupling - Q[np.ix_(normal, tangential)]).max() < tolerance
-    for mine, other in ((explicit.q, implicit.q), (explicit.V, implicit.V), (explicit.s, implicit.s)):
+    for mine, other in (
+        (explicit.q, implicit.q),
+        (explicit.V, implicit.V),
+        (explicit.s, implicit.s),
+    ):
         assert np.allclose(mine, other, rtol=1e-11, atol=1e-12 * np.abs(other).max())
 
 
@@ -81,7 +108,9 @@ def test_nodal_weights_of_even_nodes_are_even():
 
 
 def test_nodal_weights_around_a_closed_line():
-    """Nodes of a circle with areas half the way to both neighbours: w^2 = 1/2 everywhere, whatever the spacing."""
+    """Nodes of a circle with areas half the way to both neighbours: w^2 = 1/2 everywhere, whatever
+    the spacing.
+    """
     x = np.sort(np.random.default_rng(0).random(9)) * 5
     steps = np.diff(np.append(x, x[0] + 5))
     areas = (steps + np.roll(steps, 1)) / 2
@@ -93,7 +122,9 @@ def test_nodal_weights_around_a_closed_line():
 def test_answers_do_not_depend_on_the_form(name, method):
     explicit, implicit = forms(name, mu=0.3)
     a, b = solve(explicit, method, tol=1e-11), solve(implicit, method, tol=1e-11)
-    assert a.solved and b.solved and natural_map_residual(explicit, b.reactions, b.multipliers) < 1e-10
+    assert (
+        a.solved and b.solved and natural_map_residual(explicit, b.reactions, b.multipliers) < 1e-10
+    )
     assert np.allclose(a.reactions, b.reactions, atol=1e-8 * np.abs(a.reactions).max())
     assert a.products == 0 < b.products <= 90
     counts = [entry["products"] for entry in b.history]
@@ -106,7 +137,9 @@ def test_every_preconditioner_leads_to_the_same_answer(preconditioner):
     reference = solve(explicit, tol=1e-11).reactions
     for method, settings in (("newton", {}), ("alternating", {"normal": "pcg"})):
         solution = solve(implicit, method, tol=1e-8, preconditioner=preconditioner, **settings)
-        assert solution.solved and np.allclose(solution.reactions, reference, atol=1e-5 * np.abs(reference).max())
+        assert solution.solved and np.allclose(
+            solution.reactions, reference, atol=1e-5 * np.abs(reference).max()
+        )
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -153,18 +186,29 @@ def test_subproblems_meet_their_conditions(bilateral):
 def test_penalty_takes_products_too():
     explicit, implicit = forms("punch-2d")
     a, b = (solve(problem, "penalty", factor=1e7) for problem in (explicit, implicit))
-    assert b.products > 0 and np.allclose(a.reactions, b.reactions, atol=1e-5 * np.abs(a.reactions).max())
+    assert b.products > 0 and np.allclose(
+        a.reactions, b.reactions, atol=1e-5 * np.abs(a.reactions).max()
+    )
 
 
 def test_auto_falls_back_on_the_entries_of_Q():
-    """Strong friction, where Newton's method needs the rest of the chain: an operator must not stop it."""
+    """Strong friction, where Newton's method needs the rest of the chain: an operator must not stop
+    it.
+    """
     explicit, _ = forms("punch-2d", mu=5.0)
     wrapped = InterfaceOperator(lambda X, accuracy: explicit.Q @ X, np.diag(explicit.Q).copy())
     problem = InterfaceProblem(
-        wrapped, explicit.q, explicit.mu, explicit.V, explicit.s, explicit.areas, explicit.coordinates
+        wrapped,
+        explicit.q,
+        explicit.mu,
+        explicit.V,
+        explicit.s,
+        explicit.areas,
+        explicit.coordinates,
     )
     assert solve(problem).solved
-    assert solve(problem, "nsgs", max_iterations=3).iterations == 3  # methods without products get the entries
+    # methods without products get the entries
+    assert solve(problem, "nsgs", max_iterations=3).iterations == 3
 
 
 def test_auto_gives_up_a_start_that_leads_nowhere(monkeypatch):
@@ -185,7 +229,10 @@ def test_auto_gives_up_a_start_that_leads_nowhere(monkeypatch):
 def test_the_form_is_chosen_by_cost():
     assert form_of(200, 4000, 2, False) == form_of(900, 20_000, 3, False) == "explicit"
     assert (
-        form_of(2050, 80_000, 2, False) == form_of(9000, 20_000, 3, False) == form_of(200, 4000, 2, True) == "implicit"
+        form_of(2050, 80_000, 2, False)
+        == form_of(9000, 20_000, 3, False)
+        == form_of(200, 4000, 2, True)
+        == "implicit"
     )
     for dim in (2, 3):  # more interface on the same body never makes an explicit Q cheaper
         chosen = [form_of(m, 30_000, dim, False) for m in (10, 100, 1000, 3000, 9000)]
@@ -196,9 +243,13 @@ def test_the_form_is_chosen_by_cost():
 
 def test_products_start_from_a_coarse_mesh_if_there_is_one():
     scene = scenes.flat_punch(2, elements=64)
-    explicit, nested = (solve_zone(scene, options=Options(Q=form)).solution for form in ("explicit", "implicit"))
+    explicit, nested = (
+        solve_zone(scene, options=Options(Q=form)).solution for form in ("explicit", "implicit")
+    )
     assert nested.solved and "coarse" in nested.seconds and "coarse" not in explicit.seconds
-    np.testing.assert_allclose(nested.reactions, explicit.reactions, atol=1e-6 * np.abs(explicit.reactions).max())
+    np.testing.assert_allclose(
+        nested.reactions, explicit.reactions, atol=1e-6 * np.abs(explicit.reactions).max()
+    )
 
     def fixed(part):
         return replace(part, mesh=part.build_mesh(64, None))
@@ -211,7 +262,9 @@ def test_products_start_from_a_coarse_mesh_if_there_is_one():
 
 def test_iterative_bodies_are_solved_with_their_contacts_from_cold(tmp_path):
     pytest.importorskip("pyamg")
-    direct, iterative = (run("punch-3d", elements=8, solver=solver) for solver in ("superlu", "multigrid"))
+    direct, iterative = (
+        run("punch-3d", elements=8, solver=solver) for solver in ("superlu", "multigrid")
+    )
     assert iterative.solution.solved and "coarse" not in iterative.solution.seconds
     assert iterative.solution.products == 0 and iterative.solution.history[-1]["cycles"] > 0
     assert iterative.summary["q"] == "implicit" and direct.summary["q"] == "explicit"
@@ -223,7 +276,9 @@ def test_trailing_product_needs_no_interior():
     body = reduction.bodies[0]
     assert isinstance(body.solver, SuperLUSolver) and body.solver.trailing_triangle is not None
     force = np.random.default_rng(0).normal(size=len(body.interface))
-    assert np.allclose(body.solver.trailing_product(force), body.interface_compliance @ force, rtol=1e-11)
+    assert np.allclose(
+        body.solver.trailing_product(force), body.interface_compliance @ force, rtol=1e-11
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -243,7 +298,9 @@ def test_preconditioner_and_explicit_Q_exclude_each_other():
 
 
 def test_operators_that_share_their_work_count_together():
-    """A block, looser products and a shifted diagonal count with the operator that they are made from; a scaled one does not."""
+    """A block, looser products and a shifted diagonal count with the operator that they are made
+    from; a scaled one does not.
+    """
     Q = InterfaceOperator(lambda X, accuracy: 2 * X, np.full(4, 2.0), inexact=True)
     x = np.ones(4)
     assert np.all(Q @ x == 2) and Q.products == 1

@@ -1,4 +1,6 @@
-"""Laws of contact and friction: each against its conditions written out, a program in cvxpy, or another law."""
+"""Laws of contact and friction: each against its conditions written out, a program in cvxpy, or
+another law.
+"""
 
 import sys
 from dataclasses import dataclass, replace
@@ -51,7 +53,9 @@ def random_problem(law: Law | float, k: int = 6, dim: int = 3, seed: int = 0) ->
 
 
 def violation(name: str, parameter: float, r: np.ndarray, u: np.ndarray) -> float:
-    """The largest violation of a law at one contact, from its conditions and not from the library's projections."""
+    """The largest violation of a law at one contact, from its conditions and not from the library's
+    projections.
+    """
     r_n, r_t, u_n, u_t = r[0], r[1:], u[0], u[1:]
     slip, force = np.linalg.norm(u_t), np.linalg.norm(r_t)
     if name == "tied":
@@ -60,16 +64,26 @@ def violation(name: str, parameter: float, r: np.ndarray, u: np.ndarray) -> floa
         return max(force - parameter * r_n, parameter * slip - u_n, abs(r @ u))
     normal = abs(u_n) if name == "bilateral" else max(-u_n, -r_n, min(abs(u_n), abs(r_n)))
     bound = {"tresca": parameter, "frictionless": 0.0}.get(name, parameter * abs(r_n))
-    # |r_t| <= bound, and dissipation r_t' u_t = -bound |u_t|: the force opposes the slip and is at its bound
+    # |r_t| <= bound, and dissipation r_t' u_t = -bound |u_t|: the force opposes the slip and is at
+    # its bound
     return max(normal, force - bound, abs(r_t @ u_t + bound * slip))
 
 
 def worst(problem: InterfaceProblem, solution, names: list[str], parameters: list[float]) -> float:
     u = problem.displacements(solution.reactions, solution.multipliers)
-    return max(violation(n, p, *pair) for n, p, *pair in zip(names, parameters, solution.reactions, u))
+    return max(
+        violation(n, p, *pair) for n, p, *pair in zip(names, parameters, solution.reactions, u)
+    )
 
 
-PARAMETER = {"coulomb": 0.4, "bilateral": 0.4, "tresca": 0.3, "associated": 0.4, "frictionless": 0.0, "tied": 0.0}
+PARAMETER = {
+    "coulomb": 0.4,
+    "bilateral": 0.4,
+    "tresca": 0.3,
+    "associated": 0.4,
+    "frictionless": 0.0,
+    "tied": 0.0,
+}
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -88,7 +102,9 @@ def test_another_laws_solution_is_no_solution(name):
     """The certificate tells the laws apart."""
     problem = random_problem(ALL[name])
     for other, law in ALL.items():
-        residual = natural_map_residual(problem, solve(replace(problem, law=law), tol=1e-11).reactions)
+        residual = natural_map_residual(
+            problem, solve(replace(problem, law=law), tol=1e-11).reactions
+        )
         assert (residual < 1e-9) == (other == name)
 
 
@@ -97,15 +113,20 @@ def test_another_laws_solution_is_no_solution(name):
 def test_every_method_that_says_so_solves_the_law(name, method):
     problem = random_problem(ALL[name], dim=2)
     if not solves(find_method(method), problem.law):
-        with pytest.raises(InputError, match=f"does not solve the law {type(problem.law).__name__}; these do: auto"):
+        with pytest.raises(
+            InputError, match=f"does not solve the law {type(problem.law).__name__}; these do: auto"
+        ):
             solve(problem, method)
         return
     tol = 1e-4 if method == "penalty" else 1e-8
     solution = solve(problem, method, tol=tol, max_iterations=5000)
     if (method, name) == ("relaxation", "coulomb"):
-        assert solution.status is Status.SETTLED  # it solves associated friction, which slips otherwise
+        # it solves associated friction, which slips otherwise
+        assert solution.status is Status.SETTLED
         return
-    assert solution.solved and worst(problem, solution, [name] * 6, [PARAMETER[name]] * 6) < 100 * tol
+    assert (
+        solution.solved and worst(problem, solution, [name] * 6, [PARAMETER[name]] * 6) < 100 * tol
+    )
 
 
 def test_the_refusal_names_methods_that_do_solve_the_law():
@@ -121,7 +142,9 @@ def test_tresca_is_the_program_in_cvxpy(dim):
     program = models.tresca(problem)
     program.parameters["g"].value = problem.law.bound(np.zeros(6))
     program.problem.solve(solver="CLARABEL")
-    assert np.allclose(solve(problem).reactions, program.variables["r"].value.reshape(6, dim), atol=1e-4)
+    assert np.allclose(
+        solve(problem).reactions, program.variables["r"].value.reshape(6, dim), atol=1e-4
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -139,8 +162,13 @@ def test_associated_friction_is_the_program_in_cvxpy(dim):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_frictionless_contact_is_coulomb_without_friction(dim):
     problem = reduce(scenes.flat_punch(dim, elements=6 if dim == 2 else 3, mu=0.0))
-    answer, other = solve(replace(problem, law=Frictionless()), tol=1e-12), solve(problem, tol=1e-12)
-    assert answer.solved and np.allclose(answer.reactions, other.reactions, atol=1e-9 * np.abs(other.reactions).max())
+    answer, other = (
+        solve(replace(problem, law=Frictionless()), tol=1e-12),
+        solve(problem, tol=1e-12),
+    )
+    assert answer.solved and np.allclose(
+        answer.reactions, other.reactions, atol=1e-9 * np.abs(other.reactions).max()
+    )
     assert not answer.reactions[:, 1:].any()
 
 
@@ -157,21 +185,31 @@ def test_derivatives_are_difference_quotients(name):
 
 @pytest.mark.parametrize("name", [name for name, law in ALL.items() if law.convex])
 def test_convex_laws_project_on_a_fixed_convex_set(name):
-    """The projection is the gradient of a convex function: firmly non-expansive, with a symmetric derivative."""
+    """The projection is the gradient of a convex function: firmly non-expansive, with a symmetric
+    derivative.
+    """
     rng = np.random.default_rng(2)
     x, y, law = rng.normal(size=(200, 3)), rng.normal(size=(200, 3)), ALL[name].spread(200)
     (a, D), b = law.project(x), law.project(y)[0]
-    assert np.all(np.sum((a - b) * (x - y - a + b), axis=1) > -1e-12) and np.allclose(D, D.transpose(0, 2, 1))
+    assert np.all(np.sum((a - b) * (x - y - a + b), axis=1) > -1e-12) and np.allclose(
+        D, D.transpose(0, 2, 1)
+    )
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_units_change_nothing(name):
-    """Forces in units of 1e-6 and lengths in units of 1e4 give the same forces, written in those units."""
+    """Forces in units of 1e-6 and lengths in units of 1e4 give the same forces, written in those
+    units.
+    """
     problem = random_problem(ALL[name])
     force, length = 1e6, 1e-4
-    other = InterfaceProblem(problem.Q * length / force, problem.q * length, problem.law.scaled(1 / force))
+    other = InterfaceProblem(
+        problem.Q * length / force, problem.q * length, problem.law.scaled(1 / force)
+    )
     a, b = solve(problem, tol=1e-11), solve(other, tol=1e-11)
-    assert a.iterations == b.iterations and np.allclose(a.reactions * force, b.reactions, rtol=1e-9, atol=1e-9 * force)
+    assert a.iterations == b.iterations and np.allclose(
+        a.reactions * force, b.reactions, rtol=1e-9, atol=1e-9 * force
+    )
     assert np.allclose(dimensionless(problem)[0].q, dimensionless(other)[0].q)
 
 
@@ -180,7 +218,9 @@ def test_friction_coefficient_per_contact():
     problem = random_problem(mu)
     solution = solve(problem, tol=1e-11)
     assert solution.solved and worst(problem, solution, ["coulomb"] * 6, mu) < 1e-8
-    assert not np.allclose(solution.reactions, solve(replace(problem, law=0.3)).reactions, atol=1e-2)
+    assert not np.allclose(
+        solution.reactions, solve(replace(problem, law=0.3)).reactions, atol=1e-2
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -204,7 +244,9 @@ def test_contacts_that_do_not_feel_each_other_are_solved_on_their_own():
     parts = [random_problem(law, k=law.contacts, dim=2, seed=i) for i, law in enumerate(laws)]
     Q = np.zeros((6, 6))
     Q[:4, :4], Q[4:, 4:] = parts[0].Q, parts[1].Q
-    whole = InterfaceProblem(Q, np.vstack([p.q for p in parts]), join([(laws[0], [0, 1]), (laws[1], [2])]))
+    whole = InterfaceProblem(
+        Q, np.vstack([p.q for p in parts]), join([(laws[0], [0, 1]), (laws[1], [2])])
+    )
     apart = np.vstack([solve(p, tol=1e-12).reactions for p in parts])
     assert np.allclose(solve(whole, tol=1e-12).reactions, apart, atol=1e-9)
 
@@ -217,9 +259,17 @@ def test_selection_and_joining_keep_every_contact_with_its_law():
     order = np.array([4, 0, 2, 2, 1])
     assert np.allclose(law.select(order).project(y[order])[0], law.project(y)[0][order])
     some = np.array([False, True, True, True, False])
-    assert isinstance(law.select(some), Coulomb) and list(law.select(some).coefficient) == [0.9, 0.5, 0.1]
+    assert isinstance(law.select(some), Coulomb) and list(law.select(some).coefficient) == [
+        0.9,
+        0.5,
+        0.1,
+    ]
     nested = join([(law, np.arange(5)), (Bilateral([0.7]), [5])])
-    assert list(nested.lowest) == [0, 0, 0, 0, 0, -np.inf] and not nested.unilateral and nested.coefficient[5] == 0.7
+    assert (
+        list(nested.lowest) == [0, 0, 0, 0, 0, -np.inf]
+        and not nested.unilateral
+        and nested.coefficient[5] == 0.7
+    )
     for overlapping in ([0], [2]):
         with pytest.raises(InputError, match="every contact needs exactly one law"):
             join([(Coulomb([0.1]), [0]), (Tresca([0.1]), overlapping)])
@@ -237,7 +287,9 @@ def test_replacing_other_data_keeps_the_law():
     problem = random_problem(Tresca(0.3))
     again = replace(problem, q=2 * problem.q)
     assert again.law.bound(np.zeros(6))[0] == 0.3 and isinstance(again.law, Tresca)
-    assert problem.fingerprint == replace(problem).fingerprint != replace(problem, law=0.3).fingerprint
+    assert (
+        problem.fingerprint == replace(problem).fingerprint != replace(problem, law=0.3).fingerprint
+    )
 
 
 @pytest.mark.parametrize(
@@ -256,7 +308,8 @@ def test_bad_parameters_are_refused(change, message):
 def test_scenes_say_their_law():
     scene = scenes.flat_punch(2, elements=6, mu=0.3)
     problem = reduce(replace(scene, law="tresca", mu=2e-3))
-    assert np.allclose(problem.law.bound(np.zeros(problem.contacts)), 2e-3 * problem.areas)  # a traction bound
+    # a traction bound
+    assert np.allclose(problem.law.bound(np.zeros(problem.contacts)), 2e-3 * problem.areas)
     traction = solve(problem).reactions / problem.areas[:, None]
     assert np.abs(traction[:, 1]).max() == pytest.approx(2e-3)
     assert isinstance(reduce(scenes.flat_punch(2, elements=4, bilateral=True)).law, Bilateral)
@@ -274,7 +327,10 @@ def test_diagnosis_needs_a_friction_coefficient():
 def test_friction_of_the_place():
     scene = scenes.flat_punch(2, elements=6, mu=lambda places: 0.1 + 0.01 * np.abs(places[0]))
     problem = reduce(scene)
-    assert np.allclose(problem.mu, 0.1 + 0.01 * np.abs(problem.coordinates[0])) and np.ptp(problem.mu) > 0.1
+    assert (
+        np.allclose(problem.mu, 0.1 + 0.01 * np.abs(problem.coordinates[0]))
+        and np.ptp(problem.mu) > 0.1
+    )
     same = reduce(replace(scene, mu=problem.mu))
     assert np.allclose(solve(same).reactions, solve(problem).reactions)
     with pytest.raises(InputError, match="one number or one per contact"):
@@ -313,7 +369,10 @@ def test_a_law_is_one_file_and_one_line(monkeypatch):
         solution = solve(problem, method, tol=1e-10)
         assert solution.solved
         u = problem.displacements(solution.reactions, solution.multipliers)
-        slip, force = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(solution.reactions[:, 1:], axis=1)
+        slip, force = (
+            np.linalg.norm(u[:, 1:], axis=1),
+            np.linalg.norm(solution.reactions[:, 1:], axis=1),
+        )
         bound = np.minimum(0.8 * solution.reactions[:, 0], 0.5)
         assert np.all(force <= bound + 1e-8) and np.allclose(slip * (bound - force), 0, atol=1e-8)
         assert {0.5} < set(np.round(bound, 9))  # some bounds are at the limit, some below

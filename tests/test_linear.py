@@ -36,7 +36,9 @@ def system(scene, part, elements):
         node[dofs], component[dofs] = np.arange(len(dofs)), i
     free = body.free
     contact = np.flatnonzero(np.isin(free, body.contact_dofs))
-    return System(body.A[free][:, free].tocsr(), node[free], component[free], body.basis.mesh.p, contact)
+    return System(
+        body.A[free][:, free].tocsr(), node[free], component[free], body.basis.mesh.p, contact
+    )
 
 
 def bodies():
@@ -55,7 +57,9 @@ BODIES = bodies()
 
 def made(name, args):
     if name != "superlu":
-        pytest.importorskip({"pardiso": "pypardiso", "multigrid": "pyamg", "petsc": "petsc4py"}[name])
+        pytest.importorskip(
+            {"pardiso": "pypardiso", "multigrid": "pyamg", "petsc": "petsc4py"}[name]
+        )
     return make_solver(name, args)
 
 
@@ -88,9 +92,14 @@ def test_a_scene_solved_with_petsc_is_the_scene_solved_with_factors(dim):
     pytest.importorskip("petsc4py")
     scene = scenes.flat_punch(dim, elements=8 if dim == 2 else 4)
     problem = contactopt.reduce(scene, solver="petsc")
-    found, expected = contactopt.solve(problem, "newton"), contactopt.solve(contactopt.reduce(scene), "newton")
+    found, expected = (
+        contactopt.solve(problem, "newton"),
+        contactopt.solve(contactopt.reduce(scene), "newton"),
+    )
     assert found.solved and problem.Q.coupled.cycles > 0
-    assert np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    assert (
+        np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    )
 
 
 def test_the_name_of_a_missing_package_is_said():
@@ -112,7 +121,9 @@ def test_multigrid_keeps_its_word_in_the_energy_norm(body, rtol, name):
     b = np.zeros(A.shape[0])
     b[last] = np.random.default_rng(0).standard_normal(len(last))
     x = spsolve(A.tocsc(), b)
-    assert energy(A, made(name, args).solve(b, rtol) - x) <= (2 if name == "multigrid" else 3) * rtol * energy(A, x)
+    assert energy(A, made(name, args).solve(b, rtol) - x) <= (
+        2 if name == "multigrid" else 3
+    ) * rtol * energy(A, x)
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -152,7 +163,8 @@ def test_iterations_do_not_depend_on_units_and_vanish_without_load():
     A, *rest = BODIES["solid foundation"]
     b = np.random.default_rng(0).standard_normal(A.shape[0])
     answers = []
-    for force, length in ((1.0, 1.0), (1e9, 1.0), (1e-30, 1e-6)):  # beyond the range of single precision
+    # beyond the range of single precision
+    for force, length in ((1.0, 1.0), (1e9, 1.0), (1e-30, 1e-6)):
         solver = made("multigrid", System(force / length * A, *rest))
         x, cycles = conjugate_gradients(solver.A, solver.cycle, force * b, RTOL)
         answers.append((x / length, cycles))
@@ -166,7 +178,9 @@ def test_iterations_do_not_depend_on_units_and_vanish_without_load():
 def test_flat_elements_are_coarsened_along_their_short_side():
     x, y = (c.ravel() for c in np.meshgrid(np.arange(5.0), 4.0 * np.arange(3), indexing="ij"))
     points = np.stack([x, y])
-    touching = np.all(np.abs(points[:, :, None] - points[:, None]) <= np.array([1.0, 4.0])[:, None, None], axis=0)
+    touching = np.all(
+        np.abs(points[:, :, None] - points[:, None]) <= np.array([1.0, 4.0])[:, None, None], axis=0
+    )
     near = near_neighbours(sp.csr_matrix(np.kron(touching, np.ones((2, 2)))).tobsr((2, 2)), points)
     expected = touching & (y[:, None] == y)
     assert np.array_equal(near.toarray() > 0, expected)
@@ -200,15 +214,21 @@ def test_products_with_the_trailing_block(name):
     load = np.random.default_rng(0).standard_normal((len(last), 2))
     expected = made("superlu", args).trailing_inverse() @ load
     limit = 1e-8 if name in ("multigrid", "petsc") else 1e-11
-    assert np.linalg.norm(solver.trailing_product(load) - expected) <= limit * np.linalg.norm(expected)
-    assert np.linalg.norm(solver.trailing_product(load[:, 0]) - expected[:, 0]) <= limit * np.linalg.norm(expected)
+    assert np.linalg.norm(solver.trailing_product(load) - expected) <= limit * np.linalg.norm(
+        expected
+    )
+    assert np.linalg.norm(
+        solver.trailing_product(load[:, 0]) - expected[:, 0]
+    ) <= limit * np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("name", ["superlu", "pardiso"])
 def test_the_order_of_the_trailing_unknowns_is_the_callers(name):
     *system, last = BODIES["solid punch"]
     shuffled = np.random.default_rng(0).permutation(len(last))
-    C, D = (made(name, System(*system, chosen)).trailing_inverse() for chosen in (last, last[shuffled]))
+    C, D = (
+        made(name, System(*system, chosen)).trailing_inverse() for chosen in (last, last[shuffled])
+    )
     assert np.abs(C[np.ix_(shuffled, shuffled)] - D).max() <= 1e-12 * np.abs(C).max()
 
 
@@ -220,7 +240,11 @@ def test_restricted_products_are_those_of_the_block(name, body):
     at = np.random.default_rng(1).permutation(system.trailing)
     act = solver.restricted(at)
     limit = 1e-8 if name in ("multigrid", "petsc") else 1e-11
-    for load in (np.ones(len(at)), np.random.default_rng(0).standard_normal((len(at), 3)), np.zeros((len(at), 0))):
+    for load in (
+        np.ones(len(at)),
+        np.random.default_rng(0).standard_normal((len(at), 3)),
+        np.zeros((len(at), 0)),
+    ):
         full = np.zeros((system.A.shape[0], *load.shape[1:]))
         full[at] = load
         expected = made("superlu", system).solve(full)[at]
@@ -248,8 +272,12 @@ GRIDS = {2: (40, 40), 3: (12, 12, 12)}
 
 
 def grid(dim):
-    """A matrix with the pattern of two unknowns per node of a grid in which neighbours meet, a face of it last."""
-    points = np.stack([c.ravel() for c in np.meshgrid(*map(np.arange, GRIDS[dim]), indexing="ij")]).astype(float)
+    """A matrix with the pattern of two unknowns per node of a grid in which neighbours meet, a face
+    of it last.
+    """
+    points = np.stack(
+        [c.ravel() for c in np.meshgrid(*map(np.arange, GRIDS[dim]), indexing="ij")]
+    ).astype(float)
     line = [sp.diags([1.0, 1.0, 1.0], [-1, 0, 1], (k, k)) for k in GRIDS[dim]]
     nodes = line[0]
     for more in line[1:]:
@@ -261,7 +289,9 @@ def grid(dim):
 
 
 def fill(A, order):
-    """Entries of the factor, counted on the graph itself: eliminating an unknown connects all its neighbours."""
+    """Entries of the factor, counted on the graph itself: eliminating an unknown connects all its
+    neighbours.
+    """
     A = A[order][:, order].tocsr()
     rows = [set(A.indices[A.indptr[i] : A.indptr[i + 1]]) for i in range(A.shape[0])]
     count = 0
@@ -289,7 +319,10 @@ def test_minimum_degree_fills_less_in_the_plane_and_nested_dissection_in_space()
     for dim in (2, 3):
         A, _, _, points, _ = grid(dim)
         nodes = A[::2][:, ::2].tocsr()
-        degree, dissection = fill(nodes, minimum_degree(nodes)), fill(nodes, nested_dissection(nodes, points))
+        degree, dissection = (
+            fill(nodes, minimum_degree(nodes)),
+            fill(nodes, nested_dissection(nodes, points)),
+        )
         assert (degree < dissection) == (dim == 2), (degree, dissection)
 
 
@@ -303,7 +336,9 @@ def test_sparse_products_are_those_of_scipy(form, precision):
     x = np.random.default_rng(0).standard_normal(n).astype(precision)
     y = SparseProduct(A) @ x
     assert y.dtype == precision
-    assert np.linalg.norm(y - A @ x) <= 10 * np.finfo(precision).eps * np.linalg.norm(abs(A) @ abs(x))
+    assert np.linalg.norm(y - A @ x) <= 10 * np.finfo(precision).eps * np.linalg.norm(
+        abs(A) @ abs(x)
+    )
 
 
 @pytest.mark.parametrize("form", ["csr", "bsr"])
@@ -331,14 +366,18 @@ def test_a_crew_does_everything_once_and_reports_failures():
 
 
 def test_a_block_is_the_matrix_without_the_other_rows():
-    """Multigrid for a Block, which copies nothing, is multigrid for the rows and columns themselves."""
+    """Multigrid for a Block, which copies nothing, is multigrid for the rows and columns
+    themselves.
+    """
     pytest.importorskip("pyamg")
     A, *rest = BODIES["solid punch"]
     n = A.shape[0]
     whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))
     block = System(Block(whole, np.arange(2, n + 2)), *rest)
     b = np.random.default_rng(0).standard_normal(n)
-    assert np.array_equal(made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b))
+    assert np.array_equal(
+        made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b)
+    )
 
 
 def test_names_that_do_not_exist():
@@ -378,7 +417,9 @@ def resident():
 
 
 def test_factors_are_freed_whatever_thread_made_them():
-    """SuperLU forgets its memory where another thread frees it: solvers made and dropped must not add up."""
+    """SuperLU forgets its memory where another thread frees it: solvers made and dropped must not
+    add up.
+    """
     scene = scenes.flat_punch(3)
     arguments = system(scene, scene.lower, 8)
     threads, sizes = threading.active_count(), []
@@ -388,7 +429,8 @@ def test_factors_are_freed_whatever_thread_made_them():
         stored = 12 * solver.factors.nnz / 2**20  # MiB of L and U
         del solver
         end = time.monotonic() + 30
-        while threading.active_count() > threads and time.monotonic() < end:  # its thread frees them, and ends
+        # its thread frees them, and ends
+        while threading.active_count() > threads and time.monotonic() < end:
             time.sleep(0.01)
         assert threading.active_count() == threads
         sizes.append(resident())
@@ -397,7 +439,9 @@ def test_factors_are_freed_whatever_thread_made_them():
 
 
 def test_factors_may_be_freed_at_any_moment():
-    """The collector may free a solver while this very thread holds the locks of a pool that it is starting."""
+    """The collector may free a solver while this very thread holds the locks of a pool that it is
+    starting.
+    """
     program = """
 import gc
 from concurrent.futures import ThreadPoolExecutor
@@ -417,5 +461,7 @@ del thread
 with ThreadPoolExecutor(1, thread_name_prefix=Prefix()) as pool:
     assert pool.submit(abs, -1).result() == 1
 """
-    ended = subprocess.run([sys.executable, "-c", program], timeout=60, check=True, capture_output=True, text=True)
+    ended = subprocess.run(
+        [sys.executable, "-c", program], timeout=60, check=True, capture_output=True, text=True
+    )
     assert "collected True" in ended.stdout

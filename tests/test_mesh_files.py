@@ -1,4 +1,6 @@
-"""Meshes from files: geometry and groups as they were written, faults repaired or refused in a sentence."""
+"""Meshes from files: geometry and groups as they were written, faults repaired or refused in a
+sentence.
+"""
 
 import logging
 import os
@@ -22,7 +24,10 @@ def volume(mesh):
 
 
 def flux(mesh, boundary=None):
-    """Integral of x . n, the normal as contact uses it; dim times the volume on the whole surface."""
+    """Integral of x .
+
+    n, the normal as contact uses it; dim times the volume on the whole surface.
+    """
     facets = mesh.boundary_facets() if boundary is None else mesh.boundaries[boundary]
     at = skfem.FacetBasis(mesh, mesh.elem(), facets=facets, intorder=8)
     return np.sum(np.asarray(at.normals) * np.asarray(at.global_coordinates()) * at.dx)
@@ -43,21 +48,30 @@ def gmsh():
 
 
 def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, version=4.1):
-    """A disc (cylinder) of radius 1 in a square plate of side 4, conforming, with a group 'rim' between them."""
+    """A disc (cylinder) of radius 1 in a square plate of side 4, conforming, with a group 'rim'
+    between them.
+    """
     for option, value in {
         "Mesh.SecondOrderIncomplete": incomplete, "Mesh.RecombineAll": recombine,
         "Mesh.MeshSizeMax": 0.3 if dim == 2 else 0.7, "Mesh.MshFileVersion": version,
     }.items():  # fmt: skip
         gmsh.option.setNumber(option, float(value))
     if dim == 2:
-        tools = [(2, gmsh.model.occ.addRectangle(-2, -2, 0, 4, 4))], [(2, gmsh.model.occ.addDisk(0, 0, 0, 1, 1))]
+        tools = (
+            [(2, gmsh.model.occ.addRectangle(-2, -2, 0, 4, 4))],
+            [(2, gmsh.model.occ.addDisk(0, 0, 0, 1, 1))],
+        )
     else:
-        box, cylinder = gmsh.model.occ.addBox(-2, -2, 0, 4, 4, 1), gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1)
+        box, cylinder = (
+            gmsh.model.occ.addBox(-2, -2, 0, 4, 4, 1),
+            gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1),
+        )
         tools = [(3, box)], [(3, cylinder)]
     gmsh.model.occ.fragment(*tools)
     gmsh.model.occ.synchronize()
     disc, plate = sorted(
-        (tag for _, tag in gmsh.model.getEntities(dim)), key=lambda tag: gmsh.model.occ.getMass(dim, tag)
+        (tag for _, tag in gmsh.model.getEntities(dim)),
+        key=lambda tag: gmsh.model.occ.getMass(dim, tag),
     )
     rim = [tag for _, tag in gmsh.model.getBoundary([(dim, disc)], oriented=False)]
     rim = [tag for tag in rim if dim == 2 or gmsh.model.getType(2, tag) == "Cylinder"]
@@ -83,14 +97,17 @@ def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, ver
         (3, 2, False, False, "MeshTet2"),
     ],
 )
-def test_gmsh_parts_share_a_rim_with_opposite_normals(gmsh, tmp_path, version, dim, order, recombine, incomplete, kind):
+def test_gmsh_parts_share_a_rim_with_opposite_normals(
+    gmsh, tmp_path, version, dim, order, recombine, incomplete, kind
+):
     path = disc_in_plate(gmsh, tmp_path / "a.msh", dim, order, recombine, incomplete, version)
     disc, plate = load_mesh(path, "disc"), load_mesh(path, "plate", scale=10)
     assert type(disc).__name__ == type(plate).__name__ == kind
     assert volume(disc) + volume(plate) / 10**dim == pytest.approx(16, rel=1e-12)  # 4 x 4 (x 1)
     assert volume(disc) == pytest.approx(np.pi, rel={1: 0.15, 2: 3e-3}[order])
     for mesh in (disc, plate):
-        assert flux(mesh) == pytest.approx(dim * volume(mesh), rel=1e-9)  # every normal points outward
+        # every normal points outward
+        assert flux(mesh) == pytest.approx(dim * volume(mesh), rel=1e-9)
     assert flux(disc, "rim") == pytest.approx(-flux(plate, "rim") / 10**dim, rel=1e-12)
     assert flux(disc, "rim") > 0
     with pytest.raises(InputError, match=r"no group 'ring'.*groups of elements are disc, plate"):
@@ -120,7 +137,9 @@ def test_other_versions_of_gmsh_files_are_named(tmp_path):
     (tmp_path / "a.msh").write_text("$MeshFormat\n3 0 8\n$EndMeshFormat\n")
     (tmp_path / "b.msh").write_text("$NOD\n0\n$ENDNOD\n")
     for name, number in (("a", 3), ("b", 1)):
-        with pytest.raises(InputError, match=f"version {number} of Gmsh's format; save it in version 4.1 or 2.2"):
+        with pytest.raises(
+            InputError, match=f"version {number} of Gmsh's format; save it in version 4.1 or 2.2"
+        ):
             load_mesh(tmp_path / f"{name}.msh")
 
 
@@ -128,10 +147,14 @@ def curved_bricks():
     """Bricks of second order under a quadratic map, which serendipity elements hold exactly."""
     mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex().refined(1))
     x, y, z = mesh.p
-    return skfem.MeshHex2(np.stack([x + 0.2 * y * z, y + 0.3 * x**2, z + 0.1 * x * y - 0.2 * y**2]), mesh.t)
+    return skfem.MeshHex2(
+        np.stack([x + 0.2 * y * z, y + 0.3 * x**2, z + 0.1 * x * y - 0.2 * y**2]), mesh.t
+    )
 
 
-@pytest.mark.parametrize("kind,nodes", [("hexahedron20", 20), ("hexahedron27", 27), ("hexahedron", 8)])
+@pytest.mark.parametrize(
+    "kind,nodes", [("hexahedron20", 20), ("hexahedron27", 27), ("hexahedron", 8)]
+)
 def test_bricks_of_every_order_keep_their_shape(tmp_path, kind, nodes):
     exact = curved_bricks()
     cells = skfem.io.meshio.to_meshio(exact, encode_cell_data=False).cells[0].data[:, :nodes]
@@ -154,7 +177,9 @@ def test_formats_of_meshio(tmp_path, name, how):
     meshio.write(tmp_path / name, meshio.Mesh(mesh.p.T, [("tetra", mesh.t.T)]), **how)
     found = load_mesh(tmp_path / name)
     assert found.nelements == mesh.nelements and volume(found) == pytest.approx(1.0)
-    np.testing.assert_allclose(found.p[:, np.lexsort(found.p)], mesh.p[:, np.lexsort(mesh.p)], atol=1e-12)
+    np.testing.assert_allclose(
+        found.p[:, np.lexsort(found.p)], mesh.p[:, np.lexsort(mesh.p)], atol=1e-12
+    )
 
 
 def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
@@ -170,9 +195,13 @@ def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
         and len(left.boundaries["floor"]) == 1
     )
     tags = {"gmsh:physical": [np.array([3, 4])]}
-    path = write(tmp_path / "a.vtu", SQUARE, [("quad", TWO)], cell_data={"part": [np.array([3, 4])]})
+    path = write(
+        tmp_path / "a.vtu", SQUARE, [("quad", TWO)], cell_data={"part": [np.array([3, 4])]}
+    )
     assert load_mesh(path, "part=4").p[0].min() == 1
-    both = meshio.Mesh(SQUARE, [("quad", TWO)], cell_data=tags | {"gmsh:geometrical": tags["gmsh:physical"]})
+    both = meshio.Mesh(
+        SQUARE, [("quad", TWO)], cell_data=tags | {"gmsh:geometrical": tags["gmsh:physical"]}
+    )
     path = tmp_path / "a.msh"
     meshio.write(path, both, file_format="gmsh22")
     assert load_mesh(path, "4").p[0].min() == 1
@@ -190,13 +219,16 @@ def test_a_plane_mesh_may_lie_across_any_axis(tmp_path):
 
 
 def test_repairs_are_logged(tmp_path, caplog):
-    points = np.concatenate([SQUARE, SQUARE[[1, 4]] + 1e-9, [[7, 7, 0]]])  # a double seam and a lonely node
+    # a double seam and a lonely node
+    points = np.concatenate([SQUARE, SQUARE[[1, 4]] + 1e-9, [[7, 7, 0]]])
     cells = np.array(
         [[0, 1, 4, 3], [6, 7, 5, 2], [4, 3, 0, 1]]
     )  # the second the wrong way round, the third the first again
     with caplog.at_level(logging.INFO):
         mesh = load_mesh(write(tmp_path / "a.vtu", points, [("quad", cells)]))
-    assert mesh.nelements == 2 and mesh.p.shape[1] == 6 and volume(mesh) == pytest.approx(2, rel=1e-8)
+    assert (
+        mesh.nelements == 2 and mesh.p.shape[1] == 6 and volume(mesh) == pytest.approx(2, rel=1e-8)
+    )
     assert flux(mesh) == pytest.approx(4)
     for what in (
         "nodes that lie on others",
@@ -216,7 +248,9 @@ def test_elements_the_wrong_way_round_are_turned_with_all_their_nodes(tmp_path, 
     }[kind]  # fmt: skip
     original = skfem.io.meshio.to_meshio(mesh, encode_cell_data=False)
     points = mesh.p.T * np.array([-1, 1, 1])[: len(mesh.p)]
-    found = load_mesh(write(tmp_path / "a.vtu", np.pad(points, [(0, 0), (0, 3 - len(mesh.p))]), original.cells))
+    found = load_mesh(
+        write(tmp_path / "a.vtu", np.pad(points, [(0, 0), (0, 3 - len(mesh.p))]), original.cells)
+    )
     assert volume(found) == pytest.approx(volume(mesh), rel=1e-12)
     assert flux(found) == pytest.approx(len(mesh.p) * volume(mesh), rel=1e-9)
     np.testing.assert_allclose(np.sort(found.p[0]), np.sort(-mesh.p[0]), atol=1e-14)
@@ -234,20 +268,39 @@ def test_faults_are_refused_with_the_element(tmp_path):
     folded = SQUARE.copy()
     folded[5] = [1.2, 0.2, 0]
     refused("quad number 2 of the file.* folds over", folded, [("quad", TWO)])
-    refused("two corners coincide in quad number 2", SQUARE, [("quad", [[0, 1, 4, 3], [1, 2, 2, 4]])])
-    refused("mixes elements of type quad and triangle", SQUARE, [("quad", TWO[:1]), ("triangle", [[1, 2, 5]])])
+    refused(
+        "two corners coincide in quad number 2", SQUARE, [("quad", [[0, 1, 4, 3], [1, 2, 2, 4]])]
+    )
+    refused(
+        "mixes elements of type quad and triangle",
+        SQUARE,
+        [("quad", TWO[:1]), ("triangle", [[1, 2, 5]])],
+    )
     lost = SQUARE.copy()
     lost[5, 1] = np.nan
     refused("coordinates of node 6", lost, [("quad", TWO)])
     refused("a quad names a node that is not there", SQUARE, [("quad", [[0, 1, 4, 33]])])
     refused("no elements of a body", SQUARE, [("line", [[0, 1]])])
-    refused("type 'wedge' cannot be used", np.random.default_rng(0).random((6, 3)), [("wedge", [[0, 1, 2, 3, 4, 5]])])
+    refused(
+        "type 'wedge' cannot be used",
+        np.random.default_rng(0).random((6, 3)),
+        [("wedge", [[0, 1, 2, 3, 4, 5]])],
+    )
     apart = np.concatenate([SQUARE[[0, 1, 4, 3]], SQUARE[[1, 2, 5, 4]] + [1, 0, 0]])
     two = [("quad", np.arange(8).reshape(2, 4))]
     refused("falls into 2 pieces that share no node; mesh it in one piece", apart, two)
-    refused("choose the body by its group, one of part=1, part=2", apart, two, cell_data={"part": [np.array([1, 2])]})
+    refused(
+        "choose the body by its group, one of part=1, part=2",
+        apart,
+        two,
+        cell_data={"part": [np.array([1, 2])]},
+    )
     fan = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0], [2, 0.5, 0]]
-    refused("more than two elements share a facet", fan, [("triangle", [[0, 2, 1], [0, 1, 3], [0, 4, 1]])])
+    refused(
+        "more than two elements share a facet",
+        fan,
+        [("triangle", [[0, 2, 1], [0, 1, 3], [0, 4, 1]])],
+    )
     curved = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [0.1, 0.1, 0], [0, 0.5, 0]])
     refused("triangle6 number 1 of the file.* folds over", curved, [("triangle6", [range(6)])])
 
@@ -255,7 +308,10 @@ def test_faults_are_refused_with_the_element(tmp_path):
 def test_coincident_nodes_of_two_bodies_stay_apart(tmp_path):
     points = np.concatenate([SQUARE[[0, 1, 4, 3]], SQUARE[[1, 2, 5, 4]]])
     path = write(
-        tmp_path / "a.vtu", points, [("quad", np.arange(8).reshape(2, 4))], cell_data={"part": [np.array([1, 2])]}
+        tmp_path / "a.vtu",
+        points,
+        [("quad", np.arange(8).reshape(2, 4))],
+        cell_data={"part": [np.array([1, 2])]},
     )
     assert load_mesh(path, "part=1").nelements == 1
     with pytest.raises(InputError, match=r"2 pieces.* one of part=1, part=2"):
@@ -282,19 +338,25 @@ def test_hostile_files_end_in_one_sentence(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="bytes"):
         load_mesh(good)
     monkeypatch.undo()
-    meshio.write(tmp_path / "a.dat", meshio.Mesh(SQUARE[:, :2], [("quad", TWO)]), file_format="tecplot")
+    meshio.write(
+        tmp_path / "a.dat", meshio.Mesh(SQUARE[:, :2], [("quad", TWO)]), file_format="tecplot"
+    )
     (tmp_path / "cut.dat").write_bytes((tmp_path / "a.dat").read_bytes()[:-40])
     monkeypatch.setattr(mesh_formats, "PATIENCE", (2.0, 0.0))
-    with pytest.raises(InputError, match="tecplot"):  # whose reader waits for the end of a file for ever
+    # whose reader waits for the end of a file for ever
+    with pytest.raises(InputError, match="tecplot"):
         load_mesh(tmp_path / "cut.dat")
 
 
 def test_boundaries_by_place():
     mesh = name_boundaries(
-        skfem.MeshQuad().refined(2), {"floor": {1: (0.0, 0.0)}, "part": {1: (1.0, 1.0), 0: (0.0, 0.5)}}
+        skfem.MeshQuad().refined(2),
+        {"floor": {1: (0.0, 0.0)}, "part": {1: (1.0, 1.0), 0: (0.0, 0.5)}},
     )
     assert len(mesh.boundaries["floor"]) == 4 and len(mesh.boundaries["part"]) == 2
-    with pytest.raises(InputError, match=r"no facet.*'roof'; the body reaches from \(0, 0\) to \(1, 1\)"):
+    with pytest.raises(
+        InputError, match=r"no facet.*'roof'; the body reaches from \(0, 0\) to \(1, 1\)"
+    ):
         name_boundaries(mesh, {"roof": {1: (2.0, 2.0)}})
     with pytest.raises(InputError, match="scale"):
         load_mesh("a.msh", scale=-1)
@@ -334,8 +396,23 @@ U
 
 def brick_of_twenty(height, first):
     """Lines of the nodes of a brick of second order, numbered from `first`."""
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])
-    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    corners = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]]
+    )
+    edges = [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (3, 0),
+        (4, 5),
+        (5, 6),
+        (6, 7),
+        (7, 4),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+    ]
     places = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in edges]])
     return "\n".join(f"{first + i}, {x}, {y}, {z + height}" for i, (x, y, z) in enumerate(places))
 
@@ -372,21 +449,31 @@ def test_plane_elements_of_calculix(tmp_path, kind, count):
         places = np.concatenate([places, (places + np.roll(places, -1, axis=0)) / 2])
     lines = [f"{10 * i + 10}, {x}, {y}" for i, (x, y) in enumerate(places)]
     names = ", ".join(str(10 * i + 10) for i in range(count))
-    text = "\n".join(["*NODE", *lines, f"*ELEMENT, TYPE={kind}", f"3, {names}", "*SURFACE, NAME=LOW", "3, S1"])
+    text = "\n".join(
+        ["*NODE", *lines, f"*ELEMENT, TYPE={kind}", f"3, {names}", "*SURFACE, NAME=LOW", "3, S1"]
+    )
     (tmp_path / "a.inp").write_text(text)
     mesh = load_mesh(tmp_path / "a.inp")
     assert volume(mesh) == pytest.approx(1 if count in (4, 8) else 0.5)
     assert np.all(mesh.p[1, mesh.facets[:, mesh.boundaries["LOW"]]] == 0)
 
 
-@pytest.mark.parametrize("apart,words", [(3e-6, None), (2e-5, "nodes .* too far for one node and too near for two")])
+@pytest.mark.parametrize(
+    "apart,words", [(3e-6, None), (2e-5, "nodes .* too far for one node and too near for two")]
+)
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e6])
 def test_a_seam_closes_in_whole_or_is_refused(tmp_path, caplog, unit, apart, words):
     """Nodes of a seam lie apart by lengths about those at which they are taken for one."""
-    grids = [skfem.MeshQuad.init_tensor(np.linspace(i, i + 1, 21), np.linspace(0, 1, 21)) for i in (0, 1)]
+    grids = [
+        skfem.MeshQuad.init_tensor(np.linspace(i, i + 1, 21), np.linspace(0, 1, 21)) for i in (0, 1)
+    ]
     moved = grids[1].p + apart * np.random.default_rng(0).uniform(-1, 1, grids[1].p.shape)
     points = unit * np.pad(np.concatenate([grids[0].p, moved], axis=1).T, [(0, 0), (0, 1)])
-    path = write(tmp_path / "a.vtu", points, [("quad", np.concatenate([grids[0].t, grids[1].t + 441], axis=1).T)])
+    path = write(
+        tmp_path / "a.vtu",
+        points,
+        [("quad", np.concatenate([grids[0].t, grids[1].t + 441], axis=1).T)],
+    )
     if words:
         with pytest.raises(InputError, match=words):
             load_mesh(path)
@@ -401,14 +488,33 @@ def test_fine_facets_of_second_order_far_from_the_origin(tmp_path, small):
     x, y = mesh.doflocs
     bent = skfem.MeshTri2(np.stack([x + 0.1 * y**2, y + 0.2 * x * y]) + 3, mesh.t)
     written = skfem.io.meshio.to_meshio(bent, encode_cell_data=False)
-    found = load_mesh(write(tmp_path / "a.vtu", np.pad(written.points, [(0, 0), (0, 1)]), written.cells))
+    found = load_mesh(
+        write(tmp_path / "a.vtu", np.pad(written.points, [(0, 0), (0, 1)]), written.cells)
+    )
     assert found.nelements == 800 and volume(found) == pytest.approx(volume(bent), rel=1e-12)
 
 
 def test_neighbours_that_do_not_share_a_node_within_their_edge_are_refused(tmp_path):
-    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5], [0.5, 0.5], [0.6, 0.5]])
+    points = np.array(
+        [
+            [0, 0],
+            [1, 0],
+            [1, 1],
+            [0, 1],
+            [0.5, 0],
+            [1, 0.5],
+            [0.5, 1],
+            [0, 0.5],
+            [0.5, 0.5],
+            [0.6, 0.5],
+        ]
+    )
     points = np.pad(points, [(0, 0), (0, 1)])
-    for other, words in ((9, "not share the nodes"), (4, "not share the nodes"), (2, "a corner of one element")):
+    for other, words in (
+        (9, "not share the nodes"),
+        (4, "not share the nodes"),
+        (2, "a corner of one element"),
+    ):
         cells = [("triangle6", [[0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 6, other]])]
         with pytest.raises(InputError, match=words):
             load_mesh(write(tmp_path / "a.vtu", points[:10] if other == 9 else points[:9], cells))
@@ -460,7 +566,9 @@ def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence
     for trial in range(40):
         bad = np.frombuffer(data, np.uint8).copy()
         bad[rng.integers(30, len(bad), 5)] = rng.integers(0, 256, 5)
-        (tmp_path / "bad.msh").write_bytes(bad[: rng.integers(len(bad)) if trial % 2 else None].tobytes())
+        (tmp_path / "bad.msh").write_bytes(
+            bad[: rng.integers(len(bad)) if trial % 2 else None].tobytes()
+        )
         try:
             mesh_formats.read_groups(tmp_path / "bad.msh")
         except InputError as error:

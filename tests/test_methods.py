@@ -5,7 +5,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Status,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.methods import METHODS, find_method
 
 ALL = sorted(METHODS)
@@ -48,7 +56,9 @@ def test_every_method_gives_the_certified_answer_or_says_why_not(name, problems)
         tol = NEAR if name in APPROXIMATE else TOL
         solution = solve(problem, name, tol=tol, max_iterations=20_000, time_limit=20)
         assert solution.reactions.shape == problem.q.shape
-        assert solution.residual == natural_map_residual(problem, solution.reactions, solution.multipliers)
+        assert solution.residual == natural_map_residual(
+            problem, solution.reactions, solution.multipliers
+        )
         assert solution.solved == (solution.residual <= tol)
         if name in OTHER_LAW:
             assert solution.solved or solution.status is Status.SETTLED
@@ -68,16 +78,22 @@ def test_limits_hold_for_every_method(name, problems):
 
 @pytest.mark.parametrize("name", ALL)
 def test_open_contacts_carry_nothing(name):
-    solution = solve(InterfaceProblem(np.eye(4), np.ones((2, 2)), 0.3), name, tol=1e-8, max_iterations=1000)
+    solution = solve(
+        InterfaceProblem(np.eye(4), np.ones((2, 2)), 0.3), name, tol=1e-8, max_iterations=1000
+    )
     assert solution.solved and np.abs(solution.reactions).max() < 1e-7
 
 
 @pytest.mark.parametrize("name", sorted(set(ALL) - OTHER_LAW))
 def test_a_start_at_the_solution_is_kept(name):
-    """One iteration from there, and more than one without it, but for the pivots of Lemke, which take no start."""
+    """One iteration from there, and more than one without it, but for the pivots of Lemke, which
+    take no start.
+    """
     rng = np.random.default_rng(5)
     A = rng.normal(size=(40, 40))
-    problem = InterfaceProblem(A @ A.T / 40 + 0.05 * np.eye(40), rng.normal(size=(20, 2)) - 0.5, 0.7)
+    problem = InterfaceProblem(
+        A @ A.T / 40 + 0.05 * np.eye(40), rng.normal(size=(20, 2)) - 0.5, 0.7
+    )
     exact = solve(problem, tol=1e-11)
     tol = NEAR if name in APPROXIMATE else TOL
     cold = solve(problem, name, tol=tol, max_iterations=1)
@@ -96,4 +112,6 @@ def test_indefinite_compliance_is_not_called_solved():
             solution = solve(problem, name, max_iterations=50, time_limit=5)
         except InputError:
             continue
-        assert solution.solved == (natural_map_residual(problem, solution.reactions, solution.multipliers) <= 1e-8)
+        assert solution.solved == (
+            natural_map_residual(problem, solution.reactions, solution.multipliers) <= 1e-8
+        )

@@ -10,12 +10,23 @@ from contactopt.methods.backends.conic import Conic
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 
-PROGRAMS = ("normal", "displacements", "penalised", "bilateral", "tangential", "tresca", "associated", "acary_cadoux")
+PROGRAMS = (
+    "normal",
+    "displacements",
+    "penalised",
+    "bilateral",
+    "tangential",
+    "tresca",
+    "associated",
+    "acary_cadoux",
+)
 
 
 @pytest.fixture(params=["plane", "solid", "no plate"])
 def problem(request) -> InterfaceProblem:
-    """Elastic contacts with every state: a random well-conditioned compliance, gaps, some contacts without friction."""
+    """Elastic contacts with every state: a random well-conditioned compliance, gaps, some contacts
+    without friction.
+    """
     dim, k = (3 if request.param == "solid" else 2), 6
     rng = np.random.default_rng(3)
     A = rng.normal(size=(k * dim, k * dim))
@@ -94,7 +105,9 @@ def test_forces_and_displacements_are_dual(problem):
     assert np.allclose(gaps.multipliers["reaction"], forces.variables["r_n"].value, atol=1e-5)
     assert np.allclose(gaps.variables["u"].value, forces.multipliers["gap"], atol=1e-5)
     if len(problem.s):
-        assert np.allclose(gaps.variables["lambda"].value, forces.multipliers["approach"], atol=1e-5)
+        assert np.allclose(
+            gaps.variables["lambda"].value, forces.multipliers["approach"], atol=1e-5
+        )
 
 
 def test_displacements_need_a_compliance_that_can_be_inverted():
@@ -151,7 +164,8 @@ def test_polygons_converge_to_discs_from_inside(problem):
         errors.append(np.abs(r - exact).max())
         costs.append(program.problem.value - disc.problem.value)
     assert np.all(np.array(costs) > 0)  # inscribed: never a better value than the disc
-    assert costs[3] < 1.2 * costs[2] / 4 and errors[3] < errors[1] / 2 < errors[0] / 3  # of second order
+    # of second order
+    assert costs[3] < 1.2 * costs[2] / 4 and errors[3] < errors[1] / 2 < errors[0] / 3
     with pytest.raises(InputError, match="at least 3 facets"):
         models.tangential(problem, 2)
 
@@ -185,7 +199,11 @@ def test_plate_that_is_dragged_belongs_to_the_tangential_program():
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_tresca_program_gives_both_laws_at_once(problem, bilateral):
     problem = InterfaceProblem(
-        problem.Q, problem.q, (Bilateral if bilateral else Coulomb)(problem.mu), problem.V, problem.s
+        problem.Q,
+        problem.q,
+        (Bilateral if bilateral else Coulomb)(problem.mu),
+        problem.V,
+        problem.s,
     )
     program = models.tresca(problem)
     g = 0.2 * np.arange(problem.contacts)
@@ -214,7 +232,9 @@ def test_associated_friction_dilates(problem):
 
 def test_acary_cadoux_shifts_the_gap(problem):
     program = models.acary_cadoux(problem)
-    assert solved(program).problem.value == pytest.approx(solved(models.associated(problem)).problem.value, abs=1e-6)
+    assert solved(program).problem.value == pytest.approx(
+        solved(models.associated(problem)).problem.value, abs=1e-6
+    )
     s = np.linspace(0, 1, problem.contacts)
     program.parameters["s"].value = s
     m, r = solved(program).multipliers, program.variables["r"].value.reshape(problem.q.shape)
@@ -254,7 +274,11 @@ def test_exported_conic_data_are_the_program(problem):
         r = rng.normal(size=problem.q.shape) * [1, 0.3, 0.3] + [0.5, 0, 0]
         x = np.zeros(len(data["q"]))
         x[data["columns"]["r"]] = r.ravel()
-        cost = r.ravel() @ problem.Q @ r.ravel() / 2 + (problem.q * r).sum() + 0.3 * problem.mu @ r[:, 0]
+        cost = (
+            r.ravel() @ problem.Q @ r.ravel() / 2
+            + (problem.q * r).sum()
+            + 0.3 * problem.mu @ r[:, 0]
+        )
         assert x @ (data["P"] @ x) / 2 + data["q"] @ x == pytest.approx(cost)
         y = (data["b"] - data["A"] @ x)[-3 * problem.contacts :].reshape(-1, 3)
         inside = np.linalg.norm(y[:, 1:], axis=1) <= y[:, 0]

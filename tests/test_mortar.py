@@ -10,7 +10,17 @@ from conftest import MATERIAL, two_blocks
 from mortar_scenes import couple, press_fit, resultants, ring, slab
 from skfem.quadrature import get_quadrature
 
-from contactopt import Contact, InputError, Material, Plate, Support, reduce, reduce_bodies, scenes, solve
+from contactopt import (
+    Contact,
+    InputError,
+    Material,
+    Plate,
+    Support,
+    reduce,
+    reduce_bodies,
+    scenes,
+    solve,
+)
 from contactopt.bodies.elements import FACES, weight_at
 from contactopt.coupling import segments
 from contactopt.coupling.faces import Faces, cross, evaluate
@@ -39,17 +49,23 @@ def line(x: np.ndarray, degree: int, up: bool, cut: bool = False, y=None, **more
     if degree == 2:
         faces = np.column_stack([faces, n + np.arange(n - 1)])
     points = np.stack([p, np.zeros_like(p) if y is None else y(p)])
-    return Faces("b", KINDS["line", cut], degree, points, faces, np.full(n - 1, -1.0 if up else 1.0), **more)
+    return Faces(
+        "b", KINDS["line", cut], degree, points, faces, np.full(n - 1, -1.0 if up else 1.0), **more
+    )
 
 
 def face(xs, ys, degree: int, up: bool, cut: bool = False, place=lambda x: x, **more) -> Faces:
-    """A grid of rectangles, each cut in two or not, put into space by `place` (2, n) -> (3, n) of plane coordinates."""
+    """A grid of rectangles, each cut in two or not, put into space by `place` (2, n) -> (3, n) of
+    plane coordinates.
+    """
     i, j = np.meshgrid(np.arange(len(xs) - 1), np.arange(len(ys) - 1), indexing="ij")
 
     def number(a, b):
         return (a * len(ys) + b).ravel()
 
-    square = np.stack([number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)], axis=1)
+    square = np.stack(
+        [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)], axis=1
+    )
     corners = np.concatenate([square[:, [0, 1, 2]], square[:, [0, 2, 3]]]) if cut else square
     p = np.stack([a.ravel() for a in np.meshgrid(xs, ys, indexing="ij")])
     if degree == 2:
@@ -78,7 +94,11 @@ def integrals(surface: Faces) -> np.ndarray:
     count = len(surface.faces)
     which, at = np.repeat(np.arange(count), len(share)), np.tile(at, count)
     x, tangents = surface.locations(which, at)
-    measure = np.tile(share, count) * np.linalg.norm(cross(tangents), axis=0) * weight_at(surface.weight, x)
+    measure = (
+        np.tile(share, count)
+        * np.linalg.norm(cross(tangents), axis=0)
+        * weight_at(surface.weight, x)
+    )
     out = np.zeros(surface.points.shape[1])
     np.add.at(out, surface.faces[which], (surface.shapes(at) * measure).T)
     return out
@@ -90,7 +110,9 @@ CUTS = [(False, False), (True, True), (False, True)]  # quadrilaterals, triangle
 
 
 def check_exact(m, upper: Faces, lower: Faces) -> None:
-    """Row sums, linear fields, forces of uniform pressure; all on flat surfaces that cover each other."""
+    """Row sums, linear fields, forces of uniform pressure; all on flat surfaces that cover each
+    other.
+    """
     for W, surface in zip(m.weights, (upper, lower)):
         assert np.abs(W.sum(axis=1) - 1).max() < 1e-12
         assert np.abs(W @ surface.points.T - m.points.T).max() < 1e-11
@@ -111,7 +133,9 @@ def test_lines_pass_on_linear_fields_and_uniform_pressure(degree, cut, ratio, ow
     assert np.allclose(m.normals, [[0], [1]], atol=1e-14)
     if own is None:
         assert m.own == 1  # more contacts, or as many
-        assert mortar(replace(lower, turn=-lower.turn), replace(upper, turn=-upper.turn)).own == (ratio[0] == ratio[1])
+        assert mortar(replace(lower, turn=-lower.turn), replace(upper, turn=-upper.turn)).own == (
+            ratio[0] == ratio[1]
+        )
 
 
 @pytest.mark.parametrize("own", SIDES)
@@ -153,7 +177,9 @@ def test_distorted_faces_are_exact_to_the_quadrature(degree, cuts, own):
 @pytest.mark.parametrize("own", ["upper", "lower"])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_partial_overlap_integrates_over_the_common_part(degree, own):
-    """Contacts beyond the edge of the other surface keep their places; those that face nothing are left out."""
+    """Contacts beyond the edge of the other surface keep their places; those that face nothing are
+    left out.
+    """
     for upper, lower, content in (
         (line(grid(5, 0.13, 0.77), degree, False), line(grid(10), degree, True), 0.64),
         (line(grid(5, 0.43, 1.77), degree, False), line(grid(10), degree, True), 0.57),
@@ -185,7 +211,9 @@ def test_slivers_do_no_harm(power):
         (face(grid(7, *ends), grid(7, *ends), 1, False), face(grid(10), grid(10), 1, True)),
     ):
         m = mortar(upper, lower, "lower")
-        assert m.areas.sum() == pytest.approx((ends[1] - ends[0]) ** (m.points.shape[0] - 1), rel=2e-8)
+        assert m.areas.sum() == pytest.approx(
+            (ends[1] - ends[0]) ** (m.points.shape[0] - 1), rel=2e-8
+        )
         for W, surface in zip(m.weights, (upper, lower)):
             assert np.abs(W.sum(axis=1) - 1).max() < 1e-13
             assert np.abs(W @ surface.points.T - m.points.T).max() < 1e-6
@@ -193,12 +221,16 @@ def test_slivers_do_no_harm(power):
 
 
 def random_forces(upper: Faces, lower: Faces, m) -> tuple[np.ndarray, np.ndarray]:
-    """Resultant force and moment of random contact forces on both bodies, over the sum of their sizes."""
+    """Resultant force and moment of random contact forces on both bodies, over the sum of their
+    sizes.
+    """
     r = np.random.default_rng(3).normal(size=m.points.shape)
     forces = []
     for i, sign in enumerate((1.0, -1.0)):
         G = m.components(i, np.zeros(r.shape, dtype=bool))
-        forces.append(np.stack([sign * sum(G[c][d].T @ r[c] for c in range(len(r))) for d in range(len(r))]))
+        forces.append(
+            np.stack([sign * sum(G[c][d].T @ r[c] for c in range(len(r))) for d in range(len(r))])
+        )
     force, moment = resultants(forces, [upper.points, lower.points])
     return force / np.abs(r).sum(), moment / np.abs(r).sum()
 
@@ -215,7 +247,9 @@ def roof(x: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("cuts", CUTS)
 @pytest.mark.parametrize("degree", [1, 2])
 def test_curved_surfaces_are_in_equilibrium_and_close_with_the_mesh(degree, cuts, place):
-    """No resultant force or moment, whatever the forces; gaps and levers of the order of the geometry."""
+    """No resultant force or moment, whatever the forces; gaps and levers of the order of the
+    geometry.
+    """
     for own in ("upper", "lower"):
         gaps = []
         for n in (4, 8) if degree == 1 else (3, 6):
@@ -246,14 +280,22 @@ def test_a_gap_of_the_geometry_stays_a_lever():
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_true_gap_of_curved_surfaces(degree):
-    """With its curve, a polygon of chords has the gap of the parabola that it stands for, up to what a linear fit misses."""
+    """With its curve, a polygon of chords has the gap of the parabola that it stands for, up to
+    what a linear fit misses.
+    """
     parabola = lambda x: np.stack([x[0], x[0] ** 2 / 4])  # noqa: E731
-    upper = line(grid(6, -1, 1), degree, False, y=lambda x: np.interp(x, grid(6, -1, 1), grid(6, -1, 1) ** 2 / 4))
+    upper = line(
+        grid(6, -1, 1),
+        degree,
+        False,
+        y=lambda x: np.interp(x, grid(6, -1, 1), grid(6, -1, 1) ** 2 / 4),
+    )
     lower = line(grid(12, -1, 1), degree, True)
     rough, true = (mortar(replace(upper, curve=c), lower) for c in (None, parabola))
     exact = true.points[0] ** 2 / 4
     h = 2 / 12 / degree
-    assert np.abs(true.gap - exact).max() < h**2 / 4 / 5  # of h^2 times the second derivative over 2: 1/12 to 1/6
+    # of h^2 times the second derivative over 2: 1/12 to 1/6
+    assert np.abs(true.gap - exact).max() < h**2 / 4 / 5
     assert np.abs(rough.gap - exact).max() > 2 * np.abs(true.gap - exact).max()
 
 
@@ -276,7 +318,10 @@ def test_turned_mirrored_moved_and_in_other_units():
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     for scale, shift in ((1e-6, 0.0), (1e6, 0.0), (1.0, 100.0)):
         sign = np.sign(np.linalg.det(turn))
-        moved = [replace(s, points=scale * (turn @ s.points + shift), turn=sign * s.turn) for s in (upper, lower)]
+        moved = [
+            replace(s, points=scale * (turn @ s.points + shift), turn=sign * s.turn)
+            for s in (upper, lower)
+        ]
         other = mortar(*moved, "lower")
         assert np.array_equal(m.nodes, other.nodes)
         assert np.allclose(other.areas, m.areas * scale**2, rtol=1e-9)
@@ -296,7 +341,12 @@ def test_surfaces_that_face_each_other_nowhere_or_twice_are_refused():
         mortar(line(grid(4), 1, False), lower, "left")
     two = line(grid(4), 1, False)
     points = np.concatenate([two.points, two.points + np.array([[0], [0.1]])], axis=1)
-    folded = replace(two, points=points, faces=np.concatenate([two.faces, two.faces + 5]), turn=np.tile(two.turn, 2))
+    folded = replace(
+        two,
+        points=points,
+        faces=np.concatenate([two.faces, two.faces + 5]),
+        turn=np.tile(two.turn, 2),
+    )
     with pytest.raises(InputError, match="two layers"):
         mortar(folded, lower, "lower")
 
@@ -304,7 +354,9 @@ def test_surfaces_that_face_each_other_nowhere_or_twice_are_refused():
 def random_facets(rng: np.random.Generator, dim: int, n: int, shift: float) -> Facets:
     axis = rng.normal(size=(dim, n))
     sizes = 10 ** rng.uniform(-4, -1, n), 10 ** rng.uniform(-4, -0.5, n) * rng.integers(0, 2)
-    return Facets(rng.uniform(size=(dim, n)) + shift, sizes[0], axis / np.linalg.norm(axis, axis=0), sizes[1])
+    return Facets(
+        rng.uniform(size=(dim, n)) + shift, sizes[0], axis / np.linalg.norm(axis, axis=0), sizes[1]
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -313,7 +365,8 @@ def test_every_facet_that_a_normal_meets_is_found(dim, shift):
     rng = np.random.default_rng(int(shift))
     own, other = random_facets(rng, dim, 90, 0.0), random_facets(rng, dim, 700, shift)
     found = set(zip(*facing_pairs(own, other, -0.1)))
-    # Lines from within each own ball, along directions within its cone, both ways: the balls that they pass through.
+    # Lines from within each own ball, along directions within its cone, both ways: the balls that
+    # they pass through.
     for _ in range(20):
         inside, off = rng.normal(size=(2, dim, 90))
         p = own.centre + own.radius * inside / np.linalg.norm(inside, axis=0)
@@ -340,7 +393,8 @@ def test_the_search_costs_the_same_at_any_gap(gap):
 @pytest.mark.parametrize("seed", range(40))
 def test_areas_and_uniform_pressure_of_random_surfaces_at_any_gap(seed):
     found = pair(seed)
-    assert found["share"] < (1e-10 if found["surfaces"] == "flat" else 5e-3)  # edges of pieces are straight
+    # edges of pieces are straight
+    assert found["share"] < (1e-10 if found["surfaces"] == "flat" else 5e-3)
     assert found["area"] < (1e-10 if found["surfaces"] == "flat" else 1e-3)
     assert found["uniform pressure"] < (1e-9 if found["surfaces"] == "flat" else 1e-2)
 
@@ -349,26 +403,42 @@ def test_areas_and_uniform_pressure_of_random_surfaces_at_any_gap(seed):
 @pytest.mark.parametrize("seed", [3, 5])
 def test_exact_pressures_on_meshes_of_gmsh(shape, seed):
     found = mesh(shape, seed)
-    assert abs(found["peak"]) < 0.015 and abs(found["half-width"]) < 0.02 and found["status"] == "solved"
+    assert (
+        abs(found["peak"]) < 0.015
+        and abs(found["half-width"]) < 0.02
+        and found["status"] == "solved"
+    )
 
 
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("cells", [3, 5, 7, 12])
 def test_contacts_below_the_steep_side_of_a_roller_stay_open(degree, cells):
-    """The cell in which the roller ends: its gap and its normals are not continued to the node beyond."""
+    """The cell in which the roller ends: its gap and its normals are not continued to the node
+    beyond.
+    """
     angle = np.linspace(-np.pi / 2, np.pi / 2, 41)
     roller = line(np.sin(angle), degree, False, y=lambda x: 1 - np.sqrt(np.maximum(0.0, 1 - x**2)))
     m = mortar(roller, line(grid(cells, -1.37, 1.21), degree, True), "lower")
-    assert np.allclose(m.normals, [[0], [1]]) and m.gap.min() > -0.1 and np.abs(m.points[0]).max() < 1 + 1e-12
+    assert (
+        np.allclose(m.normals, [[0], [1]])
+        and m.gap.min() > -0.1
+        and np.abs(m.points[0]).max() < 1 + 1e-12
+    )
     assert m.gap[np.abs(m.points[0]) > 0.8].min() > 0.3
-    assert m.areas.sum() == pytest.approx(2.0, rel=4e-3)  # the last facets are steeper than those that face anything
+    # the last facets are steeper than those that face anything
+    assert m.areas.sum() == pytest.approx(2.0, rel=4e-3)
 
 
 @pytest.mark.parametrize("gap", [0.02, 3.0])
 def test_a_layer_far_behind_the_nearest_one_is_none_of_a_fold(gap):
     near, lower = line(grid(5), 1, False, y=lambda x: gap + 0 * x), line(grid(8), 1, True)
     points = np.concatenate([near.points, near.points + np.array([[0.1], [20.0]])], axis=1)
-    both = replace(near, points=points, faces=np.concatenate([near.faces, near.faces + 6]), turn=np.tile(near.turn, 2))
+    both = replace(
+        near,
+        points=points,
+        faces=np.concatenate([near.faces, near.faces + 6]),
+        turn=np.tile(near.turn, 2),
+    )
     assert np.allclose(mortar(both, lower, "lower").gap, gap)
     below = replace(both, points=np.where(points > 10, points - 40, points))
     assert np.allclose(mortar(below, lower, "lower").gap, gap)
@@ -379,8 +449,14 @@ def test_a_layer_far_behind_the_nearest_one_is_none_of_a_fold(gap):
 def test_pressure_where_the_other_surface_ends_within_a_face(degree, covered):
     """The edge of a block presses on a part of the last cell: its pressure is finite, and told."""
     h = 1 / 8 / degree
-    top = rename(tensor_mesh(np.linspace(-covered * h, 1 + covered * h, 6), [0.0, 0.5, 1.0]), top="y+", contact="y-")
-    base = rename(tensor_mesh(np.linspace(-1, 2, 25), np.linspace(-2, 0, 9)), bottom="y-", contact="y+")
+    top = rename(
+        tensor_mesh(np.linspace(-covered * h, 1 + covered * h, 6), [0.0, 0.5, 1.0]),
+        top="y+",
+        contact="y-",
+    )
+    base = rename(
+        tensor_mesh(np.linspace(-1, 2, 25), np.linspace(-2, 0, 9)), bottom="y-", contact="y+"
+    )
     upper = Part("upper", top, MATERIAL, (), (Plate("top", {"y": -1.0}),))
     lower = Part("lower", base, MATERIAL, (Support("bottom"),))
     coupled = couple(Scene("s", upper, lower, 0.0, degree=degree), "lower")
@@ -397,7 +473,9 @@ def test_pressure_where_the_other_surface_ends_within_a_face(degree, covered):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_uniform_load_closes_any_gap(dim, seed):
-    """Turned, moved, in other units, on meshes of other kinds: without lateral contraction the pressure is uniform."""
+    """Turned, moved, in other units, on meshes of other kinds: without lateral contraction the
+    pressure is uniform.
+    """
     rng = np.random.default_rng([dim, seed])
     unit, gap = 10 ** rng.uniform(-3, 3), 10 ** rng.uniform(-2, 1)
     turn = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * unit
@@ -420,7 +498,9 @@ def test_a_uniform_load_closes_any_gap(dim, seed):
     kind = "plane-strain" if dim == 2 else "solid"
     for carrier in ("upper", "lower"):
         contact = Contact("upper", "lower", 0.3, coupling="mortar", carrier=carrier)
-        problem = reduce_bodies(Scene("s", bodies=(upper, lower), contacts=(contact,), kind=kind)).problem
+        problem = reduce_bodies(
+            Scene("s", bodies=(upper, lower), contacts=(contact,), kind=kind)
+        ).problem
         pressure = solve(problem, tol=1e-12).reactions[:, 0] / problem.areas
         assert np.abs(pressure * unit ** (dim - 1) / 3 - 1).max() < 1e-8
 
@@ -471,11 +551,23 @@ def test_a_press_fit_is_of_second_order(own):
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_closed_ring_is_in_equilibrium(degree, cut, interference):
-    """Polygons of 24 and 36 edges in each other, any forces: no resultant force and no resultant moment."""
-    outer = Part("outer", ring(2, 3, 2, 24, 2 * np.pi), MATERIAL, (Support("outer"),), contact="inner")
-    inner = Part("inner", ring(1, 2 + interference, 2, 36, 2 * np.pi), MATERIAL, (Support("inner"),), contact="outer")
+    """Polygons of 24 and 36 edges in each other, any forces: no resultant force and no resultant
+    moment.
+    """
+    outer = Part(
+        "outer", ring(2, 3, 2, 24, 2 * np.pi), MATERIAL, (Support("outer"),), contact="inner"
+    )
+    inner = Part(
+        "inner",
+        ring(1, 2 + interference, 2, 36, 2 * np.pi),
+        MATERIAL,
+        (Support("inner"),),
+        contact="outer",
+    )
     for own in ("upper", "lower"):
-        coupled = couple(with_elements(Scene("s", outer, inner, 0.3, degree=degree), degree, cut), own)
+        coupled = couple(
+            with_elements(Scene("s", outer, inner, 0.3, degree=degree), degree, cut), own
+        )
         places = [b.body.locations for b in coupled.bodies]
         assert np.any(coupled.mortar.lever)
         size = len(coupled.problem.areas), 2
@@ -488,7 +580,9 @@ def test_a_closed_ring_is_in_equilibrium(degree, cut, interference):
 
 @pytest.mark.parametrize("name", ["cylinder", "sphere"])
 def test_hertz_on_meshes_two_to_three(name, monkeypatch):
-    """Peak and width within .2 % on at most 10,000 unknowns; no larger error of the pressure than on matching meshes."""
+    """Peak and width within .2 % on at most 10,000 unknowns; no larger error of the pressure than
+    on matching meshes.
+    """
     monkeypatch.setitem(round_bodies.GROWTH, 2, 1.5)  # coarse away from the contact
     scene = getattr(scenes, name)(mu=0.0, force=30.0 if name == "cylinder" else 1.0)
     scene = with_elements(scene, 2)
@@ -521,12 +615,21 @@ def test_a_half_model_is_half_of_the_whole():
         for cells, heights, load in ((3, (0, 1), True), (5, (-1, 0), False)):
             x = np.linspace(0, 1, cells + 1) ** 1.2
             x = x if copies == 2 else np.concatenate([-x[:0:-1], x])
-            mesh = rename(tensor_mesh(x, np.linspace(*heights, 4)), top="y+", bottom="y-", axis="x-")
+            mesh = rename(
+                tensor_mesh(x, np.linspace(*heights, 4)), top="y+", bottom="y-", axis="x-"
+            )
             hold = (Support("axis", {"x": 0.0}),) if copies == 2 else ()
             loads = (Plate("top", {"y": -1.0}),) if load else ()
             hold = hold if load else (*hold, Support("bottom"))
             parts.append(
-                Part("upper" if load else "lower", mesh, MATERIAL, hold, loads, contact="bottom" if load else "top")
+                Part(
+                    "upper" if load else "lower",
+                    mesh,
+                    MATERIAL,
+                    hold,
+                    loads,
+                    contact="bottom" if load else "top",
+                )
             )
         coupled = couple(Scene("s", *parts, 0.2, degree=2, copies=copies))
         problem, solution = coupled.problem, solve(coupled.problem, tol=1e-12)
@@ -540,7 +643,9 @@ def test_a_half_model_is_half_of_the_whole():
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("carrier", ["upper", "lower"])
 def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
-    """On curved surfaces, with friction: at planes of symmetry nothing slips while the rings press each other."""
+    """On curved surfaces, with friction: at planes of symmetry nothing slips while the rings press
+    each other.
+    """
     results = []
     for quarters in (1, 2):
         parts = []
@@ -548,12 +653,17 @@ def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
             mesh = ring(*radii, 2, quarters * sectors, quarters * np.pi / 2)
             axes = ("y", "x") if quarters == 1 else ("y", "y")
             hold = tuple(Support(side, {axis: 0.0}) for side, axis in zip(("start", "end"), axes))
-            parts.append(Part(name, mesh, MATERIAL, hold, contact="inner" if name == "outer" else "outer"))
+            parts.append(
+                Part(name, mesh, MATERIAL, hold, contact="inner" if name == "outer" else "outer")
+            )
         pair = Contact("outer", "inner", 0.15, coupling="mortar", carrier=carrier)
-        problem = reduce_bodies(Scene("rings", bodies=tuple(parts), contacts=(pair,), degree=degree)).problem
+        problem = reduce_bodies(
+            Scene("rings", bodies=tuple(parts), contacts=(pair,), degree=degree)
+        ).problem
         solution = solve(problem, tol=1e-12)
         x, y = problem.coordinates
-        first = np.flatnonzero(x > 1e-9 * x.max())  # the middle of the half has two of the quarter's ends
+        # the middle of the half has two of the quarter's ends
+        first = np.flatnonzero(x > 1e-9 * x.max())
         order = first[np.argsort(np.arctan2(y[first], x[first]))]
         results.append(solution.reactions[order] / problem.areas[order, None])
         assert solution.reactions[order[0], 0] > 0 and solution.reactions[order[0], 1] == 0
@@ -565,14 +675,20 @@ def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
 
 
 def test_a_small_block_on_a_large_one():
-    """Contacts of the larger, finer surface reach beyond the block's edge: the approach converges to that of matching meshes."""
+    """Contacts of the larger, finer surface reach beyond the block's edge: the approach converges
+    to that of matching meshes.
+    """
     x = np.linspace(-1, 2, 49)
     results = []
     for cells, own in ((16, None), (5, "lower"), (11, "lower")):
-        top = rename(tensor_mesh(np.linspace(0, 1, cells + 1), np.linspace(0, 1, 9)), top="y+", contact="y-")
+        top = rename(
+            tensor_mesh(np.linspace(0, 1, cells + 1), np.linspace(0, 1, 9)), top="y+", contact="y-"
+        )
         base = rename(tensor_mesh(x, np.linspace(-2, 0, 17)), bottom="y-", contact="y+")
         upper = Part("upper", top, MATERIAL, (), (Plate("top", {"y": -1.0}),))
-        scene = Scene("s", upper, Part("lower", base, MATERIAL, (Support("bottom"),)), 0.0, degree=2)
+        scene = Scene(
+            "s", upper, Part("lower", base, MATERIAL, (Support("bottom"),)), 0.0, degree=2
+        )
         coupled = couple(scene, own)
         solution = solve(coupled.problem)
         assert solution.reactions[:, 0].sum() == pytest.approx(1.0, rel=1e-8)
@@ -582,14 +698,17 @@ def test_a_small_block_on_a_large_one():
 
 @pytest.mark.parametrize("weight", [(1.0, False), (2 * np.pi, True)])
 def test_finer_contacts_see_no_kinks_of_linear_elements(weight):
-    """A parabola that both sides interpolate linearly has no relative displacement but a constant, away from uneven cells."""
+    """A parabola that both sides interpolate linearly has no relative displacement but a constant,
+    away from uneven cells.
+    """
     upper, lower = line(grid(8), 1, False, weight=weight), line(grid(24), 1, True, weight=weight)
     m = mortar(upper, lower)
     inner = (m.points[0] > 0.2) & (m.points[0] < 0.8)
     seen = [W @ s.points[0] ** 2 for W, s in zip(m.weights, (upper, lower))]
     apart = (seen[0] - seen[1])[inner]
     assert np.ptp(apart) < 1e-3 / 8**2
-    assert apart.mean() == pytest.approx((1 / 8**2 - 1 / 24**2) / 6, rel=1e-3)  # what interpolation adds on either side
+    # what interpolation adds on either side
+    assert apart.mean() == pytest.approx((1 / 8**2 - 1 / 24**2) / 6, rel=1e-3)
 
 
 @pytest.mark.parametrize("cuts", CUTS)
@@ -630,7 +749,11 @@ def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
     finer = replace(scene, lower=replace(scene.lower, mesh=slab("plane-strain", -2, 0, 7)))
     with caplog.at_level(logging.INFO, logger="contactopt.coupling"):
         same, other = reduce_bodies(scene), reduce_bodies(finer)
-    assert (same.coupling.kind, other.coupling.kind, other.coupling.carrier) == ("matching", "mortar", "lower")
+    assert (same.coupling.kind, other.coupling.kind, other.coupling.carrier) == (
+        "matching",
+        "mortar",
+        "lower",
+    )
     assert "is coupled by mortar" in caplog.text
     problem = reduce(finer)
     assert np.allclose(solve(problem, tol=1e-12).reactions[:, 0] / problem.areas, 3.0, rtol=1e-10)

@@ -9,7 +9,15 @@ from conftest import one_contact
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve, transfer
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+    transfer,
+)
 from contactopt.benchmark.problems import rigid_bodies as random_rigid_bodies
 from contactopt.benchmark.problems import tangential
 from contactopt.methods.auto import Auto
@@ -46,27 +54,40 @@ def test_newton_step_solves_the_linearised_equations(p):
     A = rng.normal(size=(k * d, k * d))
     Q, V = A @ A.T / 10 + np.eye(k * d), rng.normal(size=(k * d, p))
     rho, mu = rng.uniform(0.5, 2, k), np.full(k, 0.6)
-    equations = Equations(Q, rng.normal(size=(k, d)), V, rng.normal(size=p), Coulomb(mu).project, rho)
+    equations = Equations(
+        Q, rng.normal(size=(k, d)), V, rng.normal(size=p), Coulomb(mu).project, rho
+    )
     r, lam = rng.normal(size=(k, d)) + np.eye(d)[0], rng.normal(size=p)
     _, error, balance, D = equations.evaluate(r, lam)
-    assert {0.0} < {float(np.abs(block).max()) for block in D}  # open and closed contacts both occur
+    # open and closed contacts both occur
+    assert {0.0} < {float(np.abs(block).max()) for block in D}
     big, scale = la.block_diag(*D), np.repeat(rho, d)
     full = np.block(
         [
-            [np.eye(k * d) - big @ (np.eye(k * d) - scale[:, None] * Q), big @ (scale[:, None] * V)],
+            [
+                np.eye(k * d) - big @ (np.eye(k * d) - scale[:, None] * Q),
+                big @ (scale[:, None] * V),
+            ],
             [V.T, np.zeros((p, p))],
         ]
     )
     expected = np.linalg.solve(full, np.concatenate([error.ravel(), -balance]))
-    for dr, dlam in (equations.step(error, balance, D, ridge=0.0), Bonded(Q, V).step(rho, error, balance, D)):
+    for dr, dlam in (
+        equations.step(error, balance, D, ridge=0.0),
+        Bonded(Q, V).step(rho, error, balance, D),
+    ):
         assert np.allclose(np.concatenate([dr.ravel(), dlam]), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", SMALL)
 def test_matrix_free_newton_takes_the_same_steps(name):
     problem = reduce(make_scene(name, mu=0.3, elements=SMALL[name]))
-    dense, free = solve(problem, "newton", tol=1e-9), solve(problem, "newton", tol=1e-9, linear="krylov")
-    assert free.solved and free.iterations <= dense.iterations + 2  # its steps are no more accurate than pays
+    dense, free = (
+        solve(problem, "newton", tol=1e-9),
+        solve(problem, "newton", tol=1e-9, linear="krylov"),
+    )
+    # its steps are no more accurate than pays
+    assert free.solved and free.iterations <= dense.iterations + 2
     assert np.allclose(free.reactions, dense.reactions, atol=1e-7)
     with pytest.raises(InputError, match="choose dense, krylov or coupled"):
         solve(problem, "newton", linear="magic")
@@ -124,7 +145,9 @@ def test_duplicated_contacts_share_the_force():
     base = reduce(scenes.flat_punch(2, elements=6))
     twice = np.repeat(np.arange(base.contacts), 2)
     rows = (2 * twice[:, None] + np.arange(2)).ravel()
-    doubled = InterfaceProblem(base.Q[np.ix_(rows, rows)], base.q[twice], base.mu[twice], base.V[rows], base.s)
+    doubled = InterfaceProblem(
+        base.Q[np.ix_(rows, rows)], base.q[twice], base.mu[twice], base.V[rows], base.s
+    )
     a, b = solve(base, tol=1e-10), solve(doubled, tol=1e-8)
     assert b.solved
     assert np.allclose(b.reactions[::2] + b.reactions[1::2], a.reactions, atol=1e-5)
@@ -132,7 +155,9 @@ def test_duplicated_contacts_share_the_force():
 
 @pytest.mark.parametrize("elements", [8, 32, 128])
 def test_steps_hardly_depend_on_the_mesh(elements):
-    coarse, fine = (reduce(scenes.flat_punch(2, elements=n, mu=0.3)) for n in (elements // 2, elements))
+    coarse, fine = (
+        reduce(scenes.flat_punch(2, elements=n, mu=0.3)) for n in (elements // 2, elements)
+    )
     cold = solve(fine)
     warm = solve(fine, start=transfer(coarse, solve(coarse), fine))
     assert cold.solved and cold.iterations - 1 <= 12
@@ -142,22 +167,28 @@ def test_steps_hardly_depend_on_the_mesh(elements):
 @pytest.mark.parametrize("reach", [2.0, 200.0])
 @pytest.mark.parametrize("mu", [0.0, 0.4])
 def test_steps_hardly_depend_on_how_far_the_surfaces_reach(reach, mu):
-    """A cylinder on a half-plane, candidates up to 200 half-widths away: peeling them off one by one takes 30 steps."""
+    """A cylinder on a half-plane, candidates up to 200 half-widths away: peeling them off one by
+    one takes 30 steps.
+    """
     right = np.concatenate([np.linspace(0, 2, 41), 2.0 * np.geomspace(1.0, 100.0, 25)[1:]])
     x = np.concatenate([-right[:0:-1], right])
     x = x[np.abs(x) <= reach]
     areas = np.gradient(x)
-    normal = -np.log(np.maximum(np.abs(x[:, None] - x), areas / 5.44) / 1e3) / np.pi  # Flamant: mean over a strip
+    # Flamant: mean over a strip
+    normal = -np.log(np.maximum(np.abs(x[:, None] - x), areas / 5.44) / 1e3) / np.pi
     Q = np.zeros((len(x), 2, len(x), 2))
     Q[:, 0, :, 0] = Q[:, 1, :, 1] = (normal + normal.T) / 2
     V = np.zeros((len(x), 2, 1))
     V[:, 0] = -1.0
     q = np.stack([x**2 / 4, 0 * x], axis=1)
-    problem = InterfaceProblem(Q.reshape(2 * len(x), -1), q, mu, V.reshape(-1, 1), [np.pi / 4], areas)
+    problem = InterfaceProblem(
+        Q.reshape(2 * len(x), -1), q, mu, V.reshape(-1, 1), [np.pi / 4], areas
+    )
     solution = solve(problem, method="newton")
     assert solution.solved and solution.iterations <= 8
     pressure = solution.reactions[:, 0] / areas
-    assert np.abs(pressure - np.sqrt(np.maximum(1 - x**2, 0.0)) / 2).max() < 0.03  # Hertz: half-width 1
+    # Hertz: half-width 1
+    assert np.abs(pressure - np.sqrt(np.maximum(1 - x**2, 0.0)) / 2).max() < 0.03
 
 
 def test_transfer_keeps_the_traction():
@@ -196,24 +227,39 @@ class Units:
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(0, 10**6), st.sampled_from([2, 3]), st.floats(-9, 9), st.floats(-9, 9), st.floats(0.0, 0.3))
+@given(
+    st.integers(0, 10**6),
+    st.sampled_from([2, 3]),
+    st.floats(-9, 9),
+    st.floats(-9, 9),
+    st.floats(0.0, 0.3),
+)
 def test_invariance(seed, dim, force, length, mu):
-    """Units, order of the contacts, tangential basis, mirror image: the same solution, where it is unique."""
+    """Units, order of the contacts, tangential basis, mirror image: the same solution, where it is
+    unique.
+    """
     rng = np.random.default_rng(seed)
     k = 5
     A = rng.normal(size=(k * dim, k * dim))
-    base = InterfaceProblem(A @ A.T / (k * dim) + np.eye(k * dim), rng.normal(size=(k, dim)) - 0.5, mu)
+    base = InterfaceProblem(
+        A @ A.T / (k * dim) + np.eye(k * dim), rng.normal(size=(k, dim)) - 0.5, mu
+    )
     order = rng.permutation(k)
     turn = np.zeros((k, dim, dim))
     turn[:, 0, 0] = 1.0
-    turn[:, 1:, 1:] = [la.qr(rng.normal(size=(dim - 1, dim - 1)))[0] for _ in range(k)]  # rotations and mirrors
+    # rotations and mirrors
+    turn[:, 1:, 1:] = [la.qr(rng.normal(size=(dim - 1, dim - 1)))[0] for _ in range(k)]
     T = la.block_diag(*turn)[(order[:, None] * dim + np.arange(dim)).ravel()]
     f, g = 10**force, 10**length
     q = (T @ base.q.ravel()).reshape(k, dim)
     other = InterfaceProblem(T @ base.Q @ T.T * g / f, q * g, mu)
     a, b = solve(base, tol=1e-11), solve(other, tol=1e-11)
     assert a.solved and b.solved
-    assert np.allclose(T @ a.reactions.ravel(), b.reactions.ravel() / f, atol=1e-8 * (1 + np.abs(a.reactions).max()))
+    assert np.allclose(
+        T @ a.reactions.ravel(),
+        b.reactions.ravel() / f,
+        atol=1e-8 * (1 + np.abs(a.reactions).max()),
+    )
 
 
 @given(st.floats(1e-6, 1e6))

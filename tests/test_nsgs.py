@@ -33,7 +33,9 @@ def test_local_problems_obey_the_law(dim, bilateral, turned):
         mu = 0.0 if trial % 10 == 0 else rng.uniform(0.05, 1.5)
         r = Local(W, mu, bilateral).solve(v.tolist())
         assert law_violation(W, v, mu, r, bilateral) < 1e-9 * (1 + np.linalg.norm(r)) ** 2
-        states.add("open" if not r.any() else "slip" if np.linalg.norm((W @ r + v)[1:]) > 1e-9 else "stick")
+        states.add(
+            "open" if not r.any() else "slip" if np.linalg.norm((W @ r + v)[1:]) > 1e-9 else "stick"
+        )
     assert states >= {"slip", "stick"} and ("open" in states) != bilateral
 
 
@@ -60,12 +62,16 @@ def test_it_finds_the_solution_of_the_default_method(scene, request):
 
 @pytest.mark.parametrize("options", [{"mu": 0.0}, {"bilateral": True}, {"mu": 0.1}])
 def test_scenes(options):
-    assert solve(reduce(scenes.flat_punch(2, elements=5, **options)), NSGS(), max_iterations=1000).solved
+    assert solve(
+        reduce(scenes.flat_punch(2, elements=5, **options)), NSGS(), max_iterations=1000
+    ).solved
 
 
 @pytest.mark.parametrize("relaxation", [0.7, 1.4])
 def test_relaxation_changes_the_way_not_the_answer(relaxation, punch):
-    plain, relaxed = (solve(punch, NSGS(w), tol=1e-10, max_iterations=2000) for w in (1.0, relaxation))
+    plain, relaxed = (
+        solve(punch, NSGS(w), tol=1e-10, max_iterations=2000) for w in (1.0, relaxation)
+    )
     assert relaxed.solved and relaxed.iterations != plain.iterations
     assert np.allclose(relaxed.reactions, plain.reactions, atol=1e-7 * plain.reactions.max())
 

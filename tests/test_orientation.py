@@ -17,7 +17,11 @@ SCENES = {
 }
 OBLIQUE = turned.turn_about((1.0, 2.0, -0.5), 67.0)
 MOVES = [
-    *((name, f"{degrees}", turned.turn(degrees)) for name in list(SCENES)[:5] for degrees in (30, 90, 137, 180)),
+    *(
+        (name, f"{degrees}", turned.turn(degrees))
+        for name in list(SCENES)[:5]
+        for degrees in (30, 90, 137, 180)
+    ),
     *((name, "mirrored", turned.mirror(2)) for name in list(SCENES)[:5]),
     ("cube", "oblique", OBLIQUE),
     ("cube", "on its side", turned.turn_about((1.0, 0.0, 0.0), 90.0)),
@@ -40,7 +44,9 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
     # each frame is the image of the other, up to the sense of tangents where the scene was mirrored
     sense = np.einsum("kac,dc,kbd->kab", a.coupling.frames, R, b.coupling.frames[own])
     signs = np.einsum("kaa->ka", sense)
-    assert np.abs(sense - signs[:, :, None] * np.eye(dim)).max() < 1e-9 and np.allclose(np.abs(signs), 1, atol=1e-9)
+    assert np.abs(sense - signs[:, :, None] * np.eye(dim)).max() < 1e-9 and np.allclose(
+        np.abs(signs), 1, atol=1e-9
+    )
     if np.linalg.det(R) > 0:
         assert np.allclose(signs, 1)
     flip, rows = np.sign(signs).ravel(), (dim * own[:, None] + np.arange(dim)).ravel()
@@ -53,35 +59,48 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
     assert np.abs(b.problem.s - columns @ p.s).max() < 1e-9 * np.abs(p.s).max()
     assert np.allclose(b.problem.areas[own], p.areas, rtol=1e-9)
     chart, other = p.chart.places, b.problem.chart.places[:, own]
-    assert b.problem.chart.period == (None if p.chart.period is None else pytest.approx(p.chart.period, rel=1e-9))
+    assert b.problem.chart.period == (
+        None if p.chart.period is None else pytest.approx(p.chart.period, rel=1e-9)
+    )
     if np.linalg.det(R) < 0 and p.chart.period is None:
         chart, other = np.abs(chart), np.abs(other)
     elif np.linalg.det(R) < 0:
-        chart, other = np.minimum(chart, p.chart.period - chart), np.minimum(other, p.chart.period - other)
+        chart, other = (
+            np.minimum(chart, p.chart.period - chart),
+            np.minimum(other, p.chart.period - other),
+        )
     assert np.abs(chart - other).max() < 1e-9 * np.abs(chart).max()
     if np.linalg.det(R) > 0:
-        assert np.array_equal(own, np.arange(k))  # contacts are numbered along the surface, whatever way it lies
+        # contacts are numbered along the surface, whatever way it lies
+        assert np.array_equal(own, np.arange(k))
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.5, 4.0])
 def test_a_pin_in_a_bush_is_coupled_along_the_radius(clearance):
-    """Concentric circles: the gap is the clearance everywhere, every partner lies on the same radius."""
+    """Concentric circles: the gap is the clearance everywhere, every partner lies on the same
+    radius.
+    """
     scene = turned.pin_in_bush(clearance=clearance)
     reduction = reduce_bodies(scene)
     assert np.allclose(reduction.coupling.gap, clearance, rtol=0.02, atol=1e-12)
     x = reduction.coupling.positions
     n = reduction.coupling.frames[:, 0]
-    assert np.all(np.sum(n * x.T, axis=1) < -0.95 * 20)  # outward normal of the bush, towards the pin
+    # outward normal of the bush, towards the pin
+    assert np.all(np.sum(n * x.T, axis=1) < -0.95 * 20)
     period = reduction.coupling.chart.period
     angle = np.sort(np.arctan2(x[1], x[0]))
     chords = 40 * np.sin(np.diff(np.append(angle, angle[0] + 2 * np.pi)) / 2)
     assert period == pytest.approx(chords.sum(), rel=1e-3)
-    # A unit turn of the pin as a rigid whole slides every contact by its radius and opens none: so partners are right.
+    # A unit turn of the pin as a rigid whole slides every contact by its radius and opens none: so
+    # partners are right.
     body = reduction.bodies[0].body
     U = np.zeros(len(body.load))
     U[body.unknowns[0]], U[body.unknowns[1]] = -body.locations[1], body.locations[0]
     u = (reduction.maps[0] @ U).reshape(-1, 2)
-    assert np.allclose(np.abs(u[:, 1]), 20 - clearance, rtol=1e-3) and np.abs(u[:, 0]).max() < 0.05 * 20
+    assert (
+        np.allclose(np.abs(u[:, 1]), 20 - clearance, rtol=1e-3)
+        and np.abs(u[:, 0]).max() < 0.05 * 20
+    )
     assert len(np.unique(np.sign(u[:, 1]))) == 1
 
 

@@ -1,4 +1,6 @@
-"""The page of a result: what is on it is what was computed, it stands alone, and a browser can use it."""
+"""The page of a result: what is on it is what was computed, it stands alone, and a browser can use
+it.
+"""
 
 import base64
 import html
@@ -24,7 +26,11 @@ def decoded(packed):
 
 
 def data_of(file):
-    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', file.read_text(), re.S)[1])
+    return json.loads(
+        re.search(
+            r'<script type="application/json" id="data">(.*?)</script>', file.read_text(), re.S
+        )[1]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -43,15 +49,19 @@ def surface_area(points, cells):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_bodies_on_the_page_are_those_of_the_result(degree, tmp_path):
-    result = run(scenes.flat_punch(3, elements=3 - degree), tmp_path, figures=(), html=True, degree=degree)
+    result = run(
+        scenes.flat_punch(3, elements=3 - degree), tmp_path, figures=(), html=True, degree=degree
+    )
     data = data_of(tmp_path / "view.html")
     for fields in result.fields:
         (body,) = (body for body in data["bodies"] if body["name"] == fields.name)
         points = decoded(body["points"])
         cells = np.concatenate([decoded(body["cells"]), decoded(body["cut_cells"])])
-        assert np.allclose(points, fields.mesh.p.T, rtol=1e-6)  # with those in the middle of edges and those inside
+        # with those in the middle of edges and those inside
+        assert np.allclose(points, fields.mesh.p.T, rtol=1e-6)
         x, y, z = np.ptp(fields.mesh.p, axis=1)
-        assert surface_area(points, cells) == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)  # of the block, once
+        # of the block, once
+        assert surface_area(points, cells) == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)
         assert np.allclose(decoded(body["values"]["von_mises"])[0], fields.von_mises, rtol=1e-5)
         assert np.allclose(decoded(body["move"])[0], fields.displacement.T, rtol=1e-5, atol=1e-9)
         assert decoded(body["values"]["stress_xz"]).shape == (1, len(points))
@@ -68,7 +78,8 @@ def test_the_inside_of_large_bodies_is_left_out(tmp_path, monkeypatch):
         assert np.allclose(np.sort(points, axis=0), np.sort(surface, axis=0), rtol=1e-6)
         assert not decoded(body["inside"]).size
         x, y, z = np.ptp(surface, axis=0)
-        cells = [decoded(body[name]) for name in ("cells", "cut_cells")]  # in the two planes of symmetry the latter
+        # in the two planes of symmetry the latter
+        cells = [decoded(body[name]) for name in ("cells", "cut_cells")]
         assert surface_area(points, cells[0]) == pytest.approx(2 * x * y + y * z + z * x, rel=1e-5)
         assert surface_area(points, cells[1]) == pytest.approx(y * z + z * x, rel=1e-5)
 
@@ -89,7 +100,9 @@ def test_every_state_of_a_path_is_on_the_page(folder):
     names = [part.name for part in path.reduction.scene.parts]
     for number, state in enumerate(path.states):
         r, areas = state.solution.reactions, path.reduction.problem.areas
-        assert np.allclose(decoded(pair["states"]["pressure"])[number], r[:, 0] / areas, rtol=1e-5, atol=1e-9)
+        assert np.allclose(
+            decoded(pair["states"]["pressure"])[number], r[:, 0] / areas, rtol=1e-5, atol=1e-9
+        )
         stick, slip = path.history["stick_nodes"][number], path.history["slip_nodes"][number]
         status = decoded(pair["states"]["status"])[number]
         assert (np.sum(status == 1), np.sum(status == 2)) == (stick, slip)
@@ -99,8 +112,12 @@ def test_every_state_of_a_path_is_on_the_page(folder):
         assert np.allclose(gap, state.displacements[:, 0], atol=1e-9)
         assert np.allclose(slip, np.abs(state.slip[:, 0]), rtol=1e-4, atol=1e-9)
         force = np.einsum("kad,ka->kd", path.reduction.frames, r) / areas[:, None]
-        assert np.allclose(decoded(pair["states"]["vector"])[number, :, :2], force, rtol=1e-4, atol=1e-7)
-        for fields, body in zip(path.fields(number), sorted(data["bodies"], key=lambda b: names.index(b["name"]))):
+        assert np.allclose(
+            decoded(pair["states"]["vector"])[number, :, :2], force, rtol=1e-4, atol=1e-7
+        )
+        for fields, body in zip(
+            path.fields(number), sorted(data["bodies"], key=lambda b: names.index(b["name"]))
+        ):
             assert fields.name == body["name"] and data["moving"]
             for packed, exact in (
                 (body["move"], fields.displacement.T),
@@ -133,7 +150,11 @@ def test_names_reach_the_page_as_text_only(tmp_path):
     hostile = replace(base, name="</script><script>alert(1)</script>", units=("<b>", "<i>"))
     run(hostile, tmp_path, figures=(), html=True)
     text = (tmp_path / "view.html").read_text()
-    assert "<script>alert" not in text and "<b>" not in text and "</script><script>alert(1)" not in text
+    assert (
+        "<script>alert" not in text
+        and "<b>" not in text
+        and "</script><script>alert(1)" not in text
+    )
     assert data_of(tmp_path / "view.html")["units"] == ["<b>", "<i>"]
 
 
@@ -169,7 +190,11 @@ def damaged(data: bytes, way: str, rng: np.random.Generator) -> bytes:
 def test_damaged_results_become_a_page_or_one_sentence(folder, tmp_path, monkeypatch, capfd):
     """Files cut, flipped, swapped, missing, and values of other types, in all three runs."""
     monkeypatch.setattr("contactopt.figures.view_page.write_html", lambda *given: None)
-    rng, refused, ways = np.random.default_rng(2), 0, ("cut", "flipped", "empty", "swapped", "missing", "type")
+    rng, refused, ways = (
+        np.random.default_rng(2),
+        0,
+        ("cut", "flipped", "empty", "swapped", "missing", "type"),
+    )
     for number in range(90):
         run_folder = folder / ("flat", "solid", "path")[number % 3]
         work = tmp_path / str(number)
@@ -200,15 +225,23 @@ def test_without_plotly_a_sentence_says_what_to_install(tmp_path, monkeypatch):
 
 def test_the_certificate_in_words_tells_a_solution_from_an_iterate():
     solved = {"status": "solved", "residual": 1e-12, "message": ""}
-    assert certificate_words(solved).startswith("These forces are a solution. The certificate is 1.0e-12")
+    assert certificate_words(solved).startswith(
+        "These forces are a solution. The certificate is 1.0e-12"
+    )
     stopped = {"status": "stalled", "residual": 1e-3, "message": "it stalled"}
-    assert certificate_words(stopped).startswith("This is not a solution, only the last iterate (it stalled).")
+    assert certificate_words(stopped).startswith(
+        "This is not a solution, only the last iterate (it stalled)."
+    )
 
 
 def test_an_adaptive_run_shows_its_last_mesh_and_the_sizes_of_all(tmp_path):
-    result = run("sphere", tmp_path, accuracy=0.05, quantity="pressure", adaptive=True, figures=(), html=True)
+    result = run(
+        "sphere", tmp_path, accuracy=0.05, quantity="pressure", adaptive=True, figures=(), html=True
+    )
     text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
-    for fields, body in zip(result.fields, sorted(data["bodies"], key=lambda body: body["name"], reverse=True)):
+    for fields, body in zip(
+        result.fields, sorted(data["bodies"], key=lambda body: body["name"], reverse=True)
+    ):
         assert fields.name == body["name"]
         assert len(decoded(body["lines"])) == fields.mesh.nfacets  # every side of a triangle once
     assert ", ".join(str(level.unknowns) for level in result.estimate.levels) in text
@@ -231,7 +264,8 @@ def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width)
         if name == "path":
             words = "document.getElementById('state-words').innerText"
             browser.ask(
-                "const s = document.getElementById('state'); s.focus(); s.value = 0; s.dispatchEvent(new Event('input'))"
+                "const s = document.getElementById('state'); s.focus(); s.value = 0;"
+                " s.dispatchEvent(new Event('input'))"
             )
             assert browser.ask(words).startswith("state 1 of ")
         assert not browser.faults
@@ -245,11 +279,15 @@ def test_bodies_move_with_the_slider_and_solids_are_cut_and_mirrored(folder):
         browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
         last = browser.ask(moved)
         browser.ask(
-            "(() => { const s = document.getElementById('state'); s.value = 0; s.dispatchEvent(new Event('input')); })()"
+            "(() => { const s = document.getElementById('state'); s.value = 0; s.dispatchEvent(new"
+            " Event('input')); })()"
         )
         assert browser.ask(moved) != last and not browser.faults
     drawn = "document.getElementById('view').data.filter((trace) => trace.type === 'mesh3d')"
-    reach = f"JSON.stringify({drawn}.slice(0, 2).map((t) => t.x.reduce((a, v) => [Math.min(a[0], v), Math.max(a[1], v)], [9, -9])))"
+    reach = (
+        f"JSON.stringify({drawn}.slice(0, 2).map((t) => t.x.reduce((a, v) => [Math.min(a[0], v),"
+        " Math.max(a[1], v)], [9, -9])))"
+    )
     with Browser(folder / "solid" / "view.html", 1000) as browser:
         browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
         (low, high), *_ = json.loads(browser.ask(reach))
@@ -259,10 +297,14 @@ def test_bodies_move_with_the_slider_and_solids_are_cut_and_mirrored(folder):
         browser.ask("document.getElementById('whole').click()")
         low, high = (corner[0] for corner in data_of(folder / "solid" / "view.html")["box"])
         browser.ask(
-            "(() => { for (const [id, value, event] of [['cut', '0', 'change'], ['cut-place', '0.5', 'input']])"
-            " { const c = document.getElementById(id); c.value = value; c.dispatchEvent(new Event(event)); } })()"
+            "(() => { for (const [id, value, event] of [['cut', '0', 'change'], ['cut-place',"
+            " '0.5', 'input']]) { const c = document.getElementById(id); c.value = value;"
+            " c.dispatchEvent(new Event(event)); } })()"
         )
-        used = f"(() => {{ const t = {drawn}[0]; return Math.min(...[...t.i].map((n) => t.x[n])); }})()"
+        used = (
+            f"(() => {{ const t = {drawn}[0]; return Math.min(...[...t.i].map((n) => t.x[n]));"
+            " })()"
+        )
         assert browser.ask(used) >= (low + high) / 2 - 1e-3 * (high - low)
         assert "from x = " in browser.ask("document.getElementById('cut-words').innerText")
         assert not browser.faults

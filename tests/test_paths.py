@@ -26,7 +26,12 @@ def dragged(shift: float, force: float = 3.0, mu: float = 0.4) -> Scene:
     """A block pressed on a rigid floor by a plate, its top dragged sideways by a support."""
     mesh = block("plane-strain", 0, 1)
     part = Part(
-        "block", mesh, MATERIAL, (Support("top", {"x": shift}),), (Plate("top", {"y": -force}, glued=False),), "bottom"
+        "block",
+        mesh,
+        MATERIAL,
+        (Support("top", {"x": shift}),),
+        (Plate("top", {"y": -force}, glued=False),),
+        "bottom",
     )
     return Scene("dragged", part, Rigid("floor"), mu)
 
@@ -44,14 +49,19 @@ def test_a_path_of_one_state_is_the_static_problem():
     scene = scenes.flat_punch(2, elements=6)
     path = follow([scene])
     alone = solve(reduce(scene))
-    np.testing.assert_allclose(path.solution.reactions, alone.reactions, atol=1e-8 * np.abs(alone.reactions).max())
+    np.testing.assert_allclose(
+        path.solution.reactions, alone.reactions, atol=1e-8 * np.abs(alone.reactions).max()
+    )
     assert path.solved and len(path.states) == 1
 
 
 def test_every_step_is_certified_by_its_own_problem(cycle):
     for step, state in enumerate(cycle.states):
         solution = state.solution
-        assert natural_map_residual(cycle.problem(step), solution.reactions, solution.multipliers) <= 1e-8
+        assert (
+            natural_map_residual(cycle.problem(step), solution.reactions, solution.multipliers)
+            <= 1e-8
+        )
     assert cycle.reduction.problem.fingerprint == cycle.problem(-1).fingerprint
 
 
@@ -65,7 +75,8 @@ def test_slip_that_never_turns_back_needs_no_path(cycle):
 def test_unloading_needs_the_path(cycle):
     back = cycle.states[6]
     assert abs(cycle.history["shear_force"][6]) < 1e-6
-    assert np.abs(back.solution.reactions[:, 1]).sum() > 5.0  # locked in; a single step from zero has none
+    # locked in; a single step from zero has none
+    assert np.abs(back.solution.reactions[:, 1]).sum() > 5.0
     once = solve(reduce(back.scene)).reactions
     assert np.abs(once[:, 1]).sum() < 0.2
 
@@ -92,9 +103,13 @@ def loads(kind: str):
     base = two_blocks(kind, mu=0.02)
     pull = (0.3, -0.2) if kind != "solid" else (0.3, 0.1, -0.2)
     for share in (0.4, 1.0, 0.7):
-        upper = replace(base.upper, loads=(*base.upper.loads, Traction("side0", tuple(share * t for t in pull))))
+        upper = replace(
+            base.upper, loads=(*base.upper.loads, Traction("side0", tuple(share * t for t in pull)))
+        )
         upper = replace(upper, supports=upper.supports[1:] if kind == "solid" else ())
-        lower = replace(base.lower, supports=(Support("bottom", dict.fromkeys(base.components, 0.01 * share)),))
+        lower = replace(
+            base.lower, supports=(Support("bottom", dict.fromkeys(base.components, 0.01 * share)),)
+        )
         yield replace(base, upper=upper, lower=lower)
 
 
@@ -103,7 +118,12 @@ def test_energy_balance_of_general_loads(kind):
     states = list(loads(kind))
     if kind != "axisymmetric":  # held against sliding away and turning by the glued plate
         states = [
-            replace(s, upper=replace(s.upper, loads=(replace(s.upper.loads[0], glued=True), s.upper.loads[1])))
+            replace(
+                s,
+                upper=replace(
+                    s.upper, loads=(replace(s.upper.loads[0], glued=True), s.upper.loads[1])
+                ),
+            )
             for s in states
         ]
     path = follow(states, tol=1e-10)
@@ -115,7 +135,9 @@ def test_energy_balance_of_general_loads(kind):
 
 
 def test_energy_balance_from_the_interface_alone(cycle):
-    """s' dlambda - r' dq = d(r' Q r / 2) + D with mean forces: the interface's share of the same balance."""
+    """s' dlambda - r' dq = d(r' Q r / 2) + D with mean forces: the interface's share of the same
+    balance.
+    """
     problem = cycle.reduction.problem
     for old, new in zip(cycle.states[:-1], cycle.states[1:]):
         r0, r1 = (state.solution.reactions.ravel() for state in (old, new))
@@ -129,20 +151,28 @@ def test_gross_sliding_saturates_at_the_friction_bound():
     path = follow([dragged(d) for d in shifts])
     h = path.history
     assert path.solved
-    assert h["shear_force"][3] == pytest.approx(1.2, rel=1e-9) and h["shear_force"][6] == pytest.approx(-1.2, rel=1e-9)
-    assert h["friction_work"][3] - h["friction_work"][2] == pytest.approx(1.2 * 2.0, rel=1e-8)  # mu N times the way
+    assert h["shear_force"][3] == pytest.approx(1.2, rel=1e-9) and h["shear_force"][
+        6
+    ] == pytest.approx(-1.2, rel=1e-9)
+    # mu N times the way
+    assert h["friction_work"][3] - h["friction_work"][2] == pytest.approx(1.2 * 2.0, rel=1e-8)
     assert h["stick_nodes"][3] == 0 and h["slip_nodes"][3] == h["contact_nodes"][3] > 2
     np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
     np.testing.assert_allclose(h["shift"], shifts, atol=1e-12)
 
 
 def test_a_mirrored_load_gives_the_mirrored_history():
-    right, left = (follow([dragged(s * d) for d in (0.1, 0.3, 0.2)], tol=1e-12).history for s in (1, -1))
-    # the block's mesh is not symmetric, so that only the whole scene's mirror image would agree exactly
+    right, left = (
+        follow([dragged(s * d) for d in (0.1, 0.3, 0.2)], tol=1e-12).history for s in (1, -1)
+    )
+    # the block's mesh is not symmetric, so that only the whole scene's mirror image would agree
+    # exactly
     assert np.sign(left["shear_force"]).tolist() == (-np.sign(right["shear_force"])).tolist()
     flipped = follow([_mirror(dragged(-d)) for d in (0.1, 0.3, 0.2)], tol=1e-12).history
     np.testing.assert_allclose(flipped["shear_force"], -right["shear_force"], rtol=1e-8)
-    np.testing.assert_allclose(flipped["friction_work"], right["friction_work"], rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(
+        flipped["friction_work"], right["friction_work"], rtol=1e-8, atol=1e-12
+    )
 
 
 def _mirror(scene: Scene) -> Scene:
@@ -163,11 +193,15 @@ def test_units_do_not_matter():
 
 @pytest.mark.parametrize("simplices", [False, True])
 def test_quadratic_elements_follow_the_same_path(cycle, simplices):
-    states = scenes.make_path("cattaneo-2d", degree=2, simplices=simplices, steps=3, elements=10, shear=30.0)
+    states = scenes.make_path(
+        "cattaneo-2d", degree=2, simplices=simplices, steps=3, elements=10, shear=30.0
+    )
     h = follow(states).history
     np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
     for name in ("shear_force", "shift", "friction_work"):
-        np.testing.assert_allclose(h[name], cycle.history[name], atol=0.05 * np.abs(cycle.history[name]).max())
+        np.testing.assert_allclose(
+            h[name], cycle.history[name], atol=0.05 * np.abs(cycle.history[name]).max()
+        )
 
 
 def test_growing_contact_of_dissimilar_bodies():
@@ -179,7 +213,8 @@ def test_growing_contact_of_dissimilar_bodies():
     path = h["stick_half_width"][-1] / h["contact_half_width"][-1]
     once = follow(states[-1:]).history
     assert path == pytest.approx(ratio, abs=0.05)
-    assert once["stick_half_width"][-1] / once["contact_half_width"][-1] < ratio - 0.3  # one big step is wrong
+    # one big step is wrong
+    assert once["stick_half_width"][-1] / once["contact_half_width"][-1] < ratio - 0.3
     np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
 
 
@@ -203,12 +238,18 @@ def test_files_of_a_path(cycle, tmp_path):
     for name, column in cycle.history.items():
         np.testing.assert_allclose(table[name], column)
     data = np.load(tmp_path / "new" / "path.npz")
-    assert data["reactions"].shape == data["displacements"].shape == (16, cycle.reduction.problem.contacts, 2)
+    assert (
+        data["reactions"].shape
+        == data["displacements"].shape
+        == (16, cycle.reduction.problem.contacts, 2)
+    )
 
 
 def test_run_follows_the_path_of_a_named_scene(tmp_path):
     result = run("cattaneo-2d", tmp_path, steps=2, elements=8, shear=20.0)
-    assert {"history.csv", "path.npz", "path.png", "summary.json"} <= {p.name for p in tmp_path.iterdir()}
+    assert {"history.csv", "path.npz", "path.png", "summary.json"} <= {
+        p.name for p in tmp_path.iterdir()
+    }
     assert result.summary["states"] == len(result.path.states) == 11
     assert result.summary["shear_force"] == pytest.approx(20.0)
     assert result.summary["friction_work"] == result.path.history["friction_work"][-1] > 0

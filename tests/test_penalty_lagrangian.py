@@ -10,16 +10,24 @@ from contactopt.methods.penalty import Penalty
 from contactopt.problem import dimensionless, natural_map_residual
 from contactopt.problem.cones import coulomb_cone_derivative, cylinder_derivative, disc_derivative
 
-EXACT = {"lagrangian": Lagrangian(), "augmented": AugmentedLagrangian(), "uzawa": AugmentedLagrangian(explicit=True)}
+EXACT = {
+    "lagrangian": Lagrangian(),
+    "augmented": AugmentedLagrangian(),
+    "uzawa": AugmentedLagrangian(explicit=True),
+}
 
 
 def test_penetration_is_force_over_stiffness():
-    """One node held against a force of 1 with compliance 1: (1 + 1 / factor) r = 1, penetration r / factor."""
+    """One node held against a force of 1 with compliance 1: (1 + 1 / factor) r = 1, penetration r /
+    factor.
+    """
     problem = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3)
     for factor in (10.0, 1e3):
         r = solve(problem, Penalty(factor)).reactions
         assert r[0, 0] == pytest.approx(1 / (1 + 1 / factor), rel=1e-9)
-        assert problem.displacements(r, np.zeros(0))[0, 0] == pytest.approx(-r[0, 0] / factor, rel=1e-8)
+        assert problem.displacements(r, np.zeros(0))[0, 0] == pytest.approx(
+            -r[0, 0] / factor, rel=1e-8
+        )
 
 
 @pytest.mark.parametrize("scene", ["punch", "cube"])
@@ -104,13 +112,15 @@ def dragged(mu: float, k: int = 6) -> InterfaceProblem:
 def test_the_cycle_of_the_alternation_is_not_hidden_and_relaxation_breaks_it():
     problem = one_contact((-10.0, 1.0), 1.0)
     assert solve(problem, Lagrangian(), max_iterations=2000).status.label == "cycling"
-    assert solve(problem, Lagrangian(relaxation=0.5)).reactions[0] == pytest.approx([6.4, -6.4], abs=1e-6)
+    assert solve(problem, Lagrangian(relaxation=0.5)).reactions[0] == pytest.approx(
+        [6.4, -6.4], abs=1e-6
+    )
 
 
 def test_multipliers_do_not_cycle_there():
-    assert solve(one_contact((-10.0, 1.0), 1.0), AugmentedLagrangian()).reactions[0] == pytest.approx(
-        [6.4, -6.4], abs=1e-6
-    )
+    assert solve(one_contact((-10.0, 1.0), 1.0), AugmentedLagrangian()).reactions[
+        0
+    ] == pytest.approx([6.4, -6.4], abs=1e-6)
 
 
 def test_the_error_of_multipliers_falls_by_one_plus_rho_times_the_eigenvalue():
@@ -165,4 +175,6 @@ def test_answers_do_not_depend_on_units(punch):
     for method in (*EXACT.values(), Penalty(1e5)):
         a, b = (solve(p, method, max_iterations=3000) for p in (punch, units))
         assert np.allclose(b.reactions / 1e3, a.reactions, atol=1e-8 * np.abs(a.reactions).max())
-        assert natural_map_residual(units, b.reactions, b.multipliers) == pytest.approx(a.residual, rel=1e-2)
+        assert natural_map_residual(units, b.reactions, b.multipliers) == pytest.approx(
+            a.residual, rel=1e-2
+        )

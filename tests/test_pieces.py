@@ -1,10 +1,20 @@
-"""What is drawn of finite elements covers the body once, with all of its nodes, for every kind of element."""
+"""What is drawn of finite elements covers the body once, with all of its nodes, for every kind of
+element.
+"""
 
 import numpy as np
 import pytest
 import skfem
 
-from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, sharp_edges, solids, surface
+from contactopt.figures.pieces import (
+    mesh_lines,
+    outline,
+    pieces,
+    segments,
+    sharp_edges,
+    solids,
+    surface,
+)
 from contactopt.meshes.cells import elements_of
 
 TICKS = np.linspace(0, 1, 4)
@@ -19,7 +29,9 @@ def unit(pair, degree):
 
 
 def length(points, lines):
-    return np.linalg.norm(points[segments(lines)[:, 1]] - points[segments(lines)[:, 0]], axis=1).sum()
+    return np.linalg.norm(
+        points[segments(lines)[:, 1]] - points[segments(lines)[:, 0]], axis=1
+    ).sum()
 
 
 def area(points, flat):

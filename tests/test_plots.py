@@ -39,7 +39,10 @@ def test_the_pressure_curve_is_the_pressure():
 
 def test_a_rigid_punch_is_drawn_with_its_exact_curve():
     result = run(scenes.flat_punch(2, elements=6, rigid="punch"))
-    labels = [line.get_label() for line in plots.pressure(result.scene, result.problem, result.solution).lines]
+    labels = [
+        line.get_label()
+        for line in plots.pressure(result.scene, result.problem, result.solution).lines
+    ]
     assert any("rigid punch" in label for label in labels)
     plain = run("punch-2d", elements=6)
     assert len(plots.pressure(plain.scene, plain.problem, plain.solution).lines) == 1
@@ -48,18 +51,25 @@ def test_a_rigid_punch_is_drawn_with_its_exact_curve():
 def test_triangles_and_convergence_are_drawn():
     base = two_blocks("plane-strain", mu=0.3)
     up = base.upper.mesh.to_meshtri()
-    up = up.with_boundaries({"top": lambda x: x[1] == 1, "bottom": lambda x: x[1] == 0, "side0": lambda x: x[0] == 0})
+    up = up.with_boundaries(
+        {"top": lambda x: x[1] == 1, "bottom": lambda x: x[1] == 0, "side0": lambda x: x[0] == 0}
+    )
     scene = replace(base, upper=replace(base.upper, mesh=up))
     result = run(scene)
     assert plots.deformed(scene, result.problem, result.fields).collections
-    ax = plots.convergence({"one": result.solution, "two": solve(reduce_bodies(scene).problem, tol=1e-4)})
+    ax = plots.convergence(
+        {"one": result.solution, "two": solve(reduce_bodies(scene).problem, tol=1e-4)}
+    )
     assert len(ax.lines) == 2 and ax.get_yscale() == "log"
 
 
 def test_nearer_bodies_hide_those_behind_them_in_every_pixel():
-    """Two triangles that pierce each other, and a small one before a large one whose middle is nearer to the eye."""
+    """Two triangles that pierce each other, and a small one before a large one whose middle is
+    nearer to the eye.
+    """
     big = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 40.0, 0.0]])
-    tilted = big + np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])  # nearer beyond half of its width
+    # nearer beyond half of its width
+    tilted = big + np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     owner = nearest(np.stack([big, tilted]), (40, 40))
     y, x = np.nonzero(owner >= 0)
     assert abs(len(x) - 800) <= 40 and np.all(x + y + 1 <= 40)
@@ -78,7 +88,11 @@ def test_the_picture_of_a_solid_has_its_colours_and_its_outline():
     cells = np.array([[0, 1, 2], [0, 2, 3]])
     lined = np.array([[True, False, True], [True, True, False]])  # its sides, not its diagonal
     image, (left, right, bottom, top) = picture(
-        corners[cells], corners[cells][..., 0], lined, lambda v: np.stack([v, v, v, np.ones_like(v)], axis=1), 102
+        corners[cells],
+        corners[cells][..., 0],
+        lined,
+        lambda v: np.stack([v, v, v, np.ones_like(v)], axis=1),
+        102,
     )
     assert image.shape[:2] == (102, 102) and np.all(image[[0, -1]] == 0)
     inner = image[3:-3, 3:-3, 0]

@@ -1,4 +1,6 @@
-"""Adding a plug-in costs one file and one line: each example of the page is added to a copy of the package and used by its name."""
+"""Adding a plug-in costs one file and one line: each example of the page is added to a copy of the
+package and used by its name.
+"""
 
 import re
 import shutil
@@ -37,7 +39,9 @@ KINDS = {
     "method": Kind("A method", "run punch-2d --mu 0.2 --elements 4 --tol 1e-3 --method projection"),
     "law": Kind("A law"),
     "coupling": Kind("A coupling", listed=False),
-    "preconditioner": Kind("A preconditioner", "run punch-2d --elements 8 --q implicit --preconditioner fourier"),
+    "preconditioner": Kind(
+        "A preconditioner", "run punch-2d --elements 8 --q implicit --preconditioner fourier"
+    ),
     "backend": Kind("A backend", files=0),
     "body solver": Kind("A body solver", "run punch-2d --elements 4 --solver dense"),
 }
@@ -55,7 +59,9 @@ def insert(text: str, at: int, lines: str) -> str:
 
 
 def add(kind: Kind, package: Path) -> tuple[list[Path], dict[Path, int]]:
-    """Add the plug-in to the package as its section says; the files that are new, and lines added to the others."""
+    """Add the plug-in to the package as its section says; the files that are new, and lines added
+    to the others.
+    """
     new, changed = [], {}
     for head, code in blocks(kind.section).items():
         where = re.search(r"(contactopt/\S+\.py)$", head)
@@ -83,16 +89,26 @@ def test_it_costs_one_file_and_one_line_and_is_used_by_its_name(name, tmp_path):
     shutil.copytree(ROOT / "contactopt", package, ignore=shutil.ignore_patterns("__pycache__"))
     new, changed = add(kind, package)
     assert len(new) == kind.files and list(changed.values()) == [kind.lines]
-    entry = re.search(r'"([\w-]+)"', next(code for head, code in blocks(kind.section).items() if head[:3] == "in "))[1]
+    entry = re.search(
+        r'"([\w-]+)"',
+        next(code for head, code in blocks(kind.section).items() if head[:3] == "in "),
+    )[1]
 
-    trial = "import contactopt, sys\nassert contactopt.__file__.startswith(sys.argv[1]), contactopt.__file__\n"
+    trial = (
+        "import contactopt, sys\nassert contactopt.__file__.startswith(sys.argv[1]),"
+        " contactopt.__file__\n"
+    )
     trial += blocks(kind.section)["try it"]
     trial += "\nfrom contactopt.cli import main\nassert main(['list']) == 0\n"
     if kind.command:
         assert entry in kind.command.split()
         trial += f"assert main({[*kind.command.split(), '--out', str(tmp_path / 'out')]!r}) == 0\n"
     done = subprocess.run(
-        [sys.executable, "-c", trial, str(tmp_path)], cwd=tmp_path, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", trial, str(tmp_path)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     if kind.listed:

@@ -15,14 +15,20 @@ from contactopt.methods.preconditioners import (
     selection,
     smooth_motions,
 )
-from contactopt.methods.preconditioners.circulant import extended, inverse_of_extended, norm, seminorm
+from contactopt.methods.preconditioners.circulant import (
+    extended,
+    inverse_of_extended,
+    norm,
+    seminorm,
+)
 from contactopt.methods.preconditioners.grid import Grid
 from contactopt.problem.chart import Chart
 from experiments.questions.preconditioners import blocks, condition, solids
 
 SIZES = (17, 33, 65)  # contacts
 
-ON_GRIDS = [name for name in PRECONDITIONERS if name != "laplacian"]  # tests/test_surface_laplacian.py has the other
+# tests/test_surface_laplacian.py has the other
+ON_GRIDS = [name for name in PRECONDITIONERS if name != "laplacian"]
 
 
 def normal_block(problem: InterfaceProblem, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -32,7 +38,9 @@ def normal_block(problem: InterfaceProblem, name: str) -> tuple[np.ndarray, np.n
 
 @pytest.mark.parametrize("k", SIZES)
 def test_condition_numbers_of_the_papers_preconditioners(k):
-    """Against the matrices of eqs (25) and (26) written down densely; both improve on Q, more so the more contacts."""
+    """Against the matrices of eqs (25) and (26) written down densely; both improve on Q, more so
+    the more contacts.
+    """
     problem, m = blocks(k, 5.0, 5.0, 0.3), int(2 ** np.ceil(np.log2(k)))
     Q = problem.Q[::2, ::2]
     first = la.circulant(seminorm(m))[:k, :k]
@@ -75,7 +83,9 @@ def test_circulants_are_those_of_the_paper(m):
     assert np.count_nonzero(column) == 2 * int(np.log2(m)) + 1
     assert column[1] == -1.0 and column[3] == pytest.approx(-(1 / 4 + 1 / 9))
     assert np.all(np.fft.fft(column).real >= -1e-12)
-    assert np.allclose(np.fft.fft(norm(m, 0.5)).real, 0.5 + 4 * (1 - np.cos(np.pi * np.arange(2 * m) / m)))
+    assert np.allclose(
+        np.fft.fft(norm(m, 0.5)).real, 0.5 + 4 * (1 - np.cos(np.pi * np.arange(2 * m) / m))
+    )
 
 
 @pytest.mark.parametrize("k", [5, 16, 33])
@@ -103,7 +113,9 @@ def test_they_are_symmetric_positive_definite_and_blind_to_order_and_units(name)
         areas=1e6 * problem.areas[order],
         coordinates=1e3 * problem.coordinates[:, order],
     )
-    assert np.allclose(preconditioner(mixed, name) @ np.eye(34), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max())
+    assert np.allclose(
+        preconditioner(mixed, name) @ np.eye(34), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max()
+    )
 
 
 def test_deflation_is_exact_on_the_deflated_motions():
@@ -114,7 +126,9 @@ def test_deflation_is_exact_on_the_deflated_motions():
 
 
 def test_bad_input():
-    with pytest.raises(InputError, match="unknown preconditioner 'ilu'; choose from p21, p22, neumann"):
+    with pytest.raises(
+        InputError, match="unknown preconditioner 'ilu'; choose from p21, p22, neumann"
+    ):
         preconditioner(blocks(17, 5.0, 5.0, 0.3), "ilu")
     short = InterfaceProblem(np.eye(4), np.zeros((2, 2)), 0.1)
     ragged = InterfaceProblem(
@@ -171,7 +185,9 @@ def test_components_held_at_a_plane_of_symmetry_get_sine_transforms():
 
 
 def around(k: int, uneven: float = 0.0) -> InterfaceProblem:
-    """The logarithmic kernel of k nodes on a closed line of length 2 pi, normal and tangential alike."""
+    """The logarithmic kernel of k nodes on a closed line of length 2 pi, normal and tangential
+    alike.
+    """
     angle = 2 * np.pi * np.arange(k) / k
     angle = angle + uneven * np.sin(angle)
     apart = np.abs(2 * np.sin((angle[:, None] - angle) / 2))
@@ -192,7 +208,9 @@ def test_on_a_closed_line_condition_numbers_hardly_grow(name, bound, k):
     assert np.allclose(dense, dense.T, atol=1e-10 * np.abs(dense).max())
     assert condition(deflated(P, problem.Q, smooth_motions(problem)), problem.Q) < bound
     if P.model is not None:
-        assert np.allclose(P.model @ (P @ problem.Q[0]), problem.Q[0], atol=1e-9 * np.abs(problem.Q[0]).max())
+        assert np.allclose(
+            P.model @ (P @ problem.Q[0]), problem.Q[0], atol=1e-9 * np.abs(problem.Q[0]).max()
+        )
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)
@@ -209,7 +227,9 @@ def test_a_closed_line_may_be_numbered_from_anywhere(name):
         chart=Chart(place[None], (False,), 2 * np.pi),
     )
     P = preconditioner(problem, name) @ np.eye(66)
-    assert np.allclose(preconditioner(mixed, name) @ np.eye(66), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max())
+    assert np.allclose(
+        preconditioner(mixed, name) @ np.eye(66), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max()
+    )
 
 
 @pytest.mark.parametrize("degrees", [20.0, 90.0, 200.0])
@@ -223,11 +243,17 @@ def test_a_grid_may_lie_at_any_angle_in_its_chart(name, degrees):
     moved = replace(problem, Q=(Q + Q.T) / 2, chart=Chart(R @ problem.chart.places, (False, False)))
     P = preconditioner(problem, name) @ np.eye(len(Q))
     expected = turn @ P @ turn.T
-    assert np.allclose(preconditioner(moved, name) @ np.eye(len(Q)), expected, atol=1e-8 * np.abs(P).max())
+    assert np.allclose(
+        preconditioner(moved, name) @ np.eye(len(Q)), expected, atol=1e-8 * np.abs(P).max()
+    )
 
 
 def test_going_on_without_a_preconditioner_is_said(caplog):
-    ragged = InterfaceProblem(np.eye(9), np.zeros((3, 3)), 0.1, coordinates=np.array([[0.0, 1, 2], [0, 1, 3]]))
+    ragged = InterfaceProblem(
+        np.eye(9), np.zeros((3, 3)), 0.1, coordinates=np.array([[0.0, 1, 2], [0, 1, 3]])
+    )
     with caplog.at_level("INFO", logger="contactopt"):
         P = model_of(ragged)
-    assert "no preconditioner fits these contacts" in caplog.text and np.array_equal(P @ np.arange(9.0), np.arange(9.0))
+    assert "no preconditioner fits these contacts" in caplog.text and np.array_equal(
+        P @ np.arange(9.0), np.arange(9.0)
+    )

@@ -2,7 +2,15 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, siconos_residual, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    natural_map_residual,
+    reduce,
+    scenes,
+    siconos_residual,
+    solve,
+)
 from contactopt.problem import balance_residual, dimensionless, fit_multipliers
 from contactopt.problem.laws.bilateral import Bilateral
 
@@ -45,10 +53,17 @@ def test_rho_one_is_the_published_formula():
 @pytest.mark.parametrize("force,length", [(1e6, 1e-3), (1e-9, 1e3), (1.0, 1e-9)])
 def test_certificate_and_scaling_do_not_depend_on_units(punch, force, length):
     units = InterfaceProblem(
-        punch.Q * length / force, punch.q * length, punch.mu, punch.V, punch.s * force, areas=punch.areas
+        punch.Q * length / force,
+        punch.q * length,
+        punch.mu,
+        punch.V,
+        punch.s * force,
+        areas=punch.areas,
     )
     r = np.abs(np.random.default_rng(0).normal(size=punch.q.shape))
-    assert natural_map_residual(units, r * force) == pytest.approx(natural_map_residual(punch, r), rel=1e-6)
+    assert natural_map_residual(units, r * force) == pytest.approx(
+        natural_map_residual(punch, r), rel=1e-6
+    )
     a, b = dimensionless(units)[0], dimensionless(punch)[0]
     assert np.allclose(a.Q, b.Q, rtol=1e-12, atol=0) and np.allclose(a.s, b.s, rtol=1e-12)
     ours, base = solve(units, tol=1e-10), solve(punch, tol=1e-10)

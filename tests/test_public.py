@@ -14,7 +14,8 @@ from contactopt.coupling.coupling import COUPLINGS
 from contactopt.methods import METHODS
 from contactopt.methods.preconditioners import PRECONDITIONERS
 
-# homes of what `contactopt` exports, the modules it exports, and those that its documentation sends readers to
+# homes of what `contactopt` exports, the modules it exports, and those that its documentation sends
+# readers to
 EXPORTED = [getattr(contactopt, name) for name in contactopt.__all__]
 MODULES = sorted(
     {thing.__name__ if inspect.ismodule(thing) else thing.__module__ for thing in EXPORTED}
@@ -32,7 +33,11 @@ def defined_in(module: Any) -> Iterator[tuple[str, Any]]:
     for name, thing in vars(module).items():
         home = getattr(thing, "__module__", "") or ""
         inside = home == module.__name__ or home.startswith(f"{module.__name__}.")
-        if not name.startswith("_") and inside and (inspect.isclass(thing) or inspect.isfunction(thing)):
+        if (
+            not name.startswith("_")
+            and inside
+            and (inspect.isclass(thing) or inspect.isfunction(thing))
+        ):
             yield name, thing
 
 
@@ -51,14 +56,18 @@ SYMBOLS = symbols()
 
 
 def functions(thing: Any) -> Iterator[Any]:
-    """The function itself, or the public methods and properties and the constructor that a class defines."""
+    """The function itself, or the public methods and properties and the constructor that a class
+    defines.
+    """
     if inspect.isfunction(thing):
         yield thing
     elif inspect.isclass(thing):
         for name, member in vars(thing).items():
             member = getattr(member, "fget", None) or getattr(member, "func", None) or member
             member = getattr(member, "__func__", member)
-            ours = inspect.isfunction(member) and member.__code__.co_filename == inspect.getsourcefile(thing)
+            ours = inspect.isfunction(
+                member
+            ) and member.__code__.co_filename == inspect.getsourcefile(thing)
             if ours and (name == "__init__" or not name.startswith("_")):
                 yield member
 
@@ -74,7 +83,9 @@ def test_it_has_a_docstring_of_its_own(name):
     thing = SYMBOLS[name]
     doc = (vars(thing).get("__doc__") if inspect.isclass(thing) else thing.__doc__) or ""
     assert len(doc.split()) >= 2, f"{name} has no docstring"
-    assert not doc.startswith(f"{name.rsplit('.', 1)[-1]}("), f"{name} has only the docstring that dataclasses make"
+    assert not doc.startswith(f"{name.rsplit('.', 1)[-1]}("), (
+        f"{name} has only the docstring that dataclasses make"
+    )
 
 
 @pytest.mark.parametrize("name", SYMBOLS)
@@ -82,7 +93,9 @@ def test_it_is_fully_annotated(name):
     for function in functions(SYMBOLS[name]):
         signature = inspect.signature(function)
         bare = [
-            p.name for p in signature.parameters.values() if p.annotation is p.empty and p.name not in ("self", "cls")
+            p.name
+            for p in signature.parameters.values()
+            if p.annotation is p.empty and p.name not in ("self", "cls")
         ]
         assert not bare, f"{function.__qualname__}: no annotation of {', '.join(bare)}"
         told = signature.return_annotation is not signature.empty or function.__name__ == "__init__"
@@ -90,19 +103,35 @@ def test_it_is_fully_annotated(name):
 
 
 def table_functions() -> dict[str, Any]:
-    """The exported functions, those of the tables of plug-ins, the named scenes, exact solutions and programs."""
+    """The exported functions, those of the tables of plug-ins, the named scenes, exact solutions
+    and programs.
+    """
     found = {name: getattr(contactopt, name) for name in contactopt.__all__}
     found |= {"make_scene": contactopt.scenes.make_scene, "make_path": contactopt.scenes.make_path}
     for table in (PRECONDITIONERS, COUPLINGS):
-        found |= {name: getattr(importlib.import_module(row[0]), row[1]) for name, row in table.items()}
+        found |= {
+            name: getattr(importlib.import_module(row[0]), row[1]) for name, row in table.items()
+        }
     scenes = contactopt.scenes
     rows = [*scenes.SCENES.values(), *scenes.PATHS.values()]
-    found |= {row[1]: getattr(importlib.import_module(f"contactopt.scenes.{row[0]}"), row[1]) for row in rows}
-    found |= {f"analytic.{name}": getattr(contactopt.analytic, name) for name in contactopt.analytic.__all__}
-    models = {
-        name: thing for name, thing in vars(contactopt.models).items() if inspect.isfunction(thing) and name[0] != "_"
+    found |= {
+        row[1]: getattr(importlib.import_module(f"contactopt.scenes.{row[0]}"), row[1])
+        for row in rows
     }
-    found |= {f"models.{name}": thing for name, thing in models.items() if thing.__module__ == "contactopt.models"}
+    found |= {
+        f"analytic.{name}": getattr(contactopt.analytic, name)
+        for name in contactopt.analytic.__all__
+    }
+    models = {
+        name: thing
+        for name, thing in vars(contactopt.models).items()
+        if inspect.isfunction(thing) and name[0] != "_"
+    }
+    found |= {
+        f"models.{name}": thing
+        for name, thing in models.items()
+        if thing.__module__ == "contactopt.models"
+    }
     return {name: thing for name, thing in found.items() if inspect.isfunction(thing)}
 
 
@@ -116,7 +145,9 @@ def section(function: Any, title: str) -> str:
     if not at:
         return ""
     rest = lines[at[0] + 2 :]
-    stop = next((i for i in range(len(rest) - 1) if rest[i + 1] and set(rest[i + 1]) == {"-"}), len(rest))
+    stop = next(
+        (i for i in range(len(rest) - 1) if rest[i + 1] and set(rest[i + 1]) == {"-"}), len(rest)
+    )
     return "\n".join(rest[:stop])
 
 
@@ -133,7 +164,15 @@ def test_a_function_tells_of_every_argument_and_of_what_it_returns(name):
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_errors_that_an_exported_function_raises_are_documented(name):
     function = FUNCTIONS[name]
-    calls = [node.exc for node in ast.walk(ast.parse(inspect.getsource(function))) if isinstance(node, ast.Raise)]
+    calls = [
+        node.exc
+        for node in ast.walk(ast.parse(inspect.getsource(function)))
+        if isinstance(node, ast.Raise)
+    ]
     told = section(function, "Raises") + function.__doc__.partition("Raises ")[2]
-    for raised in {call.func.id for call in calls if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)}:
+    for raised in {
+        call.func.id
+        for call in calls
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
+    }:
         assert raised in told, f"{name} raises {raised} and does not say when"

@@ -1,4 +1,6 @@
-"""Bodies on ranks of their own: the same answers to the last digit, few and short messages, and no rank left alone."""
+"""Bodies on ranks of their own: the same answers to the last digit, few and short messages, and no
+rank left alone.
+"""
 
 import json
 import os
@@ -121,7 +123,9 @@ def found(tmp_path_factory):
     script = tmp_path_factory.mktemp("ranks") / "comparison.py"
     script.write_text(COMPARISON)
     command = [*mpiexec(3), sys.executable, str(script)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, env=environment(), cwd=ROOT)
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=PATIENCE, env=environment(), cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -135,7 +139,10 @@ CASES = (
 def test_answers_steps_and_certificates_are_those_of_one_process(found, case):
     result = found[case]
     assert result["same"] and result["stress"] == 0.0 and result["messages"] > 0
-    assert result["steps"][0] == result["steps"][1] and result["residuals"][0] == result["residuals"][1] <= 1e-8
+    assert (
+        result["steps"][0] == result["steps"][1]
+        and result["residuals"][0] == result["residuals"][1] <= 1e-8
+    )
 
 
 def test_energies_of_a_load_path_are_those_of_one_process(found):
@@ -147,7 +154,11 @@ def test_refinement_is_that_of_one_process(found, quantity):
     one, many = found[f"adaptive {quantity}"]
     assert one == many and len(one) > 1
     errors = found[f"errors {quantity}"]  # none where no mesh bounds the quantity
-    assert errors[0] == errors[1] if errors[0] is None else errors[1] == pytest.approx(errors[0], rel=1e-12)
+    assert (
+        errors[0] == errors[1]
+        if errors[0] is None
+        else errors[1] == pytest.approx(errors[0], rel=1e-12)
+    )
 
 
 @pytest.mark.parametrize("scene", ["punch-2d", "cattaneo-2d"])
@@ -163,10 +174,13 @@ def test_a_body_elsewhere_has_every_member_of_a_body():
 
 
 def test_messages_do_not_grow_with_the_unknowns_of_the_bodies(found):
-    """One product with Q is one order to the other body and its reply, whatever lies inside of the body."""
+    """One product with Q is one order to the other body and its reply, whatever lies inside of the
+    body.
+    """
     (messages, data, unknowns), (others, more, larger) = found["traffic"]
     assert messages == others == 2 and larger > 1.3 * unknowns
-    assert abs(data - more) < 16 and data < 1500  # two vectors of 34 numbers, and what the order says
+    # two vectors of 34 numbers, and what the order says
+    assert abs(data - more) < 16 and data < 1500
 
 
 def test_what_a_rank_raises_is_raised_on_rank_0(found):
@@ -178,14 +192,19 @@ def test_a_result_whose_ranks_were_dismissed_says_so(found):
 
 
 def test_the_command_line_starts_the_ranks_itself(tmp_path, capfd):
-    assert main(["run", "punch-2d", "--elements", "4", "--ranks", "2", "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(["run", "punch-2d", "--elements", "4", "--ranks", "2", "--out", str(tmp_path / "out")])
+        == 0
+    )
     captured = capfd.readouterr()
     assert "solved" in captured.out and "2 ranks, " in captured.out
     assert (tmp_path / "out" / "summary.json").exists()
 
 
 def test_a_mistake_ends_all_ranks_with_its_one_sentence(tmp_path, capfd):
-    code = main(["run", "punch-2d", "--elements", "0", "--ranks", "2", "--out", str(tmp_path / "out")])
+    code = main(
+        ["run", "punch-2d", "--elements", "0", "--ranks", "2", "--out", str(tmp_path / "out")]
+    )
     assert code == main(["run", "punch-2d", "--elements", "0", "--out", str(tmp_path / "out")]) == 2
     first, second = capfd.readouterr().err.strip().splitlines()
     assert first == second and first.startswith("contactopt: ")
@@ -193,14 +212,35 @@ def test_a_mistake_ends_all_ranks_with_its_one_sentence(tmp_path, capfd):
 
 def test_one_rank_runs_here_and_starts_no_other(tmp_path, monkeypatch):
     monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
-    assert main(["run", "punch-2d", "--elements", "4", "--ranks", "1", "--no-figures", "--out", str(tmp_path)]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "punch-2d",
+                "--elements",
+                "4",
+                "--ranks",
+                "1",
+                "--no-figures",
+                "--out",
+                str(tmp_path),
+            ]
+        )
+        == 0
+    )
 
 
 @pytest.mark.parametrize(
     ("scene", "ranks", "sentence"),
-    [("punch-2d", "1000", "2 elastic bodies"), ("punch-2d", "3", "2 elastic bodies"), ("punch-2d", "0", "at least 1")],
+    [
+        ("punch-2d", "1000", "2 elastic bodies"),
+        ("punch-2d", "3", "2 elastic bodies"),
+        ("punch-2d", "0", "at least 1"),
+    ],
 )
-def test_ranks_that_would_have_nothing_to_do_are_refused_before_they_start(scene, ranks, sentence, monkeypatch, capfd):
+def test_ranks_that_would_have_nothing_to_do_are_refused_before_they_start(
+    scene, ranks, sentence, monkeypatch, capfd
+):
     monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
     assert main(["run", scene, "--ranks", ranks]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()
@@ -230,14 +270,19 @@ def test_a_stopped_rank_is_waited_for_with_a_word_and_not_for_ever(tmp_path, mon
             time.sleep(0.05)
             for process in psutil.Process().children(recursive=True):
                 with suppress(psutil.Error):
-                    if process.environ().get("OMPI_COMM_WORLD_RANK") == "1" and "python" in process.name():
+                    if (
+                        process.environ().get("OMPI_COMM_WORLD_RANK") == "1"
+                        and "python" in process.name()
+                    ):
                         process.suspend()
                         stopped.append(process.pid)
 
     thread = threading.Thread(target=stop)
     thread.start()
     begin = time.monotonic()
-    code = main(["run", "punch-2d", "--elements", "4", "--ranks", "2", "--out", str(tmp_path / "out")])
+    code = main(
+        ["run", "punch-2d", "--elements", "4", "--ranks", "2", "--out", str(tmp_path / "out")]
+    )
     thread.join()
     errors = capfd.readouterr().err
     assert code != 0 and time.monotonic() - begin < 30 and not psutil.pid_exists(stopped[0])
@@ -245,9 +290,23 @@ def test_a_stopped_rank_is_waited_for_with_a_word_and_not_for_ever(tmp_path, mon
 
 
 def test_the_death_of_a_rank_ends_all(tmp_path):
-    command = [sys.executable, "-m", "contactopt", "run", "punch-3d", "--elements", "14", "--ranks", "2"]
+    command = [
+        sys.executable,
+        "-m",
+        "contactopt",
+        "run",
+        "punch-3d",
+        "--elements",
+        "14",
+        "--ranks",
+        "2",
+    ]
     started = subprocess.Popen(
-        [*command, "--out", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True, env=environment(), cwd=ROOT
+        [*command, "--out", str(tmp_path / "out")],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        cwd=ROOT,
     )
 
     def second_rank():
@@ -287,12 +346,17 @@ def test_slices_of_quadratic_simplices_are_the_whole_body(dim):
             outer = np.isin(np.arange(new.facets.shape[1]), new.boundary_facets())
             there = {name: np.unique(old.facets[:, own]) for name, own in old.boundaries.items()}
             return new.with_boundaries(
-                {name: np.flatnonzero(np.isin(new.facets, at).all(axis=0) & outer) for name, at in there.items()}
+                {
+                    name: np.flatnonzero(np.isin(new.facets, at).all(axis=0) & outer)
+                    for name, at in there.items()
+                }
             )
 
         return replace(part, mesh=mesh)
 
-    scene = replace(scenes.flat_punch(dim, elements=4 if dim == 2 else 2), degree=2).with_parts(simplices)
+    scene = replace(scenes.flat_punch(dim, elements=4 if dim == 2 else 2), degree=2).with_parts(
+        simplices
+    )
     cut = reduce(sliced(scene, "foundation", 2), Q="explicit")
     whole, pieces = solve(reduce(scene, Q="explicit"), tol=1e-11), solve(cut, tol=1e-11)
     error = np.abs(pieces.reactions[cut.pairs[0].contacts] - whole.reactions).max()
@@ -319,7 +383,9 @@ def test_what_cannot_be_sliced_is_refused():
     ],
 )
 def test_thin_slices_are_solved_from_products_with_q(dim, elements, count, options):
-    """The thinnest of eight slices is a hundred times wider than high, and held by tied pairs alone."""
+    """The thinnest of eight slices is a hundred times wider than high, and held by tied pairs
+    alone.
+    """
     scene = scenes.flat_punch(dim, elements=elements)
     problem = reduce(sliced(scene, "foundation", count), **options)
     assert problem.Q.diagonal.min() >= 0.0  # signs of one pair say nothing of another
@@ -332,7 +398,10 @@ def test_thin_slices_are_solved_from_products_with_q(dim, elements, count, optio
 
 def test_smooth_motions_grow_with_the_length_of_a_pair_over_its_distance_to_the_next():
     thick, thin = (
-        reduce(sliced(scenes.flat_punch(2, elements=8, foundation_height=height), "foundation", 2), Q="explicit")
+        reduce(
+            sliced(scenes.flat_punch(2, elements=8, foundation_height=height), "foundation", 2),
+            Q="explicit",
+        )
         for height in (160.0, 10.0)
     )
     assert degrees(reduce(scenes.flat_punch(2, elements=8))) == [1] == degrees(thick)[:1]

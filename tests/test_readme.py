@@ -37,7 +37,9 @@ def test_files_that_are_linked_exist():
 
 
 def test_commands_are_commands():
-    """Those of contactopt are read by its own parser, the files and modules that the others name exist."""
+    """Those of contactopt are read by its own parser, the files and modules that the others name
+    exist.
+    """
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", README, re.S))
     for line in re.findall(r"bin/contactopt (.*)$", shell, re.M):
         make_parser().parse_args(line.split())
@@ -46,7 +48,9 @@ def test_commands_are_commands():
     for module in re.findall(r"python -m (experiments[\w.]+)", README):
         place = ROOT / module.replace(".", "/")
         assert place.with_suffix(".py").exists() or (place / "__main__.py").exists(), module
-    extras = re.search(r"\[project.optional-dependencies\](.*?)\n\[", (ROOT / "pyproject.toml").read_text(), re.S)[1]
+    extras = re.search(
+        r"\[project.optional-dependencies\](.*?)\n\[", (ROOT / "pyproject.toml").read_text(), re.S
+    )[1]
     for extra in re.findall(r"install (?:-e )?'\.\[(\w+)\]'", shell):
         assert re.search(rf"^{extra} = ", extras, re.M), extra
 

@@ -37,14 +37,17 @@ def test_hexahedra_are_written_with_positive_volume_in_vtk_order(tmp_path):
     back = meshio.read(tmp_path / "u.vtu")
     corners = back.points[back.cells[0].data]
     base, top = corners[:, :4], corners[:, 4:]
-    assert np.allclose((top - base).std(axis=1), 0)  # each upper corner above its lower one, for bricks
+    # each upper corner above its lower one, for bricks
+    assert np.allclose((top - base).std(axis=1), 0)
     assert np.allclose(base[:, 0] + base[:, 2], base[:, 1] + base[:, 3])
     normal = np.cross(base[:, 1] - base[:, 0], base[:, 3] - base[:, 0])
     assert np.all(np.sum(normal * (top - base)[:, 0], axis=1) > 0)
 
 
 def test_stress_below_hertz_contact():
-    """On the axis: sigma_z = -p0 / (1 + z^2/a^2); largest von Mises stress about .62 p0 at .48 a (nu = .3)."""
+    """On the axis: sigma_z = -p0 / (1 + z^2/a^2); largest von Mises stress about .62 p0 at .48 a
+    (nu = .3).
+    """
     scene = scenes.sphere()
     a, p0 = scene.reference.half_width, scene.reference.peak
     foundation = solved(scene, zone=a)[1]
@@ -65,7 +68,8 @@ def test_plane_strain_out_of_plane_stress():
         assert np.allclose(s["zz"], 0.3 * (s["xx"] + s["yy"]), atol=1e-12)
 
 
-# corners whose middle each node of a cell of second order is, as in the documentation of VTK's file formats
+# corners whose middle each node of a cell of second order is, as in the documentation of VTK's file
+# formats
 EDGES = {
     "triangle6": (3, [(0, 1), (1, 2), (2, 0)]),
     "quad9": (4, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)]),
@@ -73,8 +77,29 @@ EDGES = {
     "hexahedron27": (
         8,
         [
-            *[(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
-            *[(0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7), tuple(range(8))],
+            *[
+                (0, 1),
+                (1, 2),
+                (2, 3),
+                (3, 0),
+                (4, 5),
+                (5, 6),
+                (6, 7),
+                (7, 4),
+                (0, 4),
+                (1, 5),
+                (2, 6),
+                (3, 7),
+            ],
+            *[
+                (0, 3, 4, 7),
+                (1, 2, 5, 6),
+                (0, 1, 4, 5),
+                (2, 3, 6, 7),
+                (0, 1, 2, 3),
+                (4, 5, 6, 7),
+                tuple(range(8)),
+            ],
         ],
     ),
 }

@@ -1,4 +1,6 @@
-"""Stress at a place: the fit is exact for polynomials, better than averages, and its load is its transpose."""
+"""Stress at a place: the fit is exact for polynomials, better than averages, and its load is its
+transpose.
+"""
 
 import numpy as np
 import pytest
@@ -36,15 +38,23 @@ def assembled(mesh, degree=1, kind=None):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("shape", MESHES)
 def test_a_stress_that_the_displacement_can_have_is_recovered_everywhere(shape, degree):
-    """A displacement of the degree of the elements has a stress that the patches fit without error, also at the surface."""
+    """A displacement of the degree of the elements has a stress that the patches fit without error,
+    also at the surface.
+    """
     body = assembled(MESHES[shape], degree)
     x = body.locations
     U = np.zeros(body.basis.N)
     for row, unknowns in enumerate(body.unknowns):
-        U[unknowns] = x[row] * (1 + row) + 0.3 * x[0] + (0.2 * x[0] * x[-1] + x[-1] ** 2 if degree == 2 else 0)
+        U[unknowns] = (
+            x[row] * (1 + row)
+            + 0.3 * x[0]
+            + (0.2 * x[0] * x[-1] + x[-1] ** 2 if degree == 2 else 0)
+        )
     found = stress_map(body, Region())
     if degree == 1:
-        wanted = np.stack([nodal_stress(body, U)[i, j] for i, j in ((0, 0), (1, 1), (2, 2))], axis=1)
+        wanted = np.stack(
+            [nodal_stress(body, U)[i, j] for i, j in ((0, 0), (1, 1), (2, 2))], axis=1
+        )
         assert np.allclose(found.stress(U)[:, :3], wanted[found.sources])
     point = (0.37, 0.61) if len(x) == 2 else (0.37, 0.61, 0.2)
     at = stress_map(body, Region(point=point)).stress(U)[0]
@@ -62,7 +72,9 @@ def test_a_stress_that_the_displacement_can_have_is_recovered_everywhere(shape, 
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_recovered_stress_converges_faster_than_averages(degree):
-    """At the surface, where averages look from one side: the worst vertex of a smooth field on two meshes."""
+    """At the surface, where averages look from one side: the worst vertex of a smooth field on two
+    meshes.
+    """
     errors = {"fit": [], "average": []}
     for count in (6, 12):
         ticks = np.linspace(0, 1, count + 1)
@@ -76,7 +88,9 @@ def test_the_recovered_stress_converges_faster_than_averages(degree):
         wanted = 2 * shear * xx + lam * (xx + yy)
         found = stress_map(body, Region())
         errors["fit"].append(np.abs(found.stress(U)[:, 0] - wanted[found.sources]).max())
-        errors["average"].append(np.abs(nodal_stress(body, U, everywhere=False)[0, 0] - wanted).max())
+        errors["average"].append(
+            np.abs(nodal_stress(body, U, everywhere=False)[0, 0] - wanted).max()
+        )
     assert errors["fit"][1] < 0.6 * errors["average"][1]
     assert errors["fit"][0] / errors["fit"][1] > 1.8 * degree
 
@@ -86,7 +100,10 @@ def test_the_load_is_the_transpose_of_the_recovery(kind):
     random = np.random.default_rng(1)
     body = assembled(MESHES["tetrahedra" if kind == "solid" else "triangles"], 1, kind)
     found = stress_map(body, Region("top"))
-    U, slopes = random.standard_normal(body.basis.N), random.standard_normal((len(found.sources), len(STRESSES[kind])))
+    U, slopes = (
+        random.standard_normal(body.basis.N),
+        random.standard_normal((len(found.sources), len(STRESSES[kind]))),
+    )
     assert np.sum(found.stress(U) * slopes) == pytest.approx(found.transposed(slopes) @ U)
     stress = random.standard_normal((5, len(STRESSES[kind])))
     change = random.standard_normal(stress.shape)
@@ -124,35 +141,53 @@ def test_bad_places_are_refused_in_one_sentence(name, words):
 
 def test_names_of_other_quantities_are_not_places():
     scene = scenes.flat_punch(2, elements=4)
-    assert [place_of(name, scene) for name in ("energy", "pressure", "pressure:3", "width", None)] == 5 * [None]
-    assert place_of("von_mises:punch@0,1,radius=2", scene).region == Region(point=(0.0, 1.0), radius=2.0)
+    assert [
+        place_of(name, scene) for name in ("energy", "pressure", "pressure:3", "width", None)
+    ] == 5 * [None]
+    assert place_of("von_mises:punch@0,1,radius=2", scene).region == Region(
+        point=(0.0, 1.0), radius=2.0
+    )
 
 
 def test_the_pressure_under_a_flat_punch_is_read_between_its_nodes():
-    """Against the exact pressure of a rigid flat punch without friction on a half-plane, P / (pi sqrt(a^2 - x^2))."""
-    scene = scenes.flat_punch(2, mu=0.0, elements=32, rigid="punch", foundation_width=1600.0, foundation_height=800.0)
+    """Against the exact pressure of a rigid flat punch without friction on a half-plane, P / (pi
+    sqrt(a^2 - x^2)).
+    """
+    scene = scenes.flat_punch(
+        2, mu=0.0, elements=32, rigid="punch", foundation_width=1600.0, foundation_height=800.0
+    )
     solved = solve_scene(scene)
     a, force = scene.reference.half_width, 100.0 / 40.0
     for place in (0.013 * a, 0.31 * a, 0.62 * a):
-        found = read_place(place_of(f"pressure@{place},0", scene), solved.reduction, solved.solution).value
+        found = read_place(
+            place_of(f"pressure@{place},0", scene), solved.reduction, solved.solution
+        ).value
         assert found == pytest.approx(force / (np.pi * np.sqrt(a**2 - place**2)), rel=0.02)
 
 
 def test_the_largest_stress_under_a_line_contact_is_where_it_should_be():
-    """Under Hertz's line contact without friction: .558 of the peak pressure, .704 half-widths deep, for nu = .3."""
+    """Under Hertz's line contact without friction: .558 of the peak pressure, .704 half-widths
+    deep, for nu = .3.
+    """
     scene = make_scene("cylinder-2d", mu=0.0, elements=16)
     solved = solve_scene(scene)
     body = scene.parts[-1].name
     found = read_stress(
-        place_of(f"von_mises:{body}", scene), solved.reduction, solved.reduction.displaced(solved.solution)
+        place_of(f"von_mises:{body}", scene),
+        solved.reduction,
+        solved.reduction.displaced(solved.solution),
     )
     a, peak = scene.reference.half_width, scene.reference.peak
     assert found.value == pytest.approx(0.558 * peak, rel=0.02)
-    assert abs(found.peaks[0].place[0]) < 0.1 * a and abs(found.peaks[0].place[1]) == pytest.approx(0.704 * a, rel=0.15)
+    assert abs(found.peaks[0].place[0]) < 0.1 * a and abs(found.peaks[0].place[1]) == pytest.approx(
+        0.704 * a, rel=0.15
+    )
 
 
 def test_the_scatter_of_the_elements_is_the_uncertainty_of_the_fit():
-    """No scatter, no uncertainty; and the fits of noise of known size deviate by as much as they say, on average."""
+    """No scatter, no uncertainty; and the fits of noise of known size deviate by as much as they
+    say, on average.
+    """
     random = np.random.default_rng(2)
     body = assembled(skfem.MeshTri.init_tensor(np.linspace(0, 1, 13), np.linspace(0, 1, 13)))
     found = stress_map(body, Region())

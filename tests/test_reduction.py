@@ -27,7 +27,9 @@ AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_patch_test_uniform_pressure_is_exact(kind):
-    """Two blocks without friction under a frictionless plate: p = F/A, approach = F/A (h1 + h2) / E (or plane strain)."""
+    """Two blocks without friction under a frictionless plate: p = F/A, approach = F/A (h1 + h2) / E
+    (or plane strain).
+    """
     scene = two_blocks(kind, force=3.0)
     reduction = reduce_bodies(scene)
     problem = reduction.problem
@@ -55,7 +57,12 @@ def test_compliance_is_the_trailing_block_of_the_inverse(kind):
 
 
 @pytest.mark.parametrize(
-    "scene", [*map(two_blocks, KINDS), scenes.flat_punch(3, elements=3), scenes.sphere(elements=6, rigid="sphere")]
+    "scene",
+    [
+        *map(two_blocks, KINDS),
+        scenes.flat_punch(3, elements=3),
+        scenes.sphere(elements=6, rigid="sphere"),
+    ],
 )
 def test_products_by_body_solves_are_those_of_the_explicit_operator(scene):
     reduction = reduce_bodies(scene)
@@ -75,7 +82,8 @@ def test_schur_complement_is_the_inverse_of_the_compliance():
 
 
 @pytest.mark.parametrize(
-    "scene", [scenes.flat_punch(2, elements=4), scenes.flat_punch(3, elements=3), scenes.sphere(elements=6)]
+    "scene",
+    [scenes.flat_punch(2, elements=4), scenes.flat_punch(3, elements=3), scenes.sphere(elements=6)],
 )
 def test_recovered_bodies_are_in_equilibrium_and_meet_the_interface_equation(scene):
     reduction = reduce_bodies(scene)
@@ -89,13 +97,19 @@ def test_recovered_bodies_are_in_equilibrium_and_meet_the_interface_equation(sce
         U[basis.nodal_dofs] = field.displacement
         force = B.T @ solution.reactions.ravel()
         free = body.body.free
-        assert np.abs((body.body.A @ U - body.body.load - force)[free]).max() < 1e-9 * np.abs(force).max()
+        assert (
+            np.abs((body.body.A @ U - body.body.load - force)[free]).max()
+            < 1e-9 * np.abs(force).max()
+        )
         jump += (B @ U).reshape(jump.shape)
     rest = problem.displacements(solution.reactions, solution.multipliers) - jump
     assert np.abs(rest[:, 1:]).max() < 1e-9
     x = problem.coordinates[0]
-    radius = 400.0 if scene.name == "sphere" else np.inf  # what is left is the initial gap below the sphere
-    assert np.allclose(rest[:, 0], 0.0 if radius == np.inf else radius - np.sqrt(radius**2 - x**2), atol=1e-9)
+    # what is left is the initial gap below the sphere
+    radius = 400.0 if scene.name == "sphere" else np.inf
+    assert np.allclose(
+        rest[:, 0], 0.0 if radius == np.inf else radius - np.sqrt(radius**2 - x**2), atol=1e-9
+    )
 
 
 def test_half_model_gives_the_answer_of_the_whole():
@@ -123,26 +137,35 @@ def test_half_model_gives_the_answer_of_the_whole():
     assert b.multipliers == pytest.approx(a.multipliers, rel=1e-8)
     assert np.allclose(b.reactions[right, 0][1:] * 2, a.reactions[1:, 0], rtol=1e-7)
     assert b.reactions[:, 0].sum() == pytest.approx(100.0) == pytest.approx(a.reactions[:, 0].sum())
-    assert np.allclose((b.reactions / pb.areas[:, None])[right], a.reactions / pa.areas[:, None], atol=1e-8)
+    assert np.allclose(
+        (b.reactions / pb.areas[:, None])[right], a.reactions / pa.areas[:, None], atol=1e-8
+    )
     assert np.allclose(b.reactions[::-1, 1], -b.reactions[:, 1], atol=1e-8)
 
 
 def test_a_plate_that_a_support_resists_is_condensed():
-    """No multiplier is left, the problem is linear in the force, and the plate only redistributes it."""
+    """No multiplier is left, the problem is linear in the force, and the plate only redistributes
+    it.
+    """
     base = two_blocks("plane-strain", mu=0.4)
     mesh = base.upper.mesh.with_boundaries({"grip": lambda x: (x[0] == 0) & (x[1] < 0.4)})
     held = replace(base.upper, mesh=mesh, supports=(Support("grip"),))
-    scenes_ = [replace(base, upper=replace(held, loads=(Plate("top", {"y": -f}),))) for f in (3.0, 6.0)]
+    scenes_ = [
+        replace(base, upper=replace(held, loads=(Plate("top", {"y": -f}),))) for f in (3.0, 6.0)
+    ]
     problem, doubled = (reduce(scene) for scene in scenes_)
     assert problem.V.shape == (2 * 5, 0)
     assert np.allclose(doubled.q, 2 * problem.q) and np.any(problem.q)
     one, two = solve(problem, tol=1e-10), solve(doubled, tol=1e-10)
     assert one.solved and np.allclose(two.reactions, 2 * one.reactions, atol=1e-7)
-    # Condensed plate = the constraint "all of the top moves as one", here by minimising the energy over its height.
+    # Condensed plate = the constraint "all of the top moves as one", here by minimising the energy
+    # over its height.
     body = reduce_bodies(scenes_[0]).bodies[0]
     A, M = body.body.A, body.body.motion[:, 0]
     free = np.append(body.body.free, A.shape[0])
-    bordered = np.block([[A.toarray(), (A @ M)[:, None]], [(A @ M)[None], np.array([[M @ (A @ M)]])]])
+    bordered = np.block(
+        [[A.toarray(), (A @ M)[:, None]], [(A @ M)[None], np.array([[M @ (A @ M)]])]]
+    )
     load = np.append(np.zeros(A.shape[0]), -3.0)
     x = np.zeros(len(load))
     x[free] = np.linalg.solve(bordered[np.ix_(free, free)], load[free])
@@ -151,7 +174,9 @@ def test_a_plate_that_a_support_resists_is_condensed():
 
 def test_prescribed_displacement_loads_as_the_force_it_needs():
     base = two_blocks("plane-strain", force=3.0)
-    driven = replace(base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -1.2})))
+    driven = replace(
+        base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -1.2}))
+    )
     solution = solve(reduce(replace(base, upper=driven)), tol=1e-11)
     assert solution.reactions[:, 0].sum() == pytest.approx(1.2 / 3 * 5 / (1 - 0.3**2), rel=1e-9)
 
@@ -185,7 +210,10 @@ def test_coulomb_solution_turns_with_the_scene():
         mesh = part.mesh
         flipped = type(mesh)(np.stack([-mesh.p[1], mesh.p[0]]), mesh.t, _boundaries=mesh.boundaries)
         swap = {"x": "y", "y": "x"}
-        supports = tuple(Support(s.boundary, {swap[c]: v for c, v in s.displacement.items()}) for s in part.supports)
+        supports = tuple(
+            Support(s.boundary, {swap[c]: v for c, v in s.displacement.items()})
+            for s in part.supports
+        )
         loads = tuple(Plate(p.boundary, {"x": -p.force["y"]}, glued=p.glued) for p in part.loads)
         return replace(part, mesh=flipped, supports=supports, loads=loads)
 
@@ -195,15 +223,21 @@ def test_coulomb_solution_turns_with_the_scene():
     a, b = solve(reduce(base), tol=1e-10), solve(reduce(side), tol=1e-10)
     assert a.solved and b.solved
     assert np.allclose(np.sort(a.reactions[:, 0]), np.sort(b.reactions[:, 0]), atol=1e-8)
-    assert np.allclose(np.sort(np.abs(a.reactions[:, 1])), np.sort(np.abs(b.reactions[:, 1])), atol=1e-8)
+    assert np.allclose(
+        np.sort(np.abs(a.reactions[:, 1])), np.sort(np.abs(b.reactions[:, 1])), atol=1e-8
+    )
 
 
-@pytest.mark.parametrize("cells,shift,message", [(5, 0.0, "has 5 contact nodes"), (4, 0.05, "lies .* off the normal")])
+@pytest.mark.parametrize(
+    "cells,shift,message", [(5, 0.0, "has 5 contact nodes"), (4, 0.05, "lies .* off the normal")]
+)
 def test_interface_nodes_that_do_not_match_are_refused(cells, shift, message):
     base = two_blocks("plane-strain")
     mesh = block("plane-strain", -2, 0, cells)
     inner = (mesh.p[0] > 0) & (mesh.p[0] < 1)
-    moved = type(mesh)(mesh.p + shift * np.stack([inner, 0 * inner]), mesh.t, _boundaries=mesh.boundaries)
+    moved = type(mesh)(
+        mesh.p + shift * np.stack([inner, 0 * inner]), mesh.t, _boundaries=mesh.boundaries
+    )
     with pytest.raises(InputError, match=f"interface nodes do not match.*{message}.*same nodes"):
         reduce_bodies(replace(base, lower=replace(base.lower, mesh=moved)), coupling="matching")
 
@@ -220,7 +254,9 @@ def test_two_rigid_bodies_are_refused():
 
 
 def test_a_plate_that_moves_along_the_contact():
-    """Two multipliers, pressed and dragged: sticks below the friction limit, and the shift is an output."""
+    """Two multipliers, pressed and dragged: sticks below the friction limit, and the shift is an
+    output.
+    """
     mesh = block("plane-strain", 0, 1)
     upper = Part("u", mesh, MATERIAL, (), (Plate("top", {"x": 0.5, "y": -3.0}),), contact="bottom")
     lower = Part("l", block("plane-strain", -2, 0), MATERIAL, (Support("bottom"),), contact="top")
@@ -239,7 +275,11 @@ def test_nested_dissection_is_a_permutation_that_saves_fill():
     n = 40
     line = sp.diags([np.ones(n - 1), np.ones(n), np.ones(n - 1)], [-1, 0, 1])
     graph = sp.kron(line, line).tocsr()
-    points = np.stack(np.meshgrid(np.arange(n), np.arange(n), indexing="ij")).reshape(2, -1).astype(float)
+    points = (
+        np.stack(np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+        .reshape(2, -1)
+        .astype(float)
+    )
     order = nested_dissection(graph, points)
     assert np.array_equal(np.sort(order), np.arange(n * n))
     A = graph + 10 * sp.eye(n * n)

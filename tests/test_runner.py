@@ -56,7 +56,9 @@ def test_run_writes_everything(name, tmp_path):
     assert summary["status"] == "solved" and summary["residual"] <= 1e-8
     assert summary["normal_force"] == pytest.approx(100, rel=1e-8)
     assert 0 < summary["stick_half_width"] <= summary["contact_half_width"]
-    assert summary["seconds"]["total"] >= max(v for k, v in summary["seconds"].items() if k != "total")
+    assert summary["seconds"]["total"] >= max(
+        v for k, v in summary["seconds"].items() if k != "total"
+    )
     data = np.load(out / "interface.npz")
     k = summary["contact_nodes"]
     shape = (k, 2) if name == "punch-3d" else (k,)
@@ -86,7 +88,9 @@ def test_a_body_without_plate_has_no_approach():
     from contactopt import Support
 
     base = two_blocks("plane-strain")
-    driven = replace(base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1})))
+    driven = replace(
+        base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1}))
+    )
     assert run(replace(base, upper=driven)).summary["approach"] is None
 
 
@@ -99,21 +103,52 @@ def test_docstring_names_exist():
 
 
 def test_command_line_runs(tmp_path, capsys):
-    assert cli.main(["run", "punch-2d", "--out", str(tmp_path), "--elements", "4", "--mu", "0.2", "--tol", "1e-7"]) == 0
+    assert (
+        cli.main(
+            [
+                "run",
+                "punch-2d",
+                "--out",
+                str(tmp_path),
+                "--elements",
+                "4",
+                "--mu",
+                "0.2",
+                "--tol",
+                "1e-7",
+            ]
+        )
+        == 0
+    )
     text = capsys.readouterr()
     assert "solved" in text.out and "approach" in text.out and "reducing" in text.err
     assert json.loads((tmp_path / "summary.json").read_text())["mu"] == 0.2
 
 
 def test_command_line_reports_what_is_not_solved(tmp_path, capsys):
-    assert cli.main(["run", "punch-2d", "--out", str(tmp_path), "--elements", "4", "--tol", "1e-30"]) == 1
-    assert json.loads((tmp_path / "summary.json").read_text())["status"] in ("stalled", "cycling", "iteration_limit")
+    assert (
+        cli.main(["run", "punch-2d", "--out", str(tmp_path), "--elements", "4", "--tol", "1e-30"])
+        == 1
+    )
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] in (
+        "stalled",
+        "cycling",
+        "iteration_limit",
+    )
 
 
 def test_list(capsys):
     assert cli.main(["list"]) == 0
     text = capsys.readouterr().out
-    for word in ("punch-2d", "punch-3d", "sphere", "alternating", "proxqp", "clarabel", "installed"):
+    for word in (
+        "punch-2d",
+        "punch-3d",
+        "sphere",
+        "alternating",
+        "proxqp",
+        "clarabel",
+        "installed",
+    ):
         assert word in text
 
 
@@ -176,7 +211,8 @@ def test_a_failure_while_writing_leaves_old_results_alone(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize(
-    "quantity,key", [("width", "contact_half_width"), ("pressure", "pressure"), ("approach", "approach")]
+    "quantity,key",
+    [("width", "contact_half_width"), ("pressure", "pressure"), ("approach", "approach")],
 )
 def test_the_summary_reports_what_accuracy_bounds(quantity, key):
     result = run("cylinder-2d", accuracy=0.05, quantity=quantity)
@@ -204,8 +240,19 @@ def test_the_summary_on_disk_is_that_of_the_result(tmp_path):
 
 def test_a_contact_that_the_mesh_cannot_show_is_remarked_on():
     assert run("cylinder-2d", elements=8).summary["remarks"] == []
-    mesh = MeshTri().refined(3).with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
-    block = Part("block", mesh, Material(E=5.0, nu=0.3), loads=(Plate("top", {"y": -0.1}),), contact="bottom")
+    mesh = (
+        MeshTri()
+        .refined(3)
+        .with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
+    )
+    block = Part(
+        "block", mesh, Material(E=5.0, nu=0.3), loads=(Plate("top", {"y": -0.1}),), contact="bottom"
+    )
     floor = Rigid("floor", normal=(0.0, 1.0), gap=lambda x: 40.0 * (x[0] - 0.5) ** 2)
     told = run(Scene("block on a ridge", block, floor, mu=0.4)).summary["remarks"]
-    assert len(told) == 2 and "strain of up to" in told[1] and "1 of 9" in told[0] and "block-floor" in told[0]
+    assert (
+        len(told) == 2
+        and "strain of up to" in told[1]
+        and "1 of 9" in told[0]
+        and "block-floor" in told[0]
+    )

@@ -58,10 +58,14 @@ def test_the_example_runs_and_a_path_ends_as_python_says(tmp_path, capsys, monke
     (tmp_path / "first.toml").write_text(text)
     assert main(["run", "first.toml"]) == 0
     assert "solved" in capsys.readouterr().out
-    assert {"summary.json", "path.png", "block.vtu"} <= {path.name for path in (tmp_path / "out" / "first").iterdir()}
+    assert {"summary.json", "path.png", "block.vtu"} <= {
+        path.name for path in (tmp_path / "out" / "first").iterdir()
+    }
     result = contactopt.run("first.toml")
     assert len(result.path.states) == 3
-    np.testing.assert_allclose(result.summary["pairs"]["block-foundation"]["force"], [-40, 100], rtol=1e-9)
+    np.testing.assert_allclose(
+        result.summary["pairs"]["block-foundation"]["force"], [-40, 100], rtol=1e-9
+    )
 
 
 def test_a_file_says_what_python_says(tmp_path):
@@ -80,8 +84,24 @@ def test_a_file_says_what_python_says(tmp_path):
 
 def test_every_entry_reaches_the_scene(tmp_path):
     plane = skfem.MeshTri2.init_circle(2)
-    meshio.write(tmp_path / "disc.vtu", meshio.Mesh(np.pad(plane.p.T, [(0, 0), (0, 1)]), [("triangle6", skfem.io.meshio.to_meshio(
-        plane, encode_cell_data=False).cells[0].data)], cell_data={"part": [np.ones(plane.nelements, int)]}))  # fmt: skip
+    meshio.write(
+        tmp_path / "disc.vtu",
+        meshio.Mesh(
+            np.pad(plane.p.T, [(0, 0), (0, 1)]),
+            [
+                (
+                    "triangle6",
+                    skfem.io.meshio.to_meshio(
+                        plane,
+                        encode_cell_data=False,
+                    )
+                    .cells[0]
+                    .data,
+                )
+            ],
+            cell_data={"part": [np.ones(plane.nelements, int)]},
+        ),
+    )
     text = """
 units = { length = "mm", stress = "MPa" }
 copies = 2
@@ -127,25 +147,45 @@ Q = "explicit"
     assert (first.name, first.copies, first.degree, first.units) == ("all", 2, 2, ("mm", "MPa"))
     disc, ring, punch = last.bodies
     assert disc.mesh is first.bodies[0].mesh and disc.material == contactopt.Material(5.0, 0.3)
-    np.testing.assert_allclose([disc.mesh.p.min(axis=1), disc.mesh.p.max(axis=1)], [[-10, 0], [10, 20]], atol=1e-9)
+    np.testing.assert_allclose(
+        [disc.mesh.p.min(axis=1), disc.mesh.p.max(axis=1)], [[-10, 0], [10, 20]], atol=1e-9
+    )
     assert disc.supports == (Support("left", {"x": 0.25}),) and ring.supports == (Support("outer"),)
     assert disc.loads == (Traction("left", (0.0, 2.0)), contactopt.BodyForce((0.0, -1e-3)))
     assert first.bodies[0].loads[0].value == (0.0, 1.0) and first.bodies[2].force == {"y": -1.0}
     np.testing.assert_allclose(disc.curve(np.array([[3.0], [6.0]])), [[6.0], [2.0]])
     assert set(ring.mesh.boundaries) == {"inner", "outer"} and ring.mesh.nelements == 24
-    assert punch.normal == (0.0, 1.0) and punch.gap(np.array([[2.0], [0.0]])) == pytest.approx([0.2])
+    assert punch.normal == (0.0, 1.0) and punch.gap(np.array([[2.0], [0.0]])) == pytest.approx(
+        [0.2]
+    )
     pair = last.contacts[0]
-    assert isinstance(pair, Contact) and (pair.law, pair.coupling, pair.carrier) == ("tresca", "mortar", "upper")
+    assert isinstance(pair, Contact) and (pair.law, pair.coupling, pair.carrier) == (
+        "tresca",
+        "mortar",
+        "upper",
+    )
     np.testing.assert_allclose(pair.mu(np.array([[0.0, 5.0], [1.0, 1.0]])), [0.1, 0.15])
 
 
-@pytest.mark.parametrize("kind,components", [("axisymmetric", ("r", "z")), ("solid", ("x", "y", "z"))])
+@pytest.mark.parametrize(
+    "kind,components", [("axisymmetric", ("r", "z")), ("solid", ("x", "y", "z"))]
+)
 def test_blocks_in_other_kinds(tmp_path, kind, components):
     up = components[-1]
     sides = ", ".join(f"{c} = [0, 1]" for c in components)
-    text = SMALL.replace("plane-strain", kind).replace("thickness = 2.0", "").replace("[0, 2], y = [0, 1]", "")
-    text = text.replace("{ x = , elements = [4, 2] }", f"{{ {sides}, elements = {[2] * len(components)} }}")
-    text = text.replace('"y-"', f'"{up}-"').replace('"y+"', f'"{up}+"').replace("x = 1.0, y = -10.0", f"{up} = -10.0")
+    text = (
+        SMALL.replace("plane-strain", kind)
+        .replace("thickness = 2.0", "")
+        .replace("[0, 2], y = [0, 1]", "")
+    )
+    text = text.replace(
+        "{ x = , elements = [4, 2] }", f"{{ {sides}, elements = {[2] * len(components)} }}"
+    )
+    text = (
+        text.replace('"y-"', f'"{up}-"')
+        .replace('"y+"', f'"{up}+"')
+        .replace("x = 1.0, y = -10.0", f"{up} = -10.0")
+    )
     result = contactopt.run(written(tmp_path, text))
     assert result.summary["normal_force"] == pytest.approx(10.0)
 
@@ -236,8 +276,9 @@ def test_hostile_scene_files(tmp_path):
 
 def test_lines_of_all_ways_to_write_toml():
     text = (
-        'a = 1 # b = 2\n"quoted key".c = """\nd = 3\n[e]\n"""\n[f."g.h"]\ni = [\n  1,\n  { j = 2, k = [3,\n 4] },\n]\n'
-        "[[l]]\nm = 'x = 1'\n[[l]]\nm = 1979-05-27\n[l.n]\no = \"\\\"]\"\n[[l.p]]\nq = '''\n'''\n[[l.p]]\nq.r = -1.5e3\n"
+        'a = 1 # b = 2\n"quoted key".c = """\nd = 3\n[e]\n"""\n[f."g.h"]\ni = [\n  1,\n  { j = 2, k'
+        " = [3,\n 4] },\n]\n[[l]]\nm = 'x = 1'\n[[l]]\nm = 1979-05-27\n[l.n]\no ="
+        " \"\\\"]\"\n[[l.p]]\nq = '''\n'''\n[[l.p]]\nq.r = -1.5e3\n"
     )
     data, lines = tomllib.loads(text), lines_of(text)
     found = {"a": 1, "quoted key": 2, "f": 6, "l": 12}
@@ -264,8 +305,23 @@ def test_expressions_compute_and_do_nothing_else():
     points = np.array([[0.0, 1.0, 2.0], [4.0, 4.0, 4.0]])
     read = Expression("where(x < 1, 0.2, sqrt(y) / 2) - -x**2 * sin(pi / 2)", ("x", "y"))
     np.testing.assert_allclose(read(points), [0.2, 2.0, 5.0])
-    for text in ("z", "__import__('os')", "x.real", "().__class__", "9**9**9**9", "[1]", "x if x else y", "lambda: 1", "x +",
-                 "sqrt(x, out=y)", "(" * 5000 + "x", "x" * 600, "1e999", "sqrt", "'a' * 9", "True"):  # fmt: skip
+    for text in (
+        "z",
+        "__import__('os')",
+        "x.real",
+        "().__class__",
+        "9**9**9**9",
+        "[1]",
+        "x if x else y",
+        "lambda: 1",
+        "sqrt(x, out=y)",
+        "(" * 5000 + "x",
+        "x" * 600,
+        "1e999",
+        "sqrt",
+        "'a' * 9",
+        "True",
+    ):
         with pytest.raises(InputError):
             Expression(text, ("x", "y"))(points)
     with pytest.raises(InputError, match=r"no finite value at \(0, 4\)"):

@@ -2,7 +2,18 @@ import numpy as np
 import pytest
 from conftest import MATERIAL, block
 
-from contactopt import InputError, Material, Part, Plate, Scene, Support, Traction, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Scene,
+    Support,
+    Traction,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.readings.edges import contact_edge, stick_edge
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
 
@@ -18,7 +29,13 @@ def test_named_scenes_are_the_papers(name):
 
 
 @pytest.mark.parametrize(
-    "name,size", [("punch-2d", {}), ("punch-3d", {"elements": 3}), ("sphere", {}), ("cylinder-2d", {"elements": 8})]
+    "name,size",
+    [
+        ("punch-2d", {}),
+        ("punch-3d", {"elements": 3}),
+        ("sphere", {}),
+        ("cylinder-2d", {"elements": 8}),
+    ],
 )
 @pytest.mark.parametrize("rigid", [None, "upper", "foundation"])
 def test_rigid_variants_solve(name, size, rigid):
@@ -68,7 +85,9 @@ def test_rigid_punch_sticks_where_spence_says(kind, mu, nu):
     scene = scenes.rigid_punch(kind, mu=mu, lower=Material(3.0, nu))
     ratio, _, r = ends(scene)
     assert r[:, 0].sum() == pytest.approx(100.0)
-    assert ratio == pytest.approx(scene.reference.stick_half_width / scene.reference.half_width, abs=0.005)
+    assert ratio == pytest.approx(
+        scene.reference.stick_half_width / scene.reference.half_width, abs=0.005
+    )
 
 
 def test_rigid_punch_tractions():
@@ -77,7 +96,9 @@ def test_rigid_punch_tractions():
     x = problem.coordinates[0]
     inner = x < 0.95 * 20
     exact = np.stack([scene.reference.pressure(x[inner]), -scene.reference.shear(x[inner])], axis=1)
-    np.testing.assert_allclose((r / problem.areas[:, None])[inner], exact, atol=0.02 * exact[:, 0].max())
+    np.testing.assert_allclose(
+        (r / problem.areas[:, None])[inner], exact, atol=0.02 * exact[:, 0].max()
+    )
 
 
 def test_cylinder_is_hertz():
@@ -86,7 +107,8 @@ def test_cylinder_is_hertz():
     exact = scene.reference
     assert contact_edge(scene, problem, r) == pytest.approx(exact.half_width, rel=3e-3)
     assert (r[:, 0] / problem.areas).max() == pytest.approx(exact.peak, rel=2e-3)
-    smooth = solve(reduce(scenes.cylinder(mu=0.0))).reactions  # similar materials: friction changes nothing
+    # similar materials: friction changes nothing
+    smooth = solve(reduce(scenes.cylinder(mu=0.0))).reactions
     assert np.abs(smooth[:, 0] - r[:, 0]).max() < 2e-3 * r[:, 0].max()
 
 
@@ -97,7 +119,9 @@ def test_sheared_cylinder_is_cattaneos(shear):
     assert -r[:, 1].sum() == pytest.approx(shear)
     assert ratio == pytest.approx(np.sqrt(1 - shear / 50), rel=0.01)
     exact = scene.reference.shear(problem.coordinates[0])
-    error = np.sum(problem.areas * (-r[:, 1] / problem.areas - exact) ** 2) / np.sum(problem.areas * exact**2)
+    error = np.sum(problem.areas * (-r[:, 1] / problem.areas - exact) ** 2) / np.sum(
+        problem.areas * exact**2
+    )
     assert np.sqrt(error) < 0.02
     opposite = solve(reduce(scenes.cattaneo(2, shear=-shear))).reactions
     order = np.argsort(problem.coordinates[0])
@@ -111,13 +135,27 @@ def test_sheared_sphere_is_cattaneos():
     assert ratio == pytest.approx(0.4 ** (1 / 3), rel=0.015)
     assert np.abs(r[:, 2]).sum() < 0.02 * np.abs(r[:, 1]).sum()  # nu = 0: slip along x
     exact = scene.reference.shear(np.linalg.norm(problem.coordinates[:2], axis=0))
-    error = np.sum(problem.areas * (-r[:, 1] / problem.areas - exact) ** 2) / np.sum(problem.areas * exact**2)
+    error = np.sum(problem.areas * (-r[:, 1] / problem.areas - exact) ** 2) / np.sum(
+        problem.areas * exact**2
+    )
     assert np.sqrt(error) < 0.05
 
 
 def test_paths_are_states_of_one_scene():
     cycle = make_path("cattaneo-2d", steps=2, shear=20.0, elements=4)
-    assert [s.upper.loads[0].force["x"] for s in cycle] == [0, 10, 20, 10, 0, -10, -20, -10, 0, 10, 20]
+    assert [s.upper.loads[0].force["x"] for s in cycle] == [
+        0,
+        10,
+        20,
+        10,
+        0,
+        -10,
+        -20,
+        -10,
+        0,
+        10,
+        20,
+    ]
     assert all(s.upper.loads[0].force["y"] == -100.0 for s in cycle)
     growing = make_path("hertz-dissimilar", steps=4, force=64.0, elements=4)
     assert [-s.upper.force["z"] for s in growing] == [1.0, 8.0, 27.0, 64.0]
@@ -143,7 +181,10 @@ def test_paths_are_states_of_one_scene():
         (lambda: make_scene("punch-4d"), "unknown scene 'punch-4d'; choose from punch-2d"),
         (lambda: make_scene("sphere", depth=3), "depth"),
         (lambda: scenes.flat_punch(4), "dim must be 2 or 3"),
-        (lambda: scenes.flat_punch(2, mu=-0.1), "friction coefficient mu must be a finite number at least 0"),
+        (
+            lambda: scenes.flat_punch(2, mu=-0.1),
+            "friction coefficient mu must be a finite number at least 0",
+        ),
         (lambda: scenes.flat_punch(2, mu=np.nan), "mu must be a finite number"),
         (lambda: scenes.flat_punch(2, force=-1), "force must be a finite number greater than 0"),
         (lambda: scenes.flat_punch(2, width=0), "width"),

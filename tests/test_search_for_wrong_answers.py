@@ -1,4 +1,6 @@
-"""Two ways to one answer: the search finds what is wrong, and nothing where nothing is; what it found stays mended."""
+"""Two ways to one answer: the search finds what is wrong, and nothing where nothing is; what it
+found stays mended.
+"""
 
 from dataclasses import replace
 
@@ -34,7 +36,9 @@ def test_an_answer_that_is_five_percent_wrong_is_found(seed):
 def test_an_upper_half_space_lies_above_in_scenes_of_many_bodies_too():
     pressed, flat = ball(force={"y": -0.05}), HalfSpace("flat", MATERIAL, (ROW,))
     short = run(Scene("short", pressed, flat, 0.0), figures=())
-    long = run(Scene("long", bodies=(pressed, flat), contacts=(Contact("ball", "flat", 0.0),)), figures=())
+    long = run(
+        Scene("long", bodies=(pressed, flat), contacts=(Contact("ball", "flat", 0.0),)), figures=()
+    )
     assert np.allclose(long.pressure, short.pressure, atol=1e-9)
     assert long.pressure[len(ROW) // 2] == long.pressure.max()
 
@@ -42,7 +46,9 @@ def test_an_upper_half_space_lies_above_in_scenes_of_many_bodies_too():
 def test_a_half_space_on_both_sides_is_refused():
     third = HalfSpace("third", MATERIAL, (ROW,))
     pairs = (Contact("ball", "flat", 0.0), Contact("third", "ball", 0.0))
-    scene = Scene("three", bodies=(ball(), HalfSpace("flat", MATERIAL, (ROW,)), third), contacts=pairs)
+    scene = Scene(
+        "three", bodies=(ball(), HalfSpace("flat", MATERIAL, (ROW,)), third), contacts=pairs
+    )
     with pytest.raises(InputError, match="upper body of one contact"):
         run(scene, figures=())
 
@@ -53,7 +59,15 @@ def test_rounding_in_the_normals_does_not_hold_a_body_without_friction():
     A = rng.normal(size=(2 * k, 2 * k))
     V = np.zeros((k, 2, 2))
     V[:, 0, 0] = V[:, 1, 1] = 1.0
-    plain = solve(InterfaceProblem(A @ A.T / k + np.eye(2 * k), np.zeros((k, 2)), 0.0, V.reshape(-1, 2), [-1.0, 0.0]))
+    plain = solve(
+        InterfaceProblem(
+            A @ A.T / k + np.eye(2 * k), np.zeros((k, 2)), 0.0, V.reshape(-1, 2), [-1.0, 0.0]
+        )
+    )
     V[:, 0, 1] = 1e-30 * rng.normal(size=k)
-    rounded = solve(InterfaceProblem(A @ A.T / k + np.eye(2 * k), np.zeros((k, 2)), 0.0, V.reshape(-1, 2), [-1.0, 0.0]))
+    rounded = solve(
+        InterfaceProblem(
+            A @ A.T / k + np.eye(2 * k), np.zeros((k, 2)), 0.0, V.reshape(-1, 2), [-1.0, 0.0]
+        )
+    )
     assert rounded.solved and np.allclose(rounded.multipliers, plain.multipliers, atol=1e-8)

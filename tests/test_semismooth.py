@@ -38,13 +38,17 @@ def test_a_rough_tangential_force_becomes_exact(d):
     c = slip.ravel() - Q @ exact.ravel()
     none = np.zeros((k * d, 0))
     rough = exact + 1e-2 * rng.normal(size=(k, d))
-    r, _ = crossover(Q, c, none, np.zeros(0), lambda y: disc_derivative(y, radius), rough, np.zeros(0))
+    r, _ = crossover(
+        Q, c, none, np.zeros(0), lambda y: disc_derivative(y, radius), rough, np.zeros(0)
+    )
     assert np.allclose(r, exact, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_it_never_makes_an_answer_worse(seed):
-    """The first Newton step leads far away from a good start; cut off there, the start must come back."""
+    """The first Newton step leads far away from a good start; cut off there, the start must come
+    back.
+    """
     rng, none = np.random.default_rng(seed), np.zeros(0)
     A = rng.normal(size=(12, 3))
     Q, c, V = A @ A.T + 1e-6 * np.eye(12), rng.normal(size=12), np.zeros((12, 0))
@@ -60,7 +64,9 @@ def test_it_never_makes_an_answer_worse(seed):
 
 
 def test_a_singular_system_has_no_newton_step():
-    """Two plates that move alike: their multipliers are not unique, and nothing that is not finite may come out."""
+    """Two plates that move alike: their multipliers are not unique, and nothing that is not finite
+    may come out.
+    """
     V, s, start = np.ones((3, 2)), -np.ones(2), np.ones((3, 1))
     equations = Equations(np.eye(3), np.zeros((3, 1)), V, s, half_line_derivative)
     _, error, balance, D = equations.evaluate(start, np.zeros(2))

@@ -1,4 +1,6 @@
-"""Derivatives of solutions by the data of the interface problem, against central and one-sided differences."""
+"""Derivatives of solutions by the data of the interface problem, against central and one-sided
+differences.
+"""
 
 from dataclasses import replace
 
@@ -7,7 +9,15 @@ import pytest
 import scipy.sparse as sp
 
 import contactopt
-from contactopt import InputError, InterfaceProblem, Solution, Status, natural_map_residual, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Solution,
+    Status,
+    natural_map_residual,
+    scenes,
+    solve,
+)
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
@@ -16,7 +26,13 @@ from contactopt.problem.laws.frictionless import Frictionless
 from contactopt.problem.laws.mixed import Mixed
 from contactopt.problem.laws.tresca import Tresca
 
-LAWS = {"coulomb": Coulomb, "tresca": Tresca, "associated": Associated, "bilateral": Bilateral, "frictionless": None}
+LAWS = {
+    "coulomb": Coulomb,
+    "tresca": Tresca,
+    "associated": Associated,
+    "bilateral": Bilateral,
+    "frictionless": None,
+}
 STEP = 1e-6
 
 
@@ -62,10 +78,14 @@ def moved(problem, change, t):
 def difference(problem, change, start):
     """Central differences of reactions and multipliers."""
     ends = [
-        solve(moved(problem, change, t), "newton", tol=1e-14, start=start, max_iterations=20) for t in (STEP, -STEP)
+        solve(moved(problem, change, t), "newton", tol=1e-14, start=start, max_iterations=20)
+        for t in (STEP, -STEP)
     ]
     assert all(end.residual < 1e-12 for end in ends)
-    return [(getattr(ends[0], name) - getattr(ends[1], name)) / (2 * STEP) for name in ("reactions", "multipliers")]
+    return [
+        (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * STEP)
+        for name in ("reactions", "multipliers")
+    ]
 
 
 @pytest.mark.parametrize("kind", LAWS)
@@ -111,7 +131,9 @@ def test_adjoint_is_the_transpose_of_forward(kind, dim):
 def test_several_laws_in_one_problem():
     problem = random_problem(3, 2)
     members = (np.array([0, 2, 5]), np.array([1, 3, 4, 6, 7]))
-    problem = replace(problem, law=Mixed((Coulomb(np.full(3, 0.3)), Tresca(np.full(5, 0.1))), members))
+    problem = replace(
+        problem, law=Mixed((Coulomb(np.full(3, 0.3)), Tresca(np.full(5, 0.1))), members)
+    )
     solution = solve(problem, tol=1e-12)
     change = random_change(problem, 5)
     found = contactopt.sensitivity(problem, solution).forward(**change)
@@ -136,7 +158,11 @@ def test_every_form_of_the_operator_gives_the_derivatives_of_the_dense_one(scene
     solution = solve(full, tol=1e-12)
     ours, dense = contactopt.sensitivity(problem, solution), contactopt.sensitivity(full, solution)
     rng = np.random.default_rng(0)
-    change = {"q": rng.normal(size=problem.q.shape), "s": rng.normal(size=problem.s.shape), "mu": 0.5}
+    change = {
+        "q": rng.normal(size=problem.q.shape),
+        "s": rng.normal(size=problem.s.shape),
+        "mu": 0.5,
+    }
     weight = rng.normal(size=problem.q.shape)
     for one, two in (
         (ours.forward(**change).reactions, dense.forward(**change).reactions),
@@ -164,7 +190,12 @@ def at_kinks(kind, dim, seed):
     if kind == "associated":
         u[0, 0], u[4, 0] = 0.7 * b[0], 0.8 * b[4]
     if kind == "tresca":
-        r[0, 1:], r[4, 1:], r[5, 1:], r[2, 1:] = -b[0] * e[0], -b[4] * e[4], -b[5] * e[5], 0.3 * b[2] * e[2]
+        r[0, 1:], r[4, 1:], r[5, 1:], r[2, 1:] = (
+            -b[0] * e[0],
+            -b[4] * e[4],
+            -b[5] * e[5],
+            0.3 * b[2] * e[2],
+        )
     if kind == "bilateral":
         u[5, 0], r[5, 0], r[5, 1:] = 0.0, 0.8, -0.8 * b[5] * e[5]
     if kind == "frictionless":
@@ -181,15 +212,25 @@ def test_one_sided_derivatives_at_kinks_are_what_one_sided_differences_say(kind,
     for seed in range(3):
         problem, solution = at_kinks(kind, dim, seed)
         sensitivity = contactopt.sensitivity(problem, solution)
-        assert [weak.contact for weak in sensitivity.weak] == ([0, 2] if kind == "frictionless" else [0, 1, 2])
+        assert [weak.contact for weak in sensitivity.weak] == (
+            [0, 2] if kind == "frictionless" else [0, 1, 2]
+        )
         assert not sensitivity.differentiable and "no gradient" in sensitivity.sentence
         rng, h = np.random.default_rng(seed + 50), 1e-7
-        change = {"q": rng.normal(size=problem.q.shape), "mu": 0.3 * (kind != "frictionless") * rng.normal(size=6)}
-        there = replace(problem, q=problem.q + h * change["q"], law=problem.law.shifted(h * change["mu"]))
+        change = {
+            "q": rng.normal(size=problem.q.shape),
+            "mu": 0.3 * (kind != "frictionless") * rng.normal(size=6),
+        }
+        there = replace(
+            problem, q=problem.q + h * change["q"], law=problem.law.shifted(h * change["mu"])
+        )
         end = solve(there, tol=1e-13, start=solution)
         assert end.residual < 1e-12
         wanted = (end.reactions - solution.reactions) / h
-        assert np.abs(sensitivity.forward(**change).reactions - wanted).max() < 1e-5 * np.abs(wanted).max()
+        assert (
+            np.abs(sensitivity.forward(**change).reactions - wanted).max()
+            < 1e-5 * np.abs(wanted).max()
+        )
 
 
 def test_at_a_kink_the_two_sides_differ():
@@ -203,10 +244,14 @@ def test_at_a_kink_the_two_sides_differ():
 
 
 def test_at_the_apex_the_derivative_is_a_contact_problem_of_its_own():
-    """Without any force the problem looks the same in all scales: its derivative along d is the solution for q = d."""
+    """Without any force the problem looks the same in all scales: its derivative along d is the
+    solution for q = d.
+    """
     Q = np.array([[1.0, 0.4], [0.4, 1.2]])
     nothing = InterfaceProblem(Q, [[0.0, 0.0]], 0.5)
-    apex = contactopt.sensitivity(nothing, Solution(np.zeros((1, 2)), np.zeros(0), Status.SOLVED, 0.0, 0, "exact"))
+    apex = contactopt.sensitivity(
+        nothing, Solution(np.zeros((1, 2)), np.zeros(0), Status.SOLVED, 0.0, 0, "exact")
+    )
     for d in ([[-1.0, 0.9]], [[-1.0, -2.0]], [[-2.0, -1.1]], [[1.0, 0.3]]):
         found = apex.forward(q=np.array(d)).reactions
         assert np.allclose(found, solve(InterfaceProblem(Q, d, 0.5), tol=1e-12).reactions)
@@ -216,13 +261,19 @@ def test_units_do_not_matter():
     problem = random_problem(4, 3)
     solution = solve(problem, tol=1e-12)
     force, length = 1e5, 1e-3
-    other = InterfaceProblem(problem.Q * length / force, problem.q * length, problem.law, problem.V, problem.s * force)
-    scaled = replace(solution, reactions=solution.reactions * force, multipliers=solution.multipliers * length)
+    other = InterfaceProblem(
+        problem.Q * length / force, problem.q * length, problem.law, problem.V, problem.s * force
+    )
+    scaled = replace(
+        solution, reactions=solution.reactions * force, multipliers=solution.multipliers * length
+    )
     weight = np.random.default_rng(1).normal(size=problem.q.shape)
     one = contactopt.sensitivity(problem, solution).adjoint(reactions=weight)
     two = contactopt.sensitivity(other, scaled).adjoint(reactions=weight)
     assert (
-        np.allclose(two.q * length / force, one.q) and np.allclose(two.mu / force, one.mu) and np.allclose(two.s, one.s)
+        np.allclose(two.q * length / force, one.q)
+        and np.allclose(two.mu / force, one.mu)
+        and np.allclose(two.s, one.s)
     )
 
 

@@ -1,4 +1,6 @@
-"""What may be left out of a scene: symmetries that are there are found, those that are not there are not."""
+"""What may be left out of a scene: symmetries that are there are found, those that are not there
+are not.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +11,19 @@ import skfem
 from turned import moved, turn
 
 import contactopt
-from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, Traction, cli, scenes, simplify
+from contactopt import (
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    cli,
+    scenes,
+    simplify,
+)
 from contactopt.bodies.protocol import Region
 from contactopt.meshes.polar import ring
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
@@ -39,10 +53,18 @@ def punch(
 
     block = rename(box((2.0, 1.0), 0.0, 2.0, 2 * cells, cells), contact=f"{up}-", top=f"{up}+")
     ground = rename(
-        box((4.0, 2.0), -3.0, 0.0, 4 * cells, cells), contact=f"{up}+", bottom=f"{up}-", left="x-", right="x+"
+        box((4.0, 2.0), -3.0, 0.0, 4 * cells, cells),
+        contact=f"{up}+",
+        bottom=f"{up}-",
+        left="x-",
+        right="x+",
     )
     plate = Plate("top", force)
-    under = np.all(np.abs(_middles(ground, "contact")[: dim - 1] - middle[:, None]) < [[2.0], [1.0]][: dim - 1], axis=0)
+    under = np.all(
+        np.abs(_middles(ground, "contact")[: dim - 1] - middle[:, None])
+        < [[2.0], [1.0]][: dim - 1],
+        axis=0,
+    )
     ground = ground.with_boundaries({"contact": ground.boundaries["contact"][under]})
     return Scene(
         "punch",
@@ -78,7 +100,10 @@ def test_half_of_a_punch_has_the_answer_of_the_whole():
     one, other = solve_scene(whole, options=TIGHT), solve_scene(found.scene, options=TIGHT)
     assert np.allclose(numbers(one), numbers(other), rtol=1e-8)
     left, right = (each.reduction.problem for each in (one, other))
-    pressure = {round(x, 9): p for x, p in zip(left.coordinates[0], one.solution.reactions[:, 0] / left.areas)}
+    pressure = {
+        round(x, 9): p
+        for x, p in zip(left.coordinates[0], one.solution.reactions[:, 0] / left.areas)
+    }
     for x, p in zip(right.coordinates[0], other.solution.reactions[:, 0] / right.areas):
         assert p == pytest.approx(pressure[round(x, 9)], rel=1e-8)
 
@@ -111,7 +136,13 @@ def test_what_spoils_a_symmetry_is_named(scene, reason):
 @pytest.mark.parametrize(
     "scene",
     [
-        punch(support=(Support("bottom", {"y": 0.0}), Support("left", {"x": 0.1}), Support("right", {"x": -0.1}))),
+        punch(
+            support=(
+                Support("bottom", {"y": 0.0}),
+                Support("left", {"x": 0.1}),
+                Support("right", {"x": -0.1}),
+            )
+        ),
         punch(loads=(Traction("x+", (0.1, 0.2)), Traction("x-", (-0.1, 0.2)))),
         punch(mu=lambda x: 0.3 + 0.1 * np.abs(x[0] - 3)),
     ],
@@ -125,20 +156,27 @@ def test_pairs_of_images_keep_a_symmetry(scene):
 
 def test_gaps_are_compared():
     block = punch().upper
-    for gap, count in ((lambda x: 0.01 * (x[0] - 3) ** 2, 1), (lambda x: 0.01 * (x[0] - 2.9) ** 2, 0)):
+    for gap, count in (
+        (lambda x: 0.01 * (x[0] - 3) ** 2, 1),
+        (lambda x: 0.01 * (x[0] - 2.9) ** 2, 0),
+    ):
         assert len(halves(Scene("ball", block, Rigid("floor", (0.0, 1.0), gap), 0.2))) == count
 
 
 def test_a_body_that_is_not_symmetric_is_told_from_one_that_is():
     scene = punch()
-    skewed = replace(scene.lower.mesh, doflocs=scene.lower.mesh.p + 1e-3 * (scene.lower.mesh.p[0] > 6.99))
+    skewed = replace(
+        scene.lower.mesh, doflocs=scene.lower.mesh.p + 1e-3 * (scene.lower.mesh.p[0] > 6.99)
+    )
     assert not halves(replace(scene, lower=replace(scene.lower, mesh=skewed)))
 
 
 def test_a_plane_across_no_axis_is_told():
     """Supports speak of the components of space, so that such a plane cannot hold a half."""
     found = simplify(moved(punch(), turn(30.0)), solve=False)
-    assert not found.found and any("0.866 x + 0.5 y = 3; turn it" in note for note in found.notes), found.notes
+    assert not found.found and any(
+        "0.866 x + 0.5 y = 3; turn it" in note for note in found.notes
+    ), found.notes
 
 
 def test_nothing_is_cut():
@@ -147,14 +185,21 @@ def test_nothing_is_cut():
 
     def shaken(part: Part) -> Part:
         mesh = simplices(part.mesh)
-        inner = np.setdiff1d(np.arange(mesh.p.shape[1]), np.unique(mesh.facets[:, mesh.boundary_facets()]))
+        inner = np.setdiff1d(
+            np.arange(mesh.p.shape[1]), np.unique(mesh.facets[:, mesh.boundary_facets()])
+        )
         p = mesh.p.copy()
         p[:, inner] += 0.05 * rng.uniform(-1, 1, (2, len(inner)))
         return replace(part, mesh=replace(mesh, doflocs=p))
 
     assert not halves(punch(cells=6).with_parts(shaken))
     odd = tensor_mesh(np.linspace(-1, 1, 6), np.linspace(0, 1, 3))
-    block = Part("block", rename(odd, contact="y-", top="y+"), SOFT, loads=(Plate("top", {"x": 0.0, "y": -1.0}),))
+    block = Part(
+        "block",
+        rename(odd, contact="y-", top="y+"),
+        SOFT,
+        loads=(Plate("top", {"x": 0.0, "y": -1.0}),),
+    )
     found = simplify(Scene("odd", block, Rigid("floor"), 0.3), solve=False)
     assert not found.found and "runs through elements" in found.notes[0]
 
@@ -182,8 +227,12 @@ def test_round_bodies_that_are_nearly_symmetric_stay_whole():
 
 
 def bumpy(height: float, wide: float = 0.01, mu: Callable | float = 0.2) -> Scene:
-    """A rigid disc on the wide top of a block, with an asperity of that height to the right of its middle."""
-    mesh = rename(tensor_mesh(np.linspace(-3, 3, 121), np.linspace(-3, 0, 4)), contact="y+", bottom="y-")
+    """A rigid disc on the wide top of a block, with an asperity of that height to the right of its
+    middle.
+    """
+    mesh = rename(
+        tensor_mesh(np.linspace(-3, 3, 121), np.linspace(-3, 0, 4)), contact="y+", bottom="y-"
+    )
 
     def gap(x: np.ndarray) -> np.ndarray:
         return x[0] ** 2 / 20 - height * np.exp(-(((x[0] - 1.234) / wide) ** 2))
@@ -201,18 +250,28 @@ def test_asperities_and_patches_that_few_contacts_see_are_seen():
 
 @pytest.mark.parametrize(
     "scene",
-    [bumpy(0.1, 0.05), punch(mu=lambda x: 0.02 + 0.3 * (x[0] > 3)), punch(force={"x": 1.0, "y": -10.0})],
+    [
+        bumpy(0.1, 0.05),
+        punch(mu=lambda x: 0.02 + 0.3 * (x[0] > 3)),
+        punch(force={"x": 1.0, "y": -10.0}),
+    ],
     ids=["gap", "friction", "force"],
 )
 def test_the_whole_refuses_what_a_comparison_would_have_missed(scene, monkeypatch):
-    """The proof reads nothing of what was compared: with blind comparisons it still finds every asymmetry."""
+    """The proof reads nothing of what was compared: with blind comparisons it still finds every
+    asymmetry.
+    """
     monkeypatch.setattr(images, "equal_functions", lambda *a: True)
     if scene.name == "punch":
         conditions = images._Comparison._conditions_differ
 
         def blind(self, part, image, own):
             conditions(self, part, image, own)
-            own |= {(part.name, i) for i, load in enumerate(getattr(part, "loads", ())) if isinstance(load, Plate)}
+            own |= {
+                (part.name, i)
+                for i, load in enumerate(getattr(part, "loads", ()))
+                if isinstance(load, Plate)
+            }
             return ""
 
         monkeypatch.setattr(images._Comparison, "_conditions_differ", blind)
@@ -224,20 +283,31 @@ def test_the_whole_refuses_what_a_comparison_would_have_missed(scene, monkeypatc
 
 
 def test_stress_at_the_plane_is_that_of_the_whole():
-    """No shear is left across the plane of symmetry, and what is recovered there looks at both sides."""
+    """No shear is left across the plane of symmetry, and what is recovered there looks at both
+    sides.
+    """
     for degree in (1, 2):
         whole = replace(punch(), degree=degree)
-        one, other = (solve_scene(scene, options=TIGHT) for scene in (whole, simplify(whole, solve=False).scene))
+        one, other = (
+            solve_scene(scene, options=TIGHT)
+            for scene in (whole, simplify(whole, solve=False).scene)
+        )
         for number in range(2):
             fields, stresses = [], []
             for each in (one, other):
-                body, U = each.reduction.bodies[number], each.reduction.displaced(each.solution)[number]
+                body, U = (
+                    each.reduction.bodies[number],
+                    each.reduction.displaced(each.solution)[number],
+                )
                 made, recovered = body.fields(U), body.stress_map(Region())
                 plane, there = (np.abs(x[0] - 3.0) < 1e-9 for x in (made.mesh.p, recovered.places))
                 fields.append(made.stress[plane][np.argsort(made.mesh.p[1, plane])])
                 stresses.append(recovered.stress(U)[there][np.argsort(recovered.places[1, there])])
             for left, right in (fields, stresses):
-                assert np.allclose(left, right, atol=1e-9 * np.abs(left).max()) and np.abs(right[:, 3]).max() == 0.0
+                assert (
+                    np.allclose(left, right, atol=1e-9 * np.abs(left).max())
+                    and np.abs(right[:, 3]).max() == 0.0
+                )
 
 
 def test_bodies_that_are_each_others_images():
@@ -248,9 +318,14 @@ def test_bodies_that_are_each_others_images():
     )  # four stones, of which one is cut, and one abutment
     one, other = solve_scene(arch, options=TIGHT), solve_scene(half.scene, options=TIGHT)
     assert numbers(one)[0] == pytest.approx(numbers(other)[0], rel=1e-8)
-    forces = {pair.name: one.solution.reactions[pair.contacts, 0].sum() for pair in one.reduction.problem.pairs}
+    forces = {
+        pair.name: one.solution.reactions[pair.contacts, 0].sum()
+        for pair in one.reduction.problem.pairs
+    }
     for pair in other.reduction.problem.pairs:
-        assert other.solution.reactions[pair.contacts, 0].sum() == pytest.approx(2 * forces[pair.name], rel=1e-8)
+        assert other.solution.reactions[pair.contacts, 0].sum() == pytest.approx(
+            2 * forces[pair.name], rel=1e-8
+        )
 
 
 def test_a_contact_in_the_plane_is_told():
@@ -270,7 +345,10 @@ def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
         mesh = skfem.MeshHex.init_tensor(*[np.unique(np.round(row, 12)) for row in flat.p], depth)
         p = np.empty_like(mesh.p)
         p[[other for other in range(3) if other != axis]], p[axis] = mesh.p[:2], mesh.p[2]
-        sides = {name: flat.p[:, flat.facets[:, facets]].mean(axis=1) for name, facets in flat.boundaries.items()}
+        sides = {
+            name: flat.p[:, flat.facets[:, facets]].mean(axis=1)
+            for name, facets in flat.boundaries.items()
+        }
         made = replace(mesh, doflocs=p)
         middle = made.p[:, made.facets].mean(axis=1)
         section = np.delete(middle, axis, axis=0)
@@ -279,10 +357,15 @@ def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
             apart = np.abs(section[:, :, None] - points[:, None]).max(axis=0).min(axis=1)
             return np.flatnonzero((apart < 1e-9) & (np.abs(middle[axis] % 0.75 - 0.375) < 1e-9))
 
-        ends = {end: np.flatnonzero(np.abs(middle[axis] - at) < 1e-9) for end, at in (("near", 0.0), ("far", 1.5))}
+        ends = {
+            end: np.flatnonzero(np.abs(middle[axis] - at) < 1e-9)
+            for end, at in (("near", 0.0), ("far", 1.5))
+        }
         made = made.with_boundaries({name: on(points) for name, points in sides.items()} | ends)
         rollers = tuple(Support(end, {components[axis]: 0.0}) for end in ends) if held else ()
-        loads = tuple(replace(load, force=dict(zip(across, load.force.values()))) for load in part.loads)
+        loads = tuple(
+            replace(load, force=dict(zip(across, load.force.values()))) for load in part.loads
+        )
         if push and loads:
             loads = (*loads, Traction("x+", tuple(push * (other == axis) for other in range(3))))
         supports = tuple(replace(each, displacement=None) for each in part.supports)
@@ -294,7 +377,9 @@ def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
 def test_a_solid_that_is_a_plate_between_rollers_is_in_plane_strain():
     solid, plane = prism(), punch(force={"x": 1.0, "y": -10.0})
     found = simplify(solid, solve=False)
-    assert [each.name for each in found.found] == ["plane strain"] and found.scene.kind == "plane-strain"
+    assert [each.name for each in found.found] == [
+        "plane strain"
+    ] and found.scene.kind == "plane-strain"
     whole, section = (solve_scene(scene, options=TIGHT) for scene in (solid, found.scene))
     exact = solve_scene(replace(plane, thickness=1.5), options=TIGHT)
     assert np.allclose(numbers(section), numbers(exact), rtol=1e-8)
@@ -312,7 +397,9 @@ def test_a_prism_that_is_not_in_plane_strain(scene, reason):
 
 @pytest.mark.parametrize("way", ["gap", "friction", "curve"])
 def test_what_changes_along_a_prism_is_seen(way):
-    """A ridge, a slippery band or a crown over a part of a roller, where three stations along it see nothing."""
+    """A ridge, a slippery band or a crown over a part of a roller, where three stations along it
+    see nothing.
+    """
 
     def band(x: np.ndarray) -> np.ndarray:
         return np.abs(x[1] - 0.62) < 0.05
@@ -324,9 +411,13 @@ def test_what_changes_along_a_prism_is_seen(way):
         ridge, slip, crown = (spoilt and way == name for name in ("gap", "friction", "curve"))
         curve = (lambda x: x + np.array([[0], [0], [1e-3]]) * np.sin(x[1])) if crown else None
         held = (Support("bottom"), Support("near", {"y": 0.0}), Support("far", {"y": 0.0}))
-        upper = Rigid("roller", (0.0, 0.0, 1.0), lambda x: x[0] ** 2 / 20 - ridge * 0.1 * band(x), {"z": -1.0})
+        upper = Rigid(
+            "roller", (0.0, 0.0, 1.0), lambda x: x[0] ** 2 / 20 - ridge * 0.1 * band(x), {"z": -1.0}
+        )
         block = Part("block", mesh, SOFT, held, curve=curve)
-        return Scene("roller", upper, block, lambda x: 0.3 - slip * 0.2 * band(x) + 0 * x[0], kind="solid")
+        return Scene(
+            "roller", upper, block, lambda x: 0.3 - slip * 0.2 * band(x) + 0 * x[0], kind="solid"
+        )
 
     for spoilt in (False, True):
         found = simplify(roller(spoilt))
@@ -355,7 +446,10 @@ def test_ties_that_would_slip_are_told():
         lambda part: replace(part, loads=loads[part.name]) if isinstance(part, Part) else part
     )
     other = replace(
-        other, contacts=tuple(replace(pair, mu=0.6) if pair.law == "coulomb" else pair for pair in other.contacts)
+        other,
+        contacts=tuple(
+            replace(pair, mu=0.6) if pair.law == "coulomb" else pair for pair in other.contacts
+        ),
     )
     assert "would slip" in ties.check(solve_scene(other))
 
@@ -363,7 +457,9 @@ def test_ties_that_would_slip_are_told():
 def test_friction_that_does_nothing_is_left_out():
     found = simplify(scenes.press_fit(mu=0.4))
     assert found["frictionless contacts"].error < 1e-6
-    assert "slide by at most" in found["frictionless contacts"].check(solve_scene(found["frictionless contacts"].scene))
+    assert "slide by at most" in found["frictionless contacts"].check(
+        solve_scene(found["frictionless contacts"].scene)
+    )
     different = simplify(scenes.cylinder(mu=0.4, rigid="cylinder"))
     assert "frictionless contacts" not in [each.name for each in different.found]
 
@@ -386,8 +482,14 @@ def test_thin_bodies_are_no_half_spaces():
 
 def test_a_report_reads_well_and_names_are_known():
     found = simplify(punch())
-    assert "mirror symmetry" in repr(found) and "<table>" in found._repr_html_() and str(found).count("\n") > 3
-    with pytest.raises(InputError, match="no simplification 'plane strain'; found were: mirror symmetry"):
+    assert (
+        "mirror symmetry" in repr(found)
+        and "<table>" in found._repr_html_()
+        and str(found).count("\n") > 3
+    )
+    with pytest.raises(
+        InputError, match="no simplification 'plane strain'; found were: mirror symmetry"
+    ):
         found["plane strain"]
     with pytest.raises(InputError, match="must be a Scene"):
         simplify("punch-2d")
@@ -399,7 +501,16 @@ def test_a_report_reads_well_and_names_are_known():
 def test_the_command_says_what_may_be_left_out_and_run_applies_it(tmp_path, capsys):
     assert cli.main(["simplify", "arch", "--set", "elements=2"]) == 0
     assert "needs no more than one half of the bodies" in capsys.readouterr().out
-    run = ["run", "arch", "--elements", "2", "--no-figures", "--simplest", "--out", str(tmp_path / "half")]
+    run = [
+        "run",
+        "arch",
+        "--elements",
+        "2",
+        "--no-figures",
+        "--simplest",
+        "--out",
+        str(tmp_path / "half"),
+    ]
     assert cli.main(run) == 0
     told = capsys.readouterr()
     assert "needs no more than one half" in told.err and "arch" in told.out
@@ -411,13 +522,19 @@ def test_a_load_path_is_not_simplified():
 
 
 def test_rollers_at_a_contact_are_no_planes_of_symmetry():
-    """A whole block between rollers: after a cut in x its walls would be taken for mirrors, and resultants halved."""
+    """A whole block between rollers: after a cut in x its walls would be taken for mirrors, and
+    resultants halved.
+    """
     scene = prism(held=False, axis=1)
     walls = scene.with_parts(
-        lambda part: replace(part, supports=(*part.supports, Support("near", {"y": 0.0})), loads=part.loads)
+        lambda part: replace(
+            part, supports=(*part.supports, Support("near", {"y": 0.0})), loads=part.loads
+        )
     )
     straight = walls.with_parts(
-        lambda part: replace(part, loads=tuple(replace(load, force={"x": 0.0, "z": -10.0}) for load in part.loads))
+        lambda part: replace(
+            part, loads=tuple(replace(load, force={"x": 0.0, "z": -10.0}) for load in part.loads)
+        )
     )
     found = simplify(straight, solve=False)
     assert not found.found and any("is not cut" in note for note in found.notes)

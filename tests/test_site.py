@@ -1,4 +1,6 @@
-"""The documentation is built from scratch, warnings as errors, tutorials executed; its pages are whole."""
+"""The documentation is built from scratch, warnings as errors, tutorials executed; its pages are
+whole.
+"""
 
 import re
 import subprocess
@@ -24,12 +26,17 @@ LIMIT = 900.0  # s: three minutes on two idle cores, more where other tests run
 def titles() -> dict[str, str]:
     """Name and title of the reports that are there before the build."""
     reports = (ROOT / "reports").glob("*/report.md")
-    return {report.parent.name: report.read_text().splitlines()[0].removeprefix("# ") for report in reports}
+    return {
+        report.parent.name: report.read_text().splitlines()[0].removeprefix("# ")
+        for report in reports
+    }
 
 
 @pytest.fixture(scope="module")
 def built(titles, tmp_path_factory) -> Path:
-    """Site of a build in a process of its own; the folder of the sources is left as it was, but for `generated`."""
+    """Site of a build in a process of its own; the folder of the sources is left as it was, but for
+    `generated`.
+    """
     out = tmp_path_factory.mktemp("site")
     command = [
         sys.executable,
@@ -45,7 +52,9 @@ def built(titles, tmp_path_factory) -> Path:
         out / "html",
     ]
     start = time.perf_counter()
-    done = subprocess.run([str(c) for c in command], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    done = subprocess.run(
+        [str(c) for c in command], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT
+    )
     assert done.returncode == 0, "install the extra `docs`, or mend:\n" + done.stderr[-4000:]
     print(f"built in {time.perf_counter() - start:.0f} s")
     return out / "html"
@@ -67,12 +76,18 @@ def test_every_method_and_public_name_has_its_place(built):
         page = (built / "generated" / "methods" / f"{name}.html").read_text()
         assert f"{name}.html" in listed and letters(what[1:]) in letters(page)
     reference = (built / "generated" / "api.html").read_text()
-    everything = {anchor for text in pages(built).values() for anchor in re.findall(r'id="(contactopt[\w.]*)"', text)}
+    everything = {
+        anchor
+        for text in pages(built).values()
+        for anchor in re.findall(r'id="(contactopt[\w.]*)"', text)
+    }
     for name in contactopt.__all__:
         assert f">{name}<" in reference
         thing = getattr(contactopt, name)
         if not hasattr(thing, "__path__") and hasattr(thing, "__qualname__"):
-            assert any(anchor.endswith(f".{name}") for anchor in everything), f"{name} is on no page"
+            assert any(anchor.endswith(f".{name}") for anchor in everything), (
+                f"{name} is on no page"
+            )
 
 
 @pytest.mark.slow
@@ -81,16 +96,23 @@ def test_tutorials_were_executed_and_their_slider_is_there(built):
         page = (built / "generated" / "tutorials" / f"{path.stem}.html").read_text()
         assert "<img" in page, f"{path.stem}: no figure"
         assert page.count("<details>") == path.read_text().count("<details>") > 0
-    assert 'class="one-node"' in (built / "generated" / "tutorials" / "one_contact_node.html").read_text()
+    assert (
+        'class="one-node"'
+        in (built / "generated" / "tutorials" / "one_contact_node.html").read_text()
+    )
 
 
 @pytest.mark.slow
 def test_reports_are_included(built, titles):
-    text = "".join((built / "generated" / f"{page}.html").read_text() for page in ("accuracy", "performance"))
+    text = "".join(
+        (built / "generated" / f"{page}.html").read_text() for page in ("accuracy", "performance")
+    )
     assert len(titles) > 5
     for name, title in titles.items():
         assert letters(title) in letters(text), title
-        assert (built / "generated" / "reports" / f"{name}.html").read_text().count("<table") > 0, name
+        assert (built / "generated" / "reports" / f"{name}.html").read_text().count("<table") > 0, (
+            name
+        )
 
 
 @pytest.mark.slow
@@ -98,10 +120,13 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
     for path, text in pages(built).items():
         for tag, target in re.findall(r'<(\w+)[^>]*?\s(?:href|src)="([^"#][^"]*)"', text):
             parts = urlsplit(unescape(target))
-            if (parts.scheme or parts.netloc) and parts.scheme != "data":  # data: a picture within the page
+            # data: a picture within the page
+            if (parts.scheme or parts.netloc) and parts.scheme != "data":
                 assert tag == "a", f"{path.name} loads {target}"
             elif parts.path and not parts.scheme:
-                assert (path.parent / unquote(parts.path)).exists(), f"{path.name} links to {target}"
+                assert (path.parent / unquote(parts.path)).exists(), (
+                    f"{path.name} links to {target}"
+                )
     assert (built / "_static" / "mathjax" / "tex-chtml.js").exists()
 
 
@@ -116,10 +141,14 @@ def reference(monkeypatch):
 def test_every_room_has_a_page_that_names_its_modules(reference):
     pages = dict(reference.room_pages(ROOT))
     rooms = {
-        path.stem for path in (ROOT / "contactopt").iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()
+        path.stem
+        for path in (ROOT / "contactopt").iterdir()
+        if path.suffix == ".py" or (path / "__init__.py").exists()
     }
     rooms -= {"__init__", "__main__"}
-    assert rooms == set(reference.ROOMS) == set(reference.rooms(ROOT)), "give the new room a sentence in ROOMS"
+    assert rooms == set(reference.ROOMS) == set(reference.rooms(ROOT)), (
+        "give the new room a sentence in ROOMS"
+    )
     for room in rooms:
         page = pages[Path("api", f"{room}.md")]
         assert reference.ROOMS[room] in page
@@ -136,7 +165,12 @@ def test_every_entry_of_every_table_is_on_its_page(reference):
     from contactopt.scenes import SCENES
 
     pages = {str(path): page for path, page in reference.plug_in_pages(SITE)}
-    tables = {"scenes": SCENES, "preconditioners": PRECONDITIONERS, "body_solvers": SOLVERS, "backends": QP | CONIC}
+    tables = {
+        "scenes": SCENES,
+        "preconditioners": PRECONDITIONERS,
+        "body_solvers": SOLVERS,
+        "backends": QP | CONIC,
+    }
     laws = reference.optional("contactopt.problem.laws", "LAWS")
     couplings = reference.optional("contactopt.coupling.coupling", "COUPLINGS")
     for name, table in (tables | {"laws": laws, "couplings": couplings}).items():
@@ -145,7 +179,8 @@ def test_every_entry_of_every_table_is_on_its_page(reference):
         assert set(listed) == set(table)
 
 
-# tests/test_plugins.py runs the page of plug-ins, tests/test_own_mesh_page.py and tests/test_how_tos.py run the pages that need files or build on themselves.
+# tests/test_plugins.py runs the page of plug-ins, tests/test_own_mesh_page.py and
+# tests/test_how_tos.py run the pages that need files or build on themselves.
 @pytest.mark.parametrize(
     "path",
     [path for path in sorted(SITE.glob("*.md")) if path.stem not in {*HOW_TOS, "add_a_plug_in"}],

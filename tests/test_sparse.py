@@ -22,7 +22,9 @@ def stack():
 def test_both_forms_are_the_same_problem(stack):
     array = InterfaceProblem(stack.Q.toarray(), stack.q, stack.mu)
     assert sp.issparse(stack.Q) and array.fingerprint == stack.fingerprint
-    assert np.array_equal(diagonal(stack.Q), diagonal(array.Q)) and np.array_equal(held(stack.Q), held(array.Q))
+    assert np.array_equal(diagonal(stack.Q), diagonal(array.Q)) and np.array_equal(
+        held(stack.Q), held(array.Q)
+    )
     some = np.array([0, 3, 5, 8])
     assert np.array_equal(dense(block(stack.Q, some)), block(array.Q, some))
     added = np.arange(float(stack.q.size))
@@ -30,17 +32,27 @@ def test_both_forms_are_the_same_problem(stack):
     a, b = dimensionless(stack)[0], dimensionless(array)[0]
     assert sp.issparse(a.Q) and np.allclose(dense(a.Q), b.Q, rtol=1e-15)
     r = np.random.default_rng(0).normal(size=stack.q.shape)
-    assert natural_map_residual(stack, r) == pytest.approx(natural_map_residual(array, r), rel=1e-12)
+    assert natural_map_residual(stack, r) == pytest.approx(
+        natural_map_residual(array, r), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("method", ["auto", "newton", "proximal", "nsgs", "admm", "apg"])
 def test_methods_solve_it_and_keep_it_sparse(method, monkeypatch):
     problem = packing(2, 16, mu=0.3)
-    monkeypatch.setattr(InterfaceProblem, "explicit", lambda self: pytest.fail("Q was formed as an array"))
+    monkeypatch.setattr(
+        InterfaceProblem, "explicit", lambda self: pytest.fail("Q was formed as an array")
+    )
     solution = solve(problem, method, tol=1e-6, max_iterations=20_000, time_limit=20)
     assert solution.solved
     found = violations(
-        problem.Q.toarray(), problem.q, problem.mu, problem.V, problem.s, solution.reactions, solution.multipliers
+        problem.Q.toarray(),
+        problem.q,
+        problem.mu,
+        problem.V,
+        problem.s,
+        solution.reactions,
+        solution.multipliers,
     )
     assert max(found.values()) < 2e-5
 
@@ -54,12 +66,17 @@ def test_every_friction_coefficient(dim, mu):
 def test_unsymmetric_compliance_is_solved_as_it_stands():
     Q = packing(2, 25).Q.toarray()
     noise = np.random.default_rng(0).normal(size=Q.shape) * (Q != 0)
-    Q = sp.csr_array(Q + 0.5 * np.diag(np.diag(Q)) + 0.05 * np.abs(Q).max() * (noise - noise.T))  # x' Q x > 0
+    # x' Q x > 0
+    Q = sp.csr_array(Q + 0.5 * np.diag(np.diag(Q)) + 0.05 * np.abs(Q).max() * (noise - noise.T))
     problem = InterfaceProblem(Q, packing(2, 25).q, 0.3)
     assert not problem.symmetric and asymmetry(problem.Q) > 0.02
     solution = solve(problem)
     u = problem.displacements(solution.reactions, solution.multipliers)
-    assert solution.solved and u[:, 0].min() > -1e-7 and np.abs(u[:, 0] * solution.reactions[:, 0]).max() < 1e-6
+    assert (
+        solution.solved
+        and u[:, 0].min() > -1e-7
+        and np.abs(u[:, 0] * solution.reactions[:, 0]).max() < 1e-6
+    )
 
     for method in ("tresca", "acary_cadoux", "alternating"):
         with pytest.raises(InputError, match="unsymmetric"):
@@ -78,7 +95,9 @@ def test_block_systems_dense_and_sparse_agree(stack):
 
 
 def test_sign_of_the_determinant():
-    """Dense and sparse factors against LAPACK's determinant of the system written out; both signs occur."""
+    """Dense and sparse factors against LAPACK's determinant of the system written out; both signs
+    occur.
+    """
     stack, rng = packing(2, 25, seed=3, points=2), np.random.default_rng(1)
     k, d = stack.q.shape
     signs = set()
@@ -114,7 +133,9 @@ def test_a_path_that_turns_back_ends_at_a_solution(dim, bodies, mu, points, monk
     for full in (True, False):  # paths that do not turn end early
         assert min(error for _, error in interior_iterates(scaled, matrix, Path(full))) > 1e-4
     seen, along = [], Homotopy.along
-    monkeypatch.setattr(Homotopy, "along", lambda self, point: seen.append(point.t) or along(self, point))
+    monkeypatch.setattr(
+        Homotopy, "along", lambda self, point: seen.append(point.t) or along(self, point)
+    )
     *_, (point, error) = homotopy_iterates(scaled, matrix, 1000)
     assert error < 1e-8 and natural_map_residual(problem, *scales.to_physical(*point)) < 1e-6
     assert np.any(np.diff(seen) > 0) and len(seen) < 300  # t has risen
@@ -164,7 +185,12 @@ def as_text(problem, storage):
     if storage == 0:
         out += [n, n, *Q.T.ravel()]
     elif storage == 1:
-        pairs = [(i, j) for i in range(k) for j in range(k) if np.any(Q[i * d : i * d + d, j * d : j * d + d])]
+        pairs = [
+            (i, j)
+            for i in range(k)
+            for j in range(k)
+            if np.any(Q[i * d : i * d + d, j * d : j * d + d])
+        ]
         ends = [d * (i + 1) for i in range(k)]
         rows = np.cumsum([0] + [sum(i == row for i, _ in pairs) for row in range(k)])
         out += [len(pairs), k, k, *ends, *ends, k + 1, len(pairs), *rows, *(j for _, j in pairs)]
@@ -177,12 +203,17 @@ def as_text(problem, storage):
             a, b = columns.indptr[j : j + 2]
             out += [f"\n col {j} : locations {a} to {b - 1}\n"]
             out += [
-                f"{columns.indices[e]} : {columns.data[e]!r}\n".replace("np.float64(", "").replace(")", "")
+                f"{columns.indices[e]} : {columns.data[e]!r}\n".replace("np.float64(", "").replace(
+                    ")", ""
+                )
                 for e in range(a, b)
             ]
     words = [*out, *problem.q.ravel(), *problem.mu]
     return (
-        " ".join(w if isinstance(w, str) else repr(float(w)) if isinstance(w, float) else str(w) for w in words)
+        " ".join(
+            w if isinstance(w, str) else repr(float(w)) if isinstance(w, float) else str(w)
+            for w in words
+        )
         + "\nend"
     )
 
@@ -200,7 +231,10 @@ def test_the_text_format_is_read_in_all_storages(storage, tmp_path):
     [
         ("3 1", "numbers"),
         ("4 1 0 4 4", "dimension"),
-        ("2 1000000000000 0 2000000000000 2000000000000 2000000000000 2000000000000 1.0", "numbers"),
+        (
+            "2 1000000000000 0 2000000000000 2000000000000 2000000000000 2000000000000 1.0",
+            "numbers",
+        ),
         ("2 1 0 3 3", "does not fit"),
         ("2 1 9 2 2 1 1", "storage"),
         ("2 1 1 2 2 5000000000 1 1 2 2", "numbers"),

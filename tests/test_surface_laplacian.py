@@ -1,4 +1,6 @@
-"""The preconditioner of any contact mesh, against dense formulas, closed curves and the kernel of the half-space."""
+"""The preconditioner of any contact mesh, against dense formulas, closed curves and the kernel of
+the half-space.
+"""
 
 from dataclasses import replace
 
@@ -11,7 +13,12 @@ from skfem import MeshQuad, MeshTri
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.methods.preconditioners.surface import divergences, inverse_root, laplacian, surface_matrices
+from contactopt.methods.preconditioners.surface import (
+    divergences,
+    inverse_root,
+    laplacian,
+    surface_matrices,
+)
 from contactopt.problem.chart import Chart
 
 POISSON = 0.3
@@ -26,7 +33,9 @@ def graded_corner(size):
     """Triangles that are twenty times finer at one corner than far from it."""
     mesh = MeshTri.init_tensor(*[np.linspace(0, 1, 2 * size - 1)] * 2)
     for ring in range(5):
-        mesh = mesh.refined(np.flatnonzero(np.linalg.norm(mesh.p[:, mesh.t].mean(axis=1), axis=0) < 0.5**ring))
+        mesh = mesh.refined(
+            np.flatnonzero(np.linalg.norm(mesh.p[:, mesh.t].mean(axis=1), axis=0) < 0.5**ring)
+        )
     return mesh.p, mesh.t
 
 
@@ -34,7 +43,9 @@ def l_shape(size):
     mesh = MeshTri.init_lshaped().refined(size - 1)
     inner = np.setdiff1d(np.arange(mesh.p.shape[1]), mesh.boundary_nodes())
     p = mesh.p.copy()
-    p[:, inner] += 0.15 * 2.0 ** (1 - size) * np.random.default_rng(0).uniform(-1, 1, (2, len(inner)))
+    p[:, inner] += (
+        0.15 * 2.0 ** (1 - size) * np.random.default_rng(0).uniform(-1, 1, (2, len(inner)))
+    )
     return p, mesh.t
 
 
@@ -52,7 +63,9 @@ def annulus(size):
 
 
 def half_space(points, cells):
-    """Boussinesq's and Cerruti's kernels for forces spread over three points of each triangle, Q dense."""
+    """Boussinesq's and Cerruti's kernels for forces spread over three points of each triangle, Q
+    dense.
+    """
     k, c = points.shape[1], cells.shape[1]
     hats = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
     x = points[:, cells]
@@ -79,7 +92,9 @@ def half_space(points, cells):
     Q = Q.reshape(3 * k, 3 * k)
     space = np.concatenate([points, np.zeros((1, k))])
     chart = Chart(points, (False, False), None, cells)
-    return InterfaceProblem((Q + Q.T) / 2, np.zeros((k, 3)), 0.5, areas=mass, coordinates=space, chart=chart)
+    return InterfaceProblem(
+        (Q + Q.T) / 2, np.zeros((k, 3)), 0.5, areas=mass, coordinates=space, chart=chart
+    )
 
 
 def condition(P, Q):
@@ -117,7 +132,8 @@ def test_matrices_of_a_surface():
     K, mass, shift, share = surface_matrices(points, cells)
     assert np.allclose(K @ np.ones(len(mass)), 0.0, atol=1e-12)
     x = points[0]
-    assert x @ K @ x == pytest.approx(3.0) and mass.sum() == pytest.approx(3.0)  # |grad x|^2 over the area
+    # |grad x|^2 over the area
+    assert x @ K @ x == pytest.approx(3.0) and mass.sum() == pytest.approx(3.0)
     corner = np.argmin(np.abs(points.T - [0.0, 0.0]).sum(axis=1))
     assert share[corner] == pytest.approx(0.75) and share.max() == pytest.approx(1.0)
     two = np.concatenate([points, points + 5.0], axis=1)
@@ -141,7 +157,9 @@ def test_products_are_those_of_the_dense_root():
     dense = weight[:, None] * la.sqrtm(L).real * weight
     P = preconditioner(problem, "laplacian")
     found = (P @ np.eye(3 * len(mass)))[::3, ::3]
-    assert np.allclose(found / found[0, 0], dense / dense[0, 0], atol=1e-3 * np.abs(dense / dense[0, 0]).max())
+    assert np.allclose(
+        found / found[0, 0], dense / dense[0, 0], atol=1e-3 * np.abs(dense / dense[0, 0]).max()
+    )
     back = P.model @ (P @ problem.Q[0])
     assert np.allclose(back, problem.Q[0], atol=2e-3 * np.abs(problem.Q[0]).max())
 
@@ -152,7 +170,9 @@ def test_numbering_and_units_do_not_matter():
     order = np.random.default_rng(0).permutation(k)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
     number = np.argsort(order)
-    chart = Chart(1e3 * problem.chart.places[:, order], (False, False), None, number[problem.chart.cells])
+    chart = Chart(
+        1e3 * problem.chart.places[:, order], (False, False), None, number[problem.chart.cells]
+    )
     mixed = replace(
         problem,
         Q=problem.Q[np.ix_(rows, rows)],
@@ -172,7 +192,10 @@ def pin_in_bush(n, ratio):
     def part(name, radii, material, far):
         p = np.concatenate([r * np.stack([np.cos(angle), np.sin(angle)]) for r in radii], axis=1)
         i = np.arange(n)
-        cells = [np.stack([i, i + n, (i + 1) % n + n, (i + 1) % n]) + ring * n for ring in range(len(radii) - 1)]
+        cells = [
+            np.stack([i, i + n, (i + 1) % n + n, (i + 1) % n]) + ring * n
+            for ring in range(len(radii) - 1)
+        ]
         mesh = MeshQuad(p, np.concatenate(cells, axis=1))
         middle = np.cos(np.pi / n)
         mesh = mesh.with_boundaries(
@@ -198,9 +221,11 @@ def test_a_pin_in_a_bush(ratio):
 
 @pytest.mark.parametrize("name", ["p21", "p22", "neumann", "laplacian"])
 def test_on_a_closed_curve_the_circulant_is_exact(name):
-    """Q of a pin in a bush is a circulant of 2 x 2 blocks, P is one too: they have the same eigenvectors, none is extended.
+    """Q of a pin in a bush is a circulant of 2 x 2 blocks, P is one too: they have the same
+    eigenvectors, none is extended.
 
-    Matrices of the normal components commute, and the condition number does not grow with the number of nodes.
+    Matrices of the normal components commute, and the condition number does not grow with the
+    number of nodes.
     """
     found = []
     for n in (32, 64):
@@ -214,25 +239,31 @@ def test_on_a_closed_curve_the_circulant_is_exact(name):
             assert np.abs(around - M).max() < limit * np.abs(M).max()
         both = P[::2, ::2] @ Q[::2, ::2]
         assert np.abs(both - both.T).max() < 1e-6 * np.abs(both).max()
-        waves = np.fft.fft(P[::2, 0]).real * np.fft.fft(Q[::2, 0]).real  # the eigenvalues of P Q, wave by wave
+        # the eigenvalues of P Q, wave by wave
+        waves = np.fft.fft(P[::2, 0]).real * np.fft.fft(Q[::2, 0]).real
         found.append(waves[2:-1].max() / waves[2:-1].min())  # rigid motions are left out
     assert found[1] < 1.2 * found[0] < 10
 
 
 def test_tangential_waves_along_their_direction_meet_more_resistance():
-    """The plane waves of `grad u : grad v + ALONG div u div v` on a large square, far from its edges."""
+    """The plane waves of `grad u : grad v + ALONG div u div v` on a large square, far from its
+    edges.
+    """
     mesh = MeshTri.init_tensor(*[np.linspace(0, 1, 33)] * 2)
     x = mesh.p
     D = divergences(x, x, mesh.t)
     K = surface_matrices(x, mesh.t)[0]
     wave = np.sin(2 * np.pi * x[0])
     along, across = (np.stack([a * wave, b * wave], axis=1).ravel() for a, b in ((1, 0), (0, 1)))
-    assert along @ D @ along == pytest.approx(wave @ K @ wave, rel=1e-12)  # the divergence is the whole gradient
+    # the divergence is the whole gradient
+    assert along @ D @ along == pytest.approx(wave @ K @ wave, rel=1e-12)
     assert across @ D @ across == pytest.approx(0.0, abs=1e-9)
     turned = np.array([[0.6, -0.8], [0.8, 0.6]])
     u = np.random.default_rng(0).normal(size=(x.shape[1], 2))
     same = divergences(turned @ x, turned @ x, mesh.t)
-    assert (u @ turned.T).ravel() @ same @ (u @ turned.T).ravel() == pytest.approx(u.ravel() @ D @ u.ravel())
+    assert (u @ turned.T).ravel() @ same @ (u @ turned.T).ravel() == pytest.approx(
+        u.ravel() @ D @ u.ravel()
+    )
     torn = x.copy()
     torn[0] *= 3.0  # a chart that has lost the lengths
     assert not divergences(x, torn, mesh.t).data.any()

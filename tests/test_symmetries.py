@@ -1,4 +1,6 @@
-"""Answers do not depend on the numbering of contacts, the choice of tangents, units, or which body is called the upper one."""
+"""Answers do not depend on the numbering of contacts, the choice of tangents, units, or which body
+is called the upper one.
+"""
 
 from dataclasses import replace
 
@@ -10,7 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
-from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce_bodies, siconos_residual, solve
+from contactopt import (
+    InterfaceProblem,
+    diagnose,
+    natural_map_residual,
+    reduce_bodies,
+    siconos_residual,
+    solve,
+)
 from contactopt.methods import METHODS
 from contactopt.problem.contact_status import contact_status
 from contactopt.problem.laws.bilateral import Bilateral
@@ -27,7 +36,9 @@ def random_problem(seed: int, dim: int) -> InterfaceProblem:
     V = np.kron(np.ones((CONTACTS, 1)), np.eye(dim)[:, :1])
     q = rng.normal(size=(CONTACTS, dim))
     mu = rng.uniform(0.0, 0.3, CONTACTS)
-    return InterfaceProblem(A @ A.T / n + np.eye(n), q, mu, V, [-CONTACTS], areas=rng.uniform(1, 2, CONTACTS))
+    return InterfaceProblem(
+        A @ A.T / n + np.eye(n), q, mu, V, [-CONTACTS], areas=rng.uniform(1, 2, CONTACTS)
+    )
 
 
 def permuted(problem: InterfaceProblem, order: np.ndarray) -> InterfaceProblem:
@@ -45,14 +56,18 @@ def permuted(problem: InterfaceProblem, order: np.ndarray) -> InterfaceProblem:
 def orthogonal(seed: int, dim: int) -> np.ndarray:
     """Tangents (k, dim, dim) turned or mirrored, at every contact in another way; normals stay."""
     rng = np.random.default_rng(seed)
-    turns = [la.qr(rng.normal(size=(dim - 1, dim - 1)))[0] * rng.choice([-1, 1]) for _ in range(CONTACTS)]
+    turns = [
+        la.qr(rng.normal(size=(dim - 1, dim - 1)))[0] * rng.choice([-1, 1]) for _ in range(CONTACTS)
+    ]
     return np.array([la.block_diag(1.0, R) for R in turns])
 
 
 def with_tangents(problem: InterfaceProblem, R: np.ndarray) -> InterfaceProblem:
     T = la.block_diag(*R)
     q = np.einsum("kab,kb->ka", R, problem.q)
-    return InterfaceProblem(T @ problem.Q @ T.T, q, problem.law, T @ problem.V, problem.s, problem.areas)
+    return InterfaceProblem(
+        T @ problem.Q @ T.T, q, problem.law, T @ problem.V, problem.s, problem.areas
+    )
 
 
 def certificates(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> list[float]:
@@ -62,15 +77,23 @@ def certificates(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> l
 @settings(max_examples=15, deadline=None)
 @given(SEED, DIMENSION)
 def test_contacts_may_be_numbered_in_any_order(seed, dim):
-    problem, order = random_problem(seed, dim), np.random.default_rng(seed + 1).permutation(CONTACTS)
+    problem, order = (
+        random_problem(seed, dim),
+        np.random.default_rng(seed + 1).permutation(CONTACTS),
+    )
     other = permuted(problem, order)
     a, b = solve(problem, tol=1e-11), solve(other, tol=1e-11)
     assert a.solved and b.solved
     assert np.allclose(b.reactions, a.reactions[order], rtol=0, atol=1e-8)
     assert np.allclose(b.multipliers, a.multipliers, rtol=0, atol=1e-8)
-    assert np.array_equal(contact_status(other, b.reactions).slip, contact_status(problem, a.reactions).slip[order])
+    assert np.array_equal(
+        contact_status(other, b.reactions).slip, contact_status(problem, a.reactions).slip[order]
+    )
     wrong = a.reactions + 0.1
-    one, two = certificates(problem, wrong, a.multipliers), certificates(other, wrong[order], a.multipliers)
+    one, two = (
+        certificates(problem, wrong, a.multipliers),
+        certificates(other, wrong[order], a.multipliers),
+    )
     assert two == pytest.approx(one, rel=1e-9) and min(one) > 1e-3
 
 
@@ -84,9 +107,14 @@ def test_tangents_may_be_turned_and_mirrored_at_every_contact(seed, dim):
     assert np.allclose(b.reactions, np.einsum("kab,kb->ka", R, a.reactions), rtol=0, atol=1e-8)
     wrong = a.reactions + 0.1
     turned_ = np.einsum("kab,kb->ka", R, wrong)
-    one, two = certificates(problem, wrong, a.multipliers), certificates(other, turned_, a.multipliers)
+    one, two = (
+        certificates(problem, wrong, a.multipliers),
+        certificates(other, turned_, a.multipliers),
+    )
     assert two == pytest.approx(one, rel=1e-9)
-    assert diagnose(other).guaranteed.unique == pytest.approx(diagnose(problem).guaranteed.unique, rel=1e-6)
+    assert diagnose(other).guaranteed.unique == pytest.approx(
+        diagnose(problem).guaranteed.unique, rel=1e-6
+    )
 
 
 @settings(max_examples=15, deadline=None)
@@ -112,10 +140,13 @@ def test_every_method_sees_the_same_problem_in_another_frame(name):
     tol = 5e-6 if name == "penalty" else 1e-8
     a, b = (solve(p, name, tol=tol, max_iterations=20_000) for p in (problem, other))
     assert a.status == b.status
-    assert np.allclose(b.reactions, np.einsum("kab,kb->ka", R, a.reactions[order]), rtol=0, atol=20 * tol)
+    assert np.allclose(
+        b.reactions, np.einsum("kab,kb->ka", R, a.reactions[order]), rtol=0, atol=20 * tol
+    )
 
 
-# surfaces that touch everywhere: where they do not, the normal is that of the lower body, which is then another
+# surfaces that touch everywhere: where they do not, the normal is that of the lower body, which is
+# then another
 SCENES = {
     "punch": turned.punch,
     "pin": lambda: turned.pin_in_bush(clearance=1e-9),
@@ -125,9 +156,13 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_upper_and_lower_body_may_be_swapped(name):
-    """Forces in space change their sign, for they then act on the other body; a plate moves as before."""
+    """Forces in space change their sign, for they then act on the other body; a plate moves as
+    before.
+    """
     scene = SCENES[name]()
-    first, second = (reduce_bodies(s) for s in (scene, replace(scene, upper=scene.lower, lower=scene.upper)))
+    first, second = (
+        reduce_bodies(s) for s in (scene, replace(scene, upper=scene.lower, lower=scene.upper))
+    )
     a, b = (solve(reduction.problem, tol=1e-11) for reduction in (first, second))
     assert a.solved and b.solved
     p = first.problem

@@ -1,4 +1,6 @@
-"""Thin layers that contact and one support hold: displacement, stress and equilibrium down to 1e-4 of the width."""
+"""Thin layers that contact and one support hold: displacement, stress and equilibrium down to 1e-4
+of the width.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ SOFT = Material(E, NU)
 
 
 def shim(dim, thickness, degree, elements, **held):
-    """A layer on a block of other elements, pressed by a uniform traction: both are in a uniform state."""
+    """A layer on a block of other elements, pressed by a uniform traction: both are in a uniform
+    state.
+    """
     up, axes = "xyz"[dim - 1], "xyz"[: dim - 1]
     sides = tuple(Support(f"{axis}-", {axis: 0.0}) for axis in axes)
 
@@ -30,7 +34,14 @@ def shim(dim, thickness, degree, elements, **held):
 
 @pytest.mark.parametrize(
     "dim,degree,elements,thickness",
-    [(2, 1, 16, 1e-3), (2, 1, 16, 1e-4), (2, 2, 16, 1e-3), (2, 2, 16, 1e-4), (3, 1, 5, 1e-4), (3, 2, 4, 1e-4)],
+    [
+        (2, 1, 16, 1e-3),
+        (2, 1, 16, 1e-4),
+        (2, 2, 16, 1e-3),
+        (2, 2, 16, 1e-4),
+        (3, 1, 5, 1e-4),
+        (3, 2, 4, 1e-4),
+    ],
 )
 def test_a_layer_in_a_uniform_state(dim, degree, elements, thickness):
     made = run(shim(dim, thickness, degree, elements), figures=())
@@ -50,7 +61,9 @@ def test_a_layer_that_friction_alone_holds():
 
 
 def test_a_coating_between_two_contacts_is_reduced_and_does_not_matter():
-    """A coating of the block's material, without friction of its own, passes the pressure of the punch on."""
+    """A coating of the block's material, without friction of its own, passes the pressure of the
+    punch on.
+    """
     peaks = []
     for thickness in (2e-4, 1e-4):
         base = shim(2, thickness, 2, 15)

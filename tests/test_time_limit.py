@@ -1,4 +1,6 @@
-"""A time limit is kept by every method, inside its backend too, on problems that no method finds easy."""
+"""A time limit is kept by every method, inside its backend too, on problems that no method finds
+easy.
+"""
 
 import os
 import signal
@@ -33,7 +35,9 @@ def plate(dim):
     V = np.zeros((3, dim, 2))
     V[:, 0, 0] = V[:, 1, 1] = 1.0
     Q = np.ones((3 * dim, 3 * dim)) + 1e-9 * np.eye(3 * dim)
-    return InterfaceProblem(Q, np.tile([1e-3] + [0.0] * (dim - 1), (3, 1)), 3.0, V.reshape(3 * dim, 2), [-1.0, 2.9])
+    return InterfaceProblem(
+        Q, np.tile([1e-3] + [0.0] * (dim - 1), (3, 1)), 3.0, V.reshape(3 * dim, 2), [-1.0, 2.9]
+    )
 
 
 def stack(dim):
@@ -41,7 +45,11 @@ def stack(dim):
     return InterfaceProblem(problem.Q.toarray(), problem.q, problem.mu)
 
 
-CASES = {f"{make.__name__} {dim}D": (make, dim) for make in (no_solution, held, plate, stack) for dim in (2, 3)}
+CASES = {
+    f"{make.__name__} {dim}D": (make, dim)
+    for make in (no_solution, held, plate, stack)
+    for dim in (2, 3)
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -82,9 +90,13 @@ def test_no_cone_program_outlasts_it(case, backend):
     assert seconds_of(make(dim), "tresca", backend=backend) < LIMIT + SLACK
 
 
-@pytest.mark.parametrize("backend", [b for b in QP if QP[b].installed and not QP[b].clock and not QP[b].steps])
+@pytest.mark.parametrize(
+    "backend", [b for b in QP if QP[b].installed and not QP[b].clock and not QP[b].steps]
+)
 def test_programs_that_no_backend_can_interrupt_end_in_time(backend, monkeypatch):
-    """A program of 401 unknowns in a process of its own: the same answer with time enough, and no hang without."""
+    """A program of 401 unknowns in a process of its own: the same answer with time enough, and no
+    hang without.
+    """
     rng = np.random.default_rng(3)
     A = rng.normal(size=(401, 401))
     P, c, none = A @ A.T / 401 + 1e-2 * np.eye(401), rng.normal(size=401), np.zeros(0)
@@ -100,7 +112,8 @@ def test_programs_that_no_backend_can_interrupt_end_in_time(backend, monkeypatch
     with pytest.raises(TimeUp), until(time.perf_counter() + 0.2):
         program.solve(*arguments)
     assert process.poll() is not None and time.perf_counter() - begin < 30
-    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as gmsh leaves it: a broken pipe would end this process
+    # as gmsh leaves it: a broken pipe would end this process
+    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     try:
         with pytest.raises(BackendError, match="exit code"), until(time.perf_counter() + 60):
             monkeypatch.setattr(child, "SERVE", "raise SystemExit(3)")

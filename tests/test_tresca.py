@@ -5,7 +5,19 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, Material, Part, Rigid, Scene, Support, fclib, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Material,
+    Part,
+    Rigid,
+    Scene,
+    Support,
+    fclib,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.methods.tresca_iteration import Tresca, TrescaProblem
 from contactopt.problem import dimensionless
@@ -22,7 +34,9 @@ def test_a_known_cycle_is_recognised_with_its_two_values():
     solution = solve(problem, Tresca())
     more = solve(problem, Tresca(), max_iterations=solution.iterations - 1)
     assert solution.status.label == "cycling"
-    assert sorted([solution.reactions[0, 0], more.reactions[0, 0]]) == pytest.approx([1.0, 14.5], abs=1e-8)
+    assert sorted([solution.reactions[0, 0], more.reactions[0, 0]]) == pytest.approx(
+        [1.0, 14.5], abs=1e-8
+    )
 
 
 def test_relaxation_breaks_the_cycle():
@@ -39,7 +53,9 @@ def test_contraction_threshold(mu, converges):
 
 @pytest.fixture(scope="module")
 def dragged() -> InterfaceProblem:
-    """A square block, nu = .2, 40 x 40 elements, clamped on top, moved down and four times as far sideways."""
+    """A square block, nu = .2, 40 x 40 elements, clamped on top, moved down and four times as far
+    sideways.
+    """
     grid = np.linspace(0.0, 1.0, 41)
     mesh = rename(tensor_mesh(grid, grid), contact="y-", top="y+")
     block = Part("block", mesh, Material(1.0, 0.2), (Support("top", {"x": 0.4, "y": -0.1}),))
@@ -63,7 +79,9 @@ def test_too_much_friction_for_a_fixed_point_is_none_for_newton(dragged):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_same_answer_as_newton(dim, bilateral):
-    problem = reduce(scenes.flat_punch(dim, elements=8 if dim == 2 else 3, mu=0.15, bilateral=bilateral))
+    problem = reduce(
+        scenes.flat_punch(dim, elements=8 if dim == 2 else 3, mu=0.15, bilateral=bilateral)
+    )
     ours, best = solve(problem, Tresca(), tol=1e-10), solve(problem, "auto", tol=1e-11)
     assert ours.solved and best.solved and ours.iterations > 1
     assert np.allclose(ours.reactions, best.reactions, atol=1e-7 * np.abs(best.reactions).max())
@@ -100,14 +118,18 @@ def test_other_backends_give_the_same(dim, backend):
 
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_the_convex_problem_is_solved_to_rounding(cube, bilateral):
-    """Every iterate obeys both laws for its own bounds, some of them zero, not only the last one for Coulomb's."""
+    """Every iterate obeys both laws for its own bounds, some of them zero, not only the last one
+    for Coulomb's.
+    """
     problem, _ = dimensionless(cube)
     problem = replace(problem, law=(Bilateral if bilateral else Coulomb)(problem.mu))
     g = np.where(np.arange(cube.contacts) % 3 == 0, 0.0, 0.05)
     r, lam = TrescaProblem("clarabel", problem).solve(g, np.zeros(problem.q.shape))
     u = problem.displacements(r, lam)
     assert np.abs(problem.V.T @ r.ravel() + problem.s).max() < 1e-12
-    assert np.allclose(r[:, 0], r[:, 0] - u[:, 0] if bilateral else np.maximum(r[:, 0] - u[:, 0], 0), atol=1e-12)
+    assert np.allclose(
+        r[:, 0], r[:, 0] - u[:, 0] if bilateral else np.maximum(r[:, 0] - u[:, 0], 0), atol=1e-12
+    )
     size, slip = np.linalg.norm(r[:, 1:], axis=1), np.linalg.norm(u[:, 1:], axis=1)
     assert np.all(size <= g + 1e-12) and (slip > 1e-3).any()
     assert np.allclose(r[:, 1:] * slip[:, None], -g[:, None] * u[:, 1:], atol=1e-11)
@@ -121,12 +143,17 @@ def test_warm_start_from_the_answer_is_one_iteration(punch):
 def test_settings_are_checked():
     with pytest.raises(InputError, match="relaxation"):
         Tresca(relaxation=0.0)
-    assert Tresca().backends(2) == ("proxqp", "proxqp") and Tresca().backends(3) == ("clarabel", "clarabel")
+    assert Tresca().backends(2) == ("proxqp", "proxqp") and Tresca().backends(3) == (
+        "clarabel",
+        "clarabel",
+    )
     with pytest.raises(InputError, match="unknown conic backend 'proxqp'"):
         Tresca("proxqp").backends(3)
 
 
-@pytest.mark.parametrize("name", ["Box_Stacks-i0035-31-0", "CubeH8", "LMGC_100_PR_PerioBox-i00361-60-03000"])
+@pytest.mark.parametrize(
+    "name", ["Box_Stacks-i0035-31-0", "CubeH8", "LMGC_100_PR_PerioBox-i00361-60-03000"]
+)
 def test_public_problems(name):
     path = FCLIB / f"{name}.hdf5"
     if not path.exists():

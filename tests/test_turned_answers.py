@@ -1,4 +1,6 @@
-"""Turning or mirroring a whole scene turns the answer, what is read from it, and the work that it takes."""
+"""Turning or mirroring a whole scene turns the answer, what is read from it, and the work that it
+takes.
+"""
 
 import numpy as np
 import pytest
@@ -20,7 +22,11 @@ SCENES = {
 }
 OBLIQUE = turned.turn_about((1.0, 2.0, -0.5), 67.0)
 MOVES = [
-    *((name, f"{degrees}", turned.turn(degrees)) for name in list(SCENES)[:3] for degrees in (30, 90, 180)),
+    *(
+        (name, f"{degrees}", turned.turn(degrees))
+        for name in list(SCENES)[:3]
+        for degrees in (30, 90, 180)
+    ),
     *((name, "mirrored", turned.mirror(2)) for name in list(SCENES)[:3]),
     ("cube", "oblique", OBLIQUE),
     ("cube", "mirrored", turned.mirror(3) @ OBLIQUE),
@@ -34,7 +40,9 @@ def plain():
 
 
 def products_to(residual: float, solution) -> float:
-    """Products with Q until the certificate is below `residual`: closer to rounding, rounding decides on one more step."""
+    """Products with Q until the certificate is below `residual`: closer to rounding, rounding
+    decides on one more step.
+    """
     return next(step["products"] for step in solution.history if step["residual"] <= residual)
 
 
@@ -47,14 +55,21 @@ def test_a_turned_scene_has_the_same_answer(plain, name, _, R):
     r, t = a.solution.reactions, b.solution.reactions[own]
     scale = np.abs(r).max()
     assert np.abs(r[:, 0] - t[:, 0]).max() < 1e-8 * scale
-    assert np.abs(np.linalg.norm(r[:, 1:], axis=1) - np.linalg.norm(t[:, 1:], axis=1)).max() < 1e-8 * scale
-    for mask, other in zip(vars(contact_status(p, r)).values(), vars(contact_status(q, b.solution.reactions)).values()):
+    assert (
+        np.abs(np.linalg.norm(r[:, 1:], axis=1) - np.linalg.norm(t[:, 1:], axis=1)).max()
+        < 1e-8 * scale
+    )
+    for mask, other in zip(
+        vars(contact_status(p, r)).values(), vars(contact_status(q, b.solution.reactions)).values()
+    ):
         assert np.array_equal(mask, other[own])
     work, other_work = (products_to(1e-8, s.solution) for s in (a, b))
     assert abs(work - other_work) <= 0.1 * work
     for read in (contact_edge, lambda *given: stick_edge(*given)[0]):
         value = read(a.reduction.scene, p, r)
-        assert value > 0 and read(b.reduction.scene, q, b.solution.reactions) == pytest.approx(value, rel=1e-8)
+        assert value > 0 and read(b.reduction.scene, q, b.solution.reactions) == pytest.approx(
+            value, rel=1e-8
+        )
     for quantity in ("pressure", "width", "stick", "energy"):
         one, two = (value_of(quantity, s.reduction, s.solution) for s in (a, b))
         assert two == pytest.approx(one, rel=1e-7)
@@ -62,7 +77,11 @@ def test_a_turned_scene_has_the_same_answer(plain, name, _, R):
 
 def test_some_of_these_contacts_are_open_stick_and_slip(plain):
     """Otherwise the test above would say little."""
-    for name, needs in (("punch", "stick slip"), ("cylinder", "open stick slip"), ("pin", "open stick slip")):
+    for name, needs in (
+        ("punch", "stick slip"),
+        ("cylinder", "open stick slip"),
+        ("pin", "open stick slip"),
+    ):
         solved = plain[name]
         status = contact_status(solved.reduction.problem, solved.solution.reactions)
         for need in needs.split():
@@ -124,7 +143,11 @@ def quarter(scene):
     R = np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def components(values):
-        return None if values is None else {{"x": "y", "y": "x"}[c]: v if c == "x" else -v for c, v in values.items()}
+        return (
+            None
+            if values is None
+            else {{"x": "y", "y": "x"}[c]: v if c == "x" else -v for c, v in values.items()}
+        )
 
     def load(old):
         if isinstance(old, Plate):
@@ -144,7 +167,13 @@ def quarter(scene):
 
         supports = tuple(replace(s, displacement=components(s.displacement)) for s in part.supports)
         curve = None if part.curve is None else lambda x: R @ part.curve(R.T @ x)
-        return replace(part, mesh=mesh, supports=supports, loads=tuple(load(old) for old in part.loads), curve=curve)
+        return replace(
+            part,
+            mesh=mesh,
+            supports=supports,
+            loads=tuple(load(old) for old in part.loads),
+            curve=curve,
+        )
 
     return replace(scene, upper=turned_part(scene.upper), lower=turned_part(scene.lower))
 
@@ -152,7 +181,9 @@ def quarter(scene):
 @pytest.mark.parametrize("name", ["punch-2d", "cylinder-2d"])
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_a_half_model_in_any_direction(name, turns, tmp_path):
-    """The named scenes, whose plane of symmetry then is y = 0: the same summary, zone loop and figures."""
+    """The named scenes, whose plane of symmetry then is y = 0: the same summary, zone loop and
+    figures.
+    """
     from contactopt import run
     from contactopt.scenes import make_scene
 

@@ -1,4 +1,6 @@
-"""Every tutorial runs as a script, its assertions hold, its exercises have solutions that run, its figures labels."""
+"""Every tutorial runs as a script, its assertions hold, its exercises have solutions that run, its
+figures labels.
+"""
 
 import ast
 import re
@@ -36,7 +38,11 @@ def test_tutorial_and_solutions_run(name, tmp_path, monkeypatch, capsys):
     assert figures, "a tutorial has at least one figure"
     for figure in figures:
         for ax in figure.axes:
-            assert not ax.axison or (ax.get_xlabel() and ax.get_ylabel()) or ax.get_label() == "<colorbar>"
+            assert (
+                not ax.axison
+                or (ax.get_xlabel() and ax.get_ylabel())
+                or ax.get_label() == "<colorbar>"
+            )
     for number, code in enumerate(solutions(TUTORIALS[name].read_text()), 1):
         exec(compile(code, f"{name}, solution {number}", "exec"), dict(names))
     plt.close("all")
@@ -74,12 +80,18 @@ def test_links_between_tutorials_exist(source):
 
 
 @pytest.mark.parametrize(
-    "path", [*TUTORIALS.values(), *sorted((FOLDER.parent / "course").glob("*.py"))], ids=lambda p: p.stem
+    "path",
+    [*TUTORIALS.values(), *sorted((FOLDER.parent / "course").glob("*.py"))],
+    ids=lambda p: p.stem,
 )
 def test_no_cell_shows_what_matplotlib_returns(path):
-    """The last expression of a cell is shown below it: a figure is, the legend object of matplotlib is no figure."""
+    """The last expression of a cell is shown below it: a figure is, the legend object of matplotlib
+    is no figure.
+    """
     for cell in re.split(r"^# %%", path.read_text(), flags=re.M)[1:]:
         head, _, code = cell.partition("\n")
         last = ast.parse("" if "[markdown]" in head else code).body[-1:]
         shown = ast.unparse(last[0]) if last and isinstance(last[0], ast.Expr) else ""
-        assert not re.match(r"(ax|left|right|axes\[\d\])\.(axis|set|legend|plot|text)\b", shown), shown
+        assert not re.match(r"(ax|left|right|axes\[\d\])\.(axis|set|legend|plot|text)\b", shown), (
+            shown
+        )

@@ -15,8 +15,14 @@ pytest.importorskip("build")
 
 def run(*command: str | Path, cwd: Path) -> str:
     """Output of a command that must succeed, with nothing of this environment on its path."""
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
-    done = subprocess.run([str(c) for c in command], cwd=cwd, env=clean, capture_output=True, text=True, timeout=900)
+    clean = {
+        key: value
+        for key, value in os.environ.items()
+        if not key.startswith(("PYTHON", "VIRTUAL_ENV"))
+    }
+    done = subprocess.run(
+        [str(c) for c in command], cwd=cwd, env=clean, capture_output=True, text=True, timeout=900
+    )
     assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
@@ -56,7 +62,10 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     assert "punch-2d" in run(binaries / "contactopt", "list", cwd=tmp_path)
     run(binaries / "contactopt", "run", "punch-2d", "--out", tmp_path / "out", cwd=tmp_path)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["status"] == "solved" and (tmp_path / "out" / "deformed.png").stat().st_size > 10_000
+    assert (
+        summary["status"] == "solved"
+        and (tmp_path / "out" / "deformed.png").stat().st_size > 10_000
+    )
     code = "import contactopt; print(contactopt.__version__, contactopt.__file__)"
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
     assert version in wheel.name and str(tmp_path) in place

@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 from conftest import two_blocks
 
-from contactopt import InputError, Plate, Rigid, Scene, Support, diagnose, reduce, reduce_bodies, run, scenes
+from contactopt import (
+    InputError,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    diagnose,
+    reduce,
+    reduce_bodies,
+    run,
+    scenes,
+)
 from contactopt.cards import card
 from contactopt.problem import InterfaceProblem
 from contactopt.solving.paths import follow
@@ -22,8 +33,14 @@ def result():
 def test_an_object_says_in_one_line_what_it_is(result):
     objects = (result, result.solution, result.problem, result.reduction, diagnose(result.problem))
     for one in objects:
-        assert len(repr(one)) < 200 and "\n" not in repr(one) and repr(one).startswith(type(one).__name__)
-    assert repr(result.solution).startswith("Solution(solved, residual ") and "5 contacts" in repr(result)
+        assert (
+            len(repr(one)) < 200
+            and "\n" not in repr(one)
+            and repr(one).startswith(type(one).__name__)
+        )
+    assert repr(result.solution).startswith("Solution(solved, residual ") and "5 contacts" in repr(
+        result
+    )
     single = InterfaceProblem(np.eye(2), np.array([[-1.0, 0.0]]), 0.5)
     assert "1 contact," in repr(single) and "Coulomb mu = 0.5" in repr(single)
 
@@ -36,7 +53,13 @@ def test_a_notebook_shows_a_table_with_all_names_escaped(result):
             found.add(tag)
 
     hostile = replace(result, scene=replace(result.scene, name="<script>alert(1)</script>"))
-    for one in (hostile, result.solution, result.problem, result.reduction, diagnose(result.problem, result.solution)):
+    for one in (
+        hostile,
+        result.solution,
+        result.problem,
+        result.reduction,
+        diagnose(result.problem, result.solution),
+    ):
         Reader().feed(one._repr_html_())
     assert found == {"table", "caption", "tbody", "tr", "th", "td"}
     assert "&lt;script&gt;" in hostile._repr_html_() and "&lt;b&gt;" in card("x", {"<b>": 1})
@@ -44,15 +67,22 @@ def test_a_notebook_shows_a_table_with_all_names_escaped(result):
 
 def test_the_grammar_of_a_diagnosis_agrees_with_its_numbers():
     single = InterfaceProblem(np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([[-1.0, 0.0]]), 0.5)
-    assert str(diagnose(single)).startswith("1 contact in 2D") and "asymmetry 0" in str(diagnose(single))
-    tilted = InterfaceProblem(np.eye(4), -np.ones((2, 2)), 0.5, V=np.array([[0.0], [1.0], [0.0], [1.0]]), s=[0.0])
+    assert str(diagnose(single)).startswith("1 contact in 2D") and "asymmetry 0" in str(
+        diagnose(single)
+    )
+    tilted = InterfaceProblem(
+        np.eye(4), -np.ones((2, 2)), 0.5, V=np.array([[0.0], [1.0], [0.0], [1.0]]), s=[0.0]
+    )
     assert "convergence is not guaranteed" in str(diagnose(tilted))
 
 
 def test_a_path_says_how_many_states_there_are():
     said = []
     path = follow(scenes.growing_indentation(steps=2, elements=6), note=said.append)
-    assert [text.partition(":")[0] for text in said if text.startswith("state")] == ["state 1 of 2", "state 2 of 2"]
+    assert [text.partition(":")[0] for text in said if text.startswith("state")] == [
+        "state 1 of 2",
+        "state 2 of 2",
+    ]
     assert "2 states" in repr(path) and len(path._repr_html_()) < 1000
     said.clear()
     follow((state for state in scenes.growing_indentation(steps=2, elements=6)), note=said.append)
@@ -62,19 +92,26 @@ def test_a_path_says_how_many_states_there_are():
 def test_a_component_of_another_kind_names_that_kind():
     base = two_blocks("plane-strain")
     wrong = replace(base.upper, supports=(Support("top", {"z": 0.0}),))
-    with pytest.raises(InputError, match=r"no component 'z'; use x, y, .*kind 'plane-strain', or .*kind='solid'"):
+    with pytest.raises(
+        InputError, match=r"no component 'z'; use x, y, .*kind 'plane-strain', or .*kind='solid'"
+    ):
         replace(base, upper=wrong)
 
 
 def test_unknown_fields_of_a_scene_name_the_fields():
-    with pytest.raises(InputError, match="no field 'friction_coefficient'; its fields are name, upper"):
+    with pytest.raises(
+        InputError, match="no field 'friction_coefficient'; its fields are name, upper"
+    ):
         run(two_blocks("plane-strain"), friction_coefficient=0.1)
 
 
 def test_boundaries_without_facets_are_no_choice():
     base = two_blocks("plane-strain")
     mesh = base.upper.mesh.with_boundaries({"nothing": np.array([], dtype=int)})
-    for name, words in (("nothing", "boundary 'nothing' has no facets"), ("topp", "no boundary named 'topp'")):
+    for name, words in (
+        ("nothing", "boundary 'nothing' has no facets"),
+        ("topp", "no boundary named 'topp'"),
+    ):
         wrong = replace(base.upper, mesh=mesh, loads=(Plate(name, {"y": -1.0}),))
         with pytest.raises(InputError, match=words) as error:
             reduce(replace(base, upper=wrong))
@@ -88,4 +125,7 @@ def test_a_gap_on_a_curved_surface_without_a_direction_is_spoken_of(caplog):
         floor = Rigid("floor", normal=normal, gap=lambda x: x[1] - x[1].min())
         with caplog.at_level(logging.WARNING, "contactopt"):
             reduce_bodies(Scene("s", cylinder, floor, 0.3, copies=2, zone=10.0, elements=6))
-        assert sum("give Rigid(normal=...)" in record.getMessage() for record in caplog.records) == expected
+        assert (
+            sum("give Rigid(normal=...)" in record.getMessage() for record in caplog.records)
+            == expected
+        )

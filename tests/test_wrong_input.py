@@ -1,4 +1,6 @@
-"""One sentence instead of a hang, a traceback or a wrong answer: files and arguments that somebody once gave."""
+"""One sentence instead of a hang, a traceback or a wrong answer: files and arguments that somebody
+once gave.
+"""
 
 import os
 
@@ -49,15 +51,20 @@ def test_nothing_is_read_from_other_files(tmp_path):
 
 
 def named(wrong):
-    """The name of a case: the field, and what is wrong in it; functions and arrays have no name that stays the same."""
+    """The name of a case: the field, and what is wrong in it; functions and arrays have no name
+    that stays the same.
+    """
     return ", ".join(
-        f"{key} {value if isinstance(value, (int, str)) else type(value).__name__}" for key, value in wrong.items()
+        f"{key} {value if isinstance(value, (int, str)) else type(value).__name__}"
+        for key, value in wrong.items()
     )
 
 
 @pytest.mark.parametrize("name", ["W/x", "W/i", "vectors/q", "vectors/mu"])
 def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
-    """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5 reads as zeros."""
+    """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5
+    reads as zeros.
+    """
     h5py = pytest.importorskip("h5py")
     path = sound(tmp_path / "huge.hdf5")
     with h5py.File(path, "a") as file:
@@ -96,7 +103,15 @@ def test_loads_and_supports_of_the_wrong_type(make):
         part = flat_punch(2).upper
         load = make()
         kind = "supports" if isinstance(load, Support) else "loads"
-        reduce(Scene("s", Part("a", part.mesh, part.material, **{kind: (load,)}), Rigid("floor"), 0.3, elements=4))
+        reduce(
+            Scene(
+                "s",
+                Part("a", part.mesh, part.material, **{kind: (load,)}),
+                Rigid("floor"),
+                0.3,
+                elements=4,
+            )
+        )
 
 
 @pytest.mark.parametrize(
@@ -159,7 +174,9 @@ def test_an_element_without_volume_is_refused(height):
     """One corner of a block is moved so that its element is flat, folds over, or is nowhere."""
 
     def mesh(elements, zone):
-        made = rename(tensor_mesh(np.linspace(0, 1, 3), np.array([0.0, 1.0])), contact="y-", top="y+")
+        made = rename(
+            tensor_mesh(np.linspace(0, 1, 3), np.array([0.0, 1.0])), contact="y-", top="y+"
+        )
         above = np.flatnonzero(made.p[1] == 1.0)
         made.p[1, above[:2]] = height
         return made
@@ -183,7 +200,10 @@ def test_too_little_memory_is_one_sentence(monkeypatch, tmp_path, capsys):
     assert (
         said.strip()
         .splitlines()[-1]
-        .startswith("contactopt: scene 'punch-2d' of 2 bodies with elements = 4 needs more memory than there is")
+        .startswith(
+            "contactopt: scene 'punch-2d' of 2 bodies with elements = 4 needs more memory than"
+            " there is"
+        )
         and "Traceback" not in said
     )
     assert not (tmp_path / "out").exists()
@@ -196,7 +216,9 @@ def test_meshes_that_cannot_be(elements):
             run(name, elements=elements)
 
 
-@pytest.mark.parametrize("choice", [{"Q": "zz"}, {"Q": 3}, {"solver": "zz"}, {"coupling": "zz"}], ids=str)
+@pytest.mark.parametrize(
+    "choice", [{"Q": "zz"}, {"Q": 3}, {"solver": "zz"}, {"coupling": "zz"}], ids=str
+)
 def test_choices_that_there_are_not(choice):
     with pytest.raises(InputError):
         reduce(flat_punch(2, elements=4), **choice)
@@ -210,10 +232,14 @@ def test_a_path_of_other_meshes_is_refused():
 # Loads that no contact can balance
 
 
-@pytest.mark.parametrize("method", ["auto", "lagrangian", "apg", "tresca", "nsgs", "admm", "proximal"])
+@pytest.mark.parametrize(
+    "method", ["auto", "lagrangian", "apg", "tresca", "nsgs", "admm", "proximal"]
+)
 @pytest.mark.parametrize("column", [[0.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [1e-300, 0.0]], ids=str)
 def test_a_plate_that_no_contact_can_hold(method, column):
-    """V is zero, moves along the surface of contacts without friction, or pulls: an answer or one sentence."""
+    """V is zero, moves along the surface of contacts without friction, or pulls: an answer or one
+    sentence.
+    """
     problem = InterfaceProblem(np.eye(2), [[0.1, 0.0]], 0.0, np.array(column)[:, None], [-1.0])
     try:
         assert not solve(problem, method, max_iterations=50, time_limit=1.0).solved

@@ -37,10 +37,14 @@ def test_the_zone_ends_at_a_node_and_is_read_from_the_answer(hertz):
 
 
 def test_a_finer_mesh_without_remeshing_reads_the_same_zone(hertz):
-    """Four times as many elements, and no node at the edge: what the loop ends at is no property of its meshes."""
+    """Four times as many elements, and no node at the edge: what the loop ends at is no property of
+    its meshes.
+    """
     scene, _, _, zones = hertz
     problem = reduce(scene, elements=4 * scene.elements, zone=1.1 * scene.reference.half_width)
-    assert contact_edge(scene, problem, solve(problem).reactions) == pytest.approx(zones[-1], rel=5e-3)
+    assert contact_edge(scene, problem, solve(problem).reactions) == pytest.approx(
+        zones[-1], rel=5e-3
+    )
 
 
 @pytest.mark.parametrize("guess", [0.5, 2.0])
@@ -85,7 +89,9 @@ def test_the_coarse_start_keeps_the_form_of_q_and_the_solver(solver, monkeypatch
         return reduce_bodies(scene, elements, zone, Q, solver)
 
     monkeypatch.setattr(module, "reduce_bodies", spy)
-    solved = solve_zone(scenes.flat_punch(2, elements=32), options=Options(Q="implicit", solver=solver))
+    solved = solve_zone(
+        scenes.flat_punch(2, elements=32), options=Options(Q="implicit", solver=solver)
+    )
     assert len(seen) > 1 and {call[1:] for call in seen} == {("implicit", solver)}
     assert len({call[0] for call in seen}) == len(seen)
     assert solved.solution.solved and "coarse" in solved.solution.seconds
@@ -115,9 +121,15 @@ def test_the_status_of_contacts():
 
 
 def test_stick_ratio_of_the_rigid_punch():
-    """Spence's exact value .689087 for plane strain, nu = mu = .3, on a foundation 1,280 half-widths wide."""
-    scene = scenes.flat_punch(2, rigid="punch", mu=0.3, foundation_width=25600, foundation_height=12800, elements=64)
+    """Spence's exact value .689087 for plane strain, nu = mu = .3, on a foundation 1,280
+    half-widths wide.
+    """
+    scene = scenes.flat_punch(
+        2, rigid="punch", mu=0.3, foundation_width=25600, foundation_height=12800, elements=64
+    )
     problem = reduce(scene)
     solution = solve(problem)
     assert solution.solved
-    assert stick_edge(scene, problem, solution.reactions)[0] / 20 == pytest.approx(0.689087, abs=0.01)
+    assert stick_edge(scene, problem, solution.reactions)[0] / 20 == pytest.approx(
+        0.689087, abs=0.01
+    )

@@ -1,4 +1,6 @@
-"""Scenes that are not symmetric to the axes of space, and the same scenes turned or mirrored as a whole."""
+"""Scenes that are not symmetric to the axes of space, and the same scenes turned or mirrored as a
+whole.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,7 +35,10 @@ def mirror(dim: int, axis: int = 0) -> np.ndarray:
 
 
 def moved(scene: Scene, R: np.ndarray) -> Scene:
-    """The whole scene with every point x at R x: meshes, loads, curves, gaps. Supports must hold all components."""
+    """The whole scene with every point x at R x: meshes, loads, curves, gaps.
+
+    Supports must hold all components.
+    """
 
     def mesh(part: Part) -> Callable:
         def build(elements, zone):
@@ -62,7 +67,9 @@ def moved(scene: Scene, R: np.ndarray) -> Scene:
                 gap=None if part.gap is None else lambda x: part.gap(R.T @ x),
                 force=None if part.force is None else vector(part.force),
             )
-        assert all(support.displacement is None for support in part.supports), "clamp all components"
+        assert all(support.displacement is None for support in part.supports), (
+            "clamp all components"
+        )
         loads = tuple(load(old) for old in part.loads)
         return replace(part, mesh=mesh(part), loads=loads, curve=curve(part))
 
@@ -79,22 +86,33 @@ def _even(half: float, length: float, elements: int, growth: float = 1.5) -> np.
 
 
 def punch(dim: int = 2, elements: int = 6, mu: float = 0.3) -> Scene:
-    """The whole of a flat punch on a foundation that is clamped below, pressed and dragged by a plate glued to its top."""
+    """The whole of a flat punch on a foundation that is clamped below, pressed and dragged by a
+    plate glued to its top.
+    """
     wide = 20.0 if dim == 2 else 15.0
     force = {"x": 4.0, "y": -100.0} if dim == 2 else {"x": 4.0, "y": 2.0, "z": -100.0}
     up = "xyz"[dim - 1]
 
     def upper(elements, zone):
         across = [_even(20.0, 20.0, elements), _even(wide, wide, elements)][: dim - 1]
-        return rename(tensor_mesh(*across, np.linspace(0, 40, elements + 1)), contact=f"{up}-", top=f"{up}+")
+        return rename(
+            tensor_mesh(*across, np.linspace(0, 40, elements + 1)), contact=f"{up}-", top=f"{up}+"
+        )
 
     def lower(elements, zone):
         across = [_even(20.0, 80.0, elements), _even(wide, 70.0, elements)][: dim - 1]
-        mesh = rename(tensor_mesh(*across, -graded(80.0, 20.0 / elements, 1.5)[::-1]), bottom=f"{up}-", top=f"{up}+")
+        mesh = rename(
+            tensor_mesh(*across, -graded(80.0, 20.0 / elements, 1.5)[::-1]),
+            bottom=f"{up}-",
+            top=f"{up}+",
+        )
         corner = np.array([20.0, wide, 0.0] if dim == 3 else [20.0, 0.0])
         shifted = replace(mesh, doflocs=mesh.p + corner[:, None])
         cut = patch(shifted, "top", "contact", [40.0, 2 * wide][: dim - 1])
-        inside = cut.p[:, cut.facets[:, cut.boundaries["contact"]]].mean(axis=1)[: dim - 1].min(axis=0) > 0
+        inside = (
+            cut.p[:, cut.facets[:, cut.boundaries["contact"]]].mean(axis=1)[: dim - 1].min(axis=0)
+            > 0
+        )
         return mesh.with_boundaries({"contact": cut.boundaries["contact"][inside]})
 
     return Scene(
@@ -113,11 +131,17 @@ def cylinder(elements: int = 8) -> Scene:
 
 
 def ring(inner: float, outer: float, layers: int, sectors: int) -> skfem.MeshQuad:
-    """A whole annulus of quadrilaterals, unevenly divided along the circle; boundaries 'inside' and 'outside'."""
+    """A whole annulus of quadrilaterals, unevenly divided along the circle; boundaries 'inside' and
+    'outside'.
+    """
     angle = 2 * np.pi * np.arange(sectors) / sectors
     angle = angle + 0.15 * np.sin(angle) + 0.05 * np.cos(3 * angle)
     radius = np.linspace(inner, outer, layers + 1)
-    p = (radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)])).transpose(1, 0, 2).reshape(2, -1)
+    p = (
+        (radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)]))
+        .transpose(1, 0, 2)
+        .reshape(2, -1)
+    )
     node = np.arange(p.shape[1]).reshape(layers + 1, sectors)
     after = np.roll(node, -1, axis=1)
     t = np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1)
@@ -130,8 +154,11 @@ def ring(inner: float, outer: float, layers: int, sectors: int) -> skfem.MeshQua
     )
 
 
-def pin_in_bush(clearance: float = 0.5, sectors: int = 40, mu: float = 0.2, radius: float = 20.0) -> Scene:
-    """A pin with a hole, loaded in the hole through a glued plate, in a bush that is clamped outside.
+def pin_in_bush(
+    clearance: float = 0.5, sectors: int = 40, mu: float = 0.2, radius: float = 20.0
+) -> Scene:
+    """A pin with a hole, loaded in the hole through a glued plate, in a bush that is clamped
+    outside.
 
     A clearance beyond the node spacing is allowed: pi radius / 20 is the mean spacing.
     """
@@ -143,14 +170,22 @@ def pin_in_bush(clearance: float = 0.5, sectors: int = 40, mu: float = 0.2, radi
         (Plate("inside", {"x": 10.0, "y": -100.0}),),
         "outside",
     )
-    bush = Part("bush", ring(radius, 2 * radius, 4, sectors), SOFT, (Support("outside"),), (), "inside")
+    bush = Part(
+        "bush", ring(radius, 2 * radius, 4, sectors), SOFT, (Support("outside"),), (), "inside"
+    )
     return Scene("pin in a bush", pin, bush, mu)
 
 
 def pulled_block(elements: int = 4) -> Scene:
-    """A block with a rigid floor of its own normal, pressed by a traction and held by nothing but a plate's rest."""
+    """A block with a rigid floor of its own normal, pressed by a traction and held by nothing but a
+    plate's rest.
+    """
     mesh = rename(
-        tensor_mesh(np.linspace(0, 3, elements + 1) ** 1.1, np.linspace(0, 1, elements + 1)), contact="y-", top="y+"
+        tensor_mesh(np.linspace(0, 3, elements + 1) ** 1.1, np.linspace(0, 1, elements + 1)),
+        contact="y-",
+        top="y+",
     )
     load = (Traction("top", (0.1, -0.5)), Plate("top", {"x": 0.2, "y": -1.0}))
-    return Scene("block on a floor", Part("block", mesh, SOFT, (), load), Rigid("floor", (0.0, 1.0)), 0.3)
+    return Scene(
+        "block on a floor", Part("block", mesh, SOFT, (), load), Rigid("floor", (0.0, 1.0)), 0.3
+    )

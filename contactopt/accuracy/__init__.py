@@ -1,4 +1,5 @@
-"""An accuracy is asked for, and meshes are refined until the estimated error of one quantity J is below it.
+"""An accuracy is asked for, and meshes are refined until the estimated error of one quantity J is
+below it.
 
     solve -> estimate -> refine (everywhere, or where the quantity needs it), until the target is met or a sentence says why not.
 
@@ -8,34 +9,39 @@ Every mesh is a Level, the end is an Estimate. The estimated error of the value 
     how uncertain its reading is (contactopt.readings.quantities, contactopt.readings.places);
     by how much another local maximum may exceed it, whose elements are refined, too.
 
-The error of a geometry that the file gives by straight edges alone is added at the end (contactopt.accuracy.polygon). A target
-is not reached on fewer than two meshes, nor where few contacts touch, nor where the gap of a rigid body undercuts what the
-contacts see of it. A value that grows at one place with every refinement is infinite (contactopt.accuracy.corners).
+The error of a geometry that the file gives by straight edges alone is added at the end
+(contactopt.accuracy.polygon). A target is not reached on fewer than two meshes, nor where few
+contacts touch, nor where the gap of a rigid body undercuts what the contacts see of it. A value
+that grows at one place with every refinement is infinite (contactopt.accuracy.corners).
 
-Refined where the quantity needs it, the error of J is estimated element by element by the dual-weighted residual method. W is the
-displacement of the adjoint problem: what J feels of a unit load at each place, with the contact states of the solution kept
-(contactopt.derivatives). Then
+Refined where the quantity needs it, the error of J is estimated element by element by the
+dual-weighted residual method. W is the displacement of the adjoint problem: what J feels of a unit
+load at each place, with the contact states of the solution kept (contactopt.derivatives). Then
 
     J - J_h = sum_K  int_K (s - s_h)(U) : C^-1 : (s - s_h)(W),
 
-exactly so for a linear problem and a linear J. The unknown stresses s are replaced by recovered ones, averages at the vertices.
-The signed sum estimates the error of J; the absolute values say where to refine. Two terms are added.
+exactly so for a linear problem and a linear J. The unknown stresses s are replaced by recovered
+ones, averages at the vertices. The signed sum estimates the error of J; the absolute values say
+where to refine. Two terms are added.
 
-The force at a contact is a mean of the pressure nearby. For a J that reads pressure, the error of the pressure at contact i is
-half of p_i less the mean of the piecewise linear p around i (indicators.pressure_errors), times dJ/dp_i. Without it a contact that
-is smaller than an element would seem exact, since then equilibrium alone says what the one closed contact carries.
+The force at a contact is a mean of the pressure nearby. For a J that reads pressure, the error of
+the pressure at contact i is half of p_i less the mean of the piecewise linear p around i
+(indicators.pressure_errors), times dJ/dp_i. Without it a contact that is smaller than an element
+would seem exact, since then equilibrium alone says what the one closed contact carries.
 
-A stress at a place is recovered by a fit to the stresses of the elements near it (contactopt.bodies.stress_recovery). For a stress
-s* = R D U the adjoint load is D' R' dJ/ds*. The stresses scatter about the fit, and the estimated error is at least two standard
-errors of the fit. For a largest stress this covers the places where it could be larger by as much; these are refined too.
+A stress at a place is recovered by a fit to the stresses of the elements near it
+(contactopt.bodies.stress_recovery). For a stress s* = R D U the adjoint load is D' R' dJ/ds*. The
+stresses scatter about the fit, and the estimated error is at least two standard errors of the fit.
+For a largest stress this covers the places where it could be larger by as much; these are refined
+too.
 
-The estimated error is also at least what the last refinement changed. What is not estimated: the linearisation of a J
-that is not linear, what recovery does not see where the solution is not smooth, and that straight edges are chords of a curved
-boundary. So the estimate is not a bound.
+The estimated error is also at least what the last refinement changed. What is not estimated: the
+linearisation of a J that is not linear, what recovery does not see where the solution is not
+smooth, and that straight edges are chords of a curved boundary. So the estimate is not a bound.
 
-Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in finite element methods, Acta
-Numerica 10; Doerfler (1996), A convergent adaptive algorithm for Poisson's equation, for the marking; Zienkiewicz, Zhu
-(1987) and (1992) for the recovery.
+Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
+finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for
+Poisson's equation, for the marking; Zienkiewicz, Zhu (1987) and (1992) for the recovery.
 
 | module | what it does |
 |---|---|

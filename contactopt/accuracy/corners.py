@@ -1,13 +1,16 @@
-"""Places where the quantity asked for is infinite, so that no mesh bounds it: pressure at a rim, stress at a corner.
+"""Places where the quantity asked for is infinite, so that no mesh bounds it: pressure at a rim,
+stress at a corner.
 
-A stress is infinite at a re-entrant corner or edge of a body. There the elements at a vertex fill clearly more than half of the
-angle around it, on every mesh; along a fillet they fill half of it as soon as the mesh resolves the fillet. A stress can be
-infinite at other places as well: at the end of a support, under the corner of another body. There it grows like h^-alpha with
-the size h of the elements, alpha up to 1/2, so that every halving of h adds between once and 1.4 times as much as the one
-before. Under a concentrated load each adds twice as much or more, which is what a contact looks like that is smaller
-than the elements, and is no reason to stop.
+A stress is infinite at a re-entrant corner or edge of a body. There the elements at a vertex fill
+clearly more than half of the angle around it, on every mesh; along a fillet they fill half of it as
+soon as the mesh resolves the fillet. A stress can be infinite at other places as well: at the end
+of a support, under the corner of another body. There it grows like h^-alpha with the size h of the
+elements, alpha up to 1/2, so that every halving of h adds between once and 1.4 times as much as the
+one before. Under a concentrated load each adds twice as much or more, which is what a contact looks
+like that is smaller than the elements, and is no reason to stop.
 
-Source: Williams (1952), Stress singularities resulting from various boundary conditions in angular corners of plates in extension.
+Source: Williams (1952), Stress singularities resulting from various boundary conditions in angular
+corners of plates in extension.
 """
 
 from __future__ import annotations
@@ -30,7 +33,8 @@ HALVED = 1.8  # by how much smaller elements must be for a level to count as the
 TRIED = 3  # meshes before a largest stress at a corner is taken for infinite
 RISE = 1.1  # by how much a stress at a corner has grown since the coarsest elements there
 STEADY = 0.8, 1.7  # share of the growth before that the next growth of a singular stress is
-GROWTHS = 4  # one after the other, that are steady; a sharp rounding looks like a corner before it is resolved
+# one after the other, that are steady; a sharp rounding looks like a corner before it is resolved
+GROWTHS = 4
 AT_EDGE = 2  # at a corner of the contact surface
 
 
@@ -49,14 +53,23 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
     place = ", ".join(f"{x:.4g}" for x in levels[-1].place)
     if peak.body < 0:
         if _grows(levels, AT_EDGE) and _at_rim(solved, peak):
-            return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
+            return (
+                "the largest pressure is at the edge of the contact surface, a corner, where no"
+                " mesh bounds it"
+            )
         what = "pressure"
     else:
         what = "stress"
         if len(levels) > TRIED and _rises(levels) and _in_corner(solved, peak):
-            return f"the largest stress is at the re-entrant corner near ({place}), where it is infinite; no mesh bounds it"
+            return (
+                f"the largest stress is at the re-entrant corner near ({place}), where it is"
+                " infinite; no mesh bounds it"
+            )
     if _grows(levels, GROWTHS):
-        return f"the largest {what}, at ({place}), grows with every refinement like an infinite one; no mesh bounds it"
+        return (
+            f"the largest {what}, at ({place}), grows with every refinement like an infinite one;"
+            " no mesh bounds it"
+        )
     return ""
 
 
@@ -76,9 +89,11 @@ def _at_rim(solved: Solved, peak: Peak) -> bool:
 
 
 def re_entrant(mesh: Any, vertex: int) -> bool:
-    """Whether a vertex, or one within two elements of it, is at a re-entrant corner of the body or on such an edge.
+    """Whether a vertex, or one within two elements of it, is at a re-entrant corner of the body or
+    on such an edge.
 
-    The recovered stress at the corner itself looks from all sides, and may be less than that next to it.
+    The recovered stress at the corner itself looks from all sides, and may be less than that next
+    to it.
     """
     cells = simplices(straight(mesh))
     near = np.array([vertex])
@@ -95,15 +110,20 @@ def filled(cells: Any, vertex: int) -> float:
     arms = cells.p[:, others] - cells.p[:, [vertex]][:, :, None]
     arms = arms / np.linalg.norm(arms, axis=0)
     if len(arms) == 2:
-        return float(np.arccos(np.clip(np.sum(arms[:, 0] * arms[:, 1], axis=0), -1, 1)).sum() / (2 * np.pi))
+        return float(
+            np.arccos(np.clip(np.sum(arms[:, 0] * arms[:, 1], axis=0), -1, 1)).sum() / (2 * np.pi)
+        )
     a, b, c = arms[:, 0], arms[:, 1], arms[:, 2]
     volume = np.abs(np.sum(a * np.cross(b, c, axis=0), axis=0))
-    angles = 2 * np.arctan2(volume, 1 + np.sum(a * b + b * c + c * a, axis=0))  # Van Oosterom, Strackee (1983)
+    # Van Oosterom, Strackee (1983)
+    angles = 2 * np.arctan2(volume, 1 + np.sum(a * b + b * c + c * a, axis=0))
     return float(angles.sum() / (4 * np.pi))
 
 
 def _kept(levels: Sequence[Level]) -> list[float]:
-    """The values of the levels at the place of the last one, from fine to coarse, each for elements clearly larger."""
+    """The values of the levels at the place of the last one, from fine to coarse, each for elements
+    clearly larger.
+    """
     last = levels[-1]
     kept: list[Level] = []
     for level in reversed(levels):
@@ -121,7 +141,9 @@ def _rises(levels: Sequence[Level]) -> bool:
 
 
 def _grows(levels: Sequence[Level], count: int) -> bool:
-    """Whether the value at the place where it is largest grows steadily as the elements there become smaller."""
+    """Whether the value at the place where it is largest grows steadily as the elements there
+    become smaller.
+    """
     growths = -np.diff(_kept(levels)[: count + 1])
     if len(growths) < count or np.any(growths <= 0):
         return False

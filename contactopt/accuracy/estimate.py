@@ -15,10 +15,13 @@ class Level:
     value        of the quantity [its unit];   uncertainty  of its reading [its unit]
     error        estimated, over the value [-]; None where one mesh says nothing
     seconds      wall time since the search began [s]
-    energy_error estimated error of the displacement in the energy norm, over its norm [-]; 0 where it is not estimated
-    place, size  of a largest value: where it was read (dim,), and the size of the elements there [length]
+    energy_error estimated error of the displacement in the energy norm, over its norm [-]; 0 where
+    it is not estimated
+    place, size  of a largest value: where it was read (dim,), and the size of the elements there
+                 [length]
     elements     across the contact half-width;   splits  how often the mesh was halved everywhere
-    rounds       of the zone loop;   zone  half-width that the mesh resolves [length]; None without a zone loop
+    rounds       of the zone loop;   zone  half-width that the mesh resolves [length]; None without
+                 a zone loop
     """
 
     unknowns: int
@@ -49,10 +52,13 @@ class Estimate:
 
     value           on the last mesh [unit of the quantity]
     extrapolated    the value with its estimated error added; None where the error is unknown
-    error           estimated error over the value [-], with that of the geometry; None where it is unknown
+    error           estimated error over the value [-], with that of the geometry; None where it is
+                    unknown
     mesh_error      signed part of it that falls with the size of the elements [-]
-    grading_error   signed part of it that falls with the size of the elements away from the contact [-]
-    geometry_error  part of it that no refinement removes, because the meshes do not tell the shape of a boundary [-]
+    grading_error   signed part of it that falls with the size of the elements away from the contact
+                    [-]
+    geometry_error  part of it that no refinement removes, because the meshes do not tell the shape
+                    of a boundary [-]
     order           observed order of convergence; None if it was not observed
     reached         whether the error is at most the target
     message         one sentence that says how the search ended

@@ -1,19 +1,22 @@
-"""Meshes refined everywhere, made anew for more elements: the error is read from differences of nested solutions.
+"""Meshes refined everywhere, made anew for more elements: the error is read from differences of
+nested solutions.
 
-Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh functions receive, and
-`splits`: how often the mesh made for elements / 2^splits was then halved everywhere. Elements in the contact zone have the
-same size whatever the splits; away from it every split turns a growth g of the elements into sqrt(g), and it halves
-whatever size the mesh function holds fixed. The error is taken as one part that falls with each,
+Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh
+functions receive, and `splits`: how often the mesh made for elements / 2^splits was then halved
+everywhere. Elements in the contact zone have the same size whatever the splits; away from it every
+split turns a growth g of the elements into sqrt(g), and it halves whatever size the mesh function
+holds fixed. The error is taken as one part that falls with each,
 
     J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
 
-both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the
-second of the last of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the
-larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of
-the displacement, the order of functionals of smooth solutions, or 2 where an edge is read, since the solution is not
-smooth there.
+both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n
+elements, the second of the last of them and its split, measured anew on the mesh that it asks to
+split. Their sizes are added, the larger part is refined next. Orders are observed where there are
+three solutions, and held between 3/4 and 2 per degree of the displacement, the order of functionals
+of smooth solutions, or 2 where an edge is read, since the solution is not smooth there.
 
-Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter 5.
+Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter
+5.
 """
 
 from __future__ import annotations
@@ -42,18 +45,21 @@ def best_order(quantity: str, degree: int) -> int:
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
     """Estimate how much a sequence still changes under further halving of the mesh.
 
-    The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences form a geometric series.
-    A small last difference may be luck, so that the result is at least what order `best` leaves of the difference before.
-    Where the two differences have opposite signs, the result is as large as the last one, or a quarter of the one before.
+    The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences
+    form a geometric series. A small last difference may be luck, so that the result is at least
+    what order `best` leaves of the difference before. Where the two differences have opposite
+    signs, the result is as large as the last one, or a quarter of the one before.
 
     Parameters
     ----------
-    before, last : the last two differences of the sequence; `before` is None where there is only one
+    before, last : the last two differences of the sequence; `before` is None where there is only
+        one
     best : the largest order that is believed
 
     Returns
     -------
-    The sum of all further differences, with the sign of the last one, and the observed order, None if it is unknown.
+    The sum of all further differences, with the sign of the last one, and the observed order, None
+    if it is unknown.
     """
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
@@ -66,7 +72,9 @@ def remainder(before: float | None, last: float, best: float) -> tuple[float, fl
 
 
 def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | None]:
-    """Signed error of the last value of nested meshes, infinite for a single one, and the observed order."""
+    """Signed error of the last value of nested meshes, infinite for a single one, and the observed
+    order.
+    """
     steps = np.diff(values[-3:])
     if not len(steps):
         return np.inf, None
@@ -77,14 +85,17 @@ def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | Non
 def stuck(values: Sequence[float]) -> bool:
     """Whether every halving of the mesh changes the value by as much as the one before."""
     steps = np.diff(values)
-    return len(steps) > 2 and bool(np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1])))
+    return len(steps) > 2 and bool(
+        np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1]))
+    )
 
 
 class Everywhere:
     """The nested solves of scenes whose parts make their own meshes.
 
-    values   (elements, splits) -> value;   changes  changes[i] is the change of the value by split i + 1. There is one
-             entry for every split of the present mesh; without one there is still the first, measured to learn what it does
+    values   (elements, splits) -> value;   changes  changes[i] is the change of the value by split
+             i + 1. There is one entry for every split of the present mesh; without one there is
+             still the first, measured to learn what it does
     """
 
     def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
@@ -93,8 +104,13 @@ class Everywhere:
         self.name, self.best = quantity, best_order(quantity, scene.degree)
         self.usual = MOST_UNKNOWNS[scene.dim]
         self.first = max(FIRST[scene.dim], scene.elements // BELOW)
-        made = [part.build_mesh(self.first, scene.zone) for part in scene.parts if isinstance(part, Part)]
-        self.halved = scene.dim == 2 and not any(is_curved(mesh) for mesh in made)  # what split() can halve
+        made = [
+            part.build_mesh(self.first, scene.zone)
+            for part in scene.parts
+            if isinstance(part, Part)
+        ]
+        # what split() can halve
+        self.halved = scene.dim == 2 and not any(is_curved(mesh) for mesh in made)
         self.values: dict[tuple[int, int], float] = {}
         self.unknowns: dict[tuple[int, int], int] = {}
         self.changes: list[float] = []
@@ -114,7 +130,9 @@ class Everywhere:
     def solve(self) -> Solved:
         """Solve the next mesh."""
         elements, splits = self.jobs[0]
-        self.options.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
+        self.options.note(
+            f"{elements} elements across the half-width" + (f", {splits} splits" if splits else "")
+        )
         states = [split_scene(scene, elements // 2**splits, splits) for scene in self.states]
         return solve_states(states, elements, self.options, self.last)
 
@@ -131,13 +149,18 @@ class Everywhere:
         grading = 0.0
         if self.changes:
             before = self.changes[-2] if len(self.changes) > 1 else None
-            grading = -remainder(before, self.changes[-1], self.best)[0] - sum(self.changes[splits:])
+            grading = -remainder(before, self.changes[-1], self.best)[0] - sum(
+                self.changes[splits:]
+            )
         return Judged(abs(mesh) + abs(grading), mesh, grading, order)
 
     def vain(self) -> str:
         """One sentence that says why further refinement would be in vain, or an empty text."""
         if stuck(self.meshes):
-            return f"the {self.name} does not converge: every refinement changes it by as much as the one before"
+            return (
+                f"the {self.name} does not converge: every refinement changes it by as much as the"
+                " one before"
+            )
         return ""
 
     @property

@@ -24,9 +24,11 @@ class ElementErrors:
     """What each element adds to the error of a quantity.
 
     value      of the quantity [its unit]
-    bodies     for each body what its elements add (elements,), signed [unit of the quantity]; (0,) for a body without a mesh
+    bodies     for each body what its elements add (elements,), signed [unit of the quantity]; (0,)
+               for a body without a mesh
     between    what of it comes from the pressure between contacts [unit of the quantity]
-    energy     estimated error of the displacement in the energy norm, over the norm of the displacement [-]
+    energy     estimated error of the displacement in the energy norm, over the norm of the
+               displacement [-]
     unsigned   whether there was no adjoint, so that the shares are those of the energy of the error
     """
 
@@ -43,11 +45,15 @@ class ElementErrors:
 
     @property
     def size(self) -> float:
-        """The estimated size of the error: of the stress in the elements and of the pressure between contacts together."""
+        """The estimated size of the error: of the stress in the elements and of the pressure
+        between contacts together.
+        """
         return abs(self.total - self.between) + abs(self.between)
 
     def marked(self, share: float) -> tuple[np.ndarray, ...]:
-        """For each body the fewest elements that together make this share of the sum of absolute errors (Doerfler)."""
+        """For each body the fewest elements that together make this share of the sum of absolute
+        errors (Doerfler).
+        """
         sizes = np.abs(np.concatenate(self.bodies))
         order = np.argsort(-sizes, kind="stable")
         count = int(np.searchsorted(np.cumsum(sizes[order]), share * sizes.sum())) + 1
@@ -63,8 +69,9 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     Parameters
     ----------
     solved : a scene that was reduced and solved
-    quantity : of the scene. For "energy" no adjoint is needed: the energy of the error itself is taken, without a sign.
-        The same serves, as a guide to the marking alone, for edges and where the adjoint problem has no solution
+    quantity : of the scene. For "energy" no adjoint is needed: the energy of the error itself is
+        taken, without a sign. The same serves, as a guide to the marking alone, for edges and where
+        the adjoint problem has no solution
     value : of the quantity
 
     Returns
@@ -107,7 +114,8 @@ def _sum(*parts: np.ndarray | None) -> np.ndarray | None:
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What elements at the contact add to the error of a function of the forces, because the pressure varies between contacts.
+    """What elements at the contact add to the error of a function of the forces, because the
+    pressure varies between contacts.
 
     Parameters
     ----------
@@ -119,7 +127,10 @@ def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, .
     """
     reduction, problem = solved.reduction, solved.reduction.problem
     added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
-    F = [np.asarray(abs(B).T @ np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel()) for B in reduction.maps]
+    F = [
+        np.asarray(abs(B).T @ np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel())
+        for B in reduction.maps
+    ]
     shares = [body.on_elements(force) for body, force in zip(reduction.bodies, F)]
     total = sum(share.sum() for share in shares)
     factor = added.sum() / total if total != 0 else 0.0
@@ -127,12 +138,14 @@ def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, .
 
 
 def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
-    """By how much the pressure at each contact exceeds the force over the area there, (k,) [stress].
+    """By how much the pressure at each contact exceeds the force over the area there, (k,)
+    [stress].
 
-    The force at a contact is the integral of the pressure with a hat function: over the area of the hat it is a mean of the
-    pressure nearby. On a line with contacts at distance h that mean is p + h^2 p'' / 12. The mean of the piecewise linear
-    function through the contacts is p + h^2 p'' / 6 as its second differences are h^2 p''. Half of what it differs from the
-    value is the error, and this half is taken on surfaces and where distances vary as well.
+    The force at a contact is the integral of the pressure with a hat function: over the area of the
+    hat it is a mean of the pressure nearby. On a line with contacts at distance h that mean is p +
+    h^2 p'' / 12. The mean of the piecewise linear function through the contacts is p + h^2 p'' / 6
+    as its second differences are h^2 p''. Half of what it differs from the value is the error, and
+    this half is taken on surfaces and where distances vary as well.
     """
     problem = reduction.problem
     pressure = np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
@@ -144,11 +157,18 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
         own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
         edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
         size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
-        p, r = own[cells], points[0][cells] if reduction.scene.kind == "axisymmetric" else np.ones(cells.shape)
+        p, r = (
+            own[cells],
+            points[0][cells] if reduction.scene.kind == "axisymmetric" else np.ones(cells.shape),
+        )
         (sum_p, sum_r), corner = (x.sum(axis=1, keepdims=True) for x in (p, r)), cells.ravel()
         # integrals of phi_a phi_b phi_c r_c p_b over a simplex, in units of its smallest one
-        mean = sum_p * sum_r + p * sum_r + r * sum_p + np.sum(p * r, axis=1, keepdims=True) + 2 * p * r
+        mean = (
+            sum_p * sum_r + p * sum_r + r * sum_p + np.sum(p * r, axis=1, keepdims=True) + 2 * p * r
+        )
         smooth = np.bincount(corner, (size * mean).ravel(), len(own))
         whole = (problem.dim + 2) * np.bincount(corner, (size * (sum_r + r)).ravel(), len(own))
-        errors[pair.contacts] = (own - np.divide(smooth, whole, out=own.copy(), where=whole > 0)) / 2
+        errors[pair.contacts] = (
+            own - np.divide(smooth, whole, out=own.copy(), where=whole > 0)
+        ) / 2
     return errors

@@ -1,4 +1,6 @@
-"""Meshes that are given, or made once, and then divided: where the quantity needs it, or everywhere."""
+"""Meshes that are given, or made once, and then divided: where the quantity needs it, or
+everywhere.
+"""
 
 from __future__ import annotations
 
@@ -27,20 +29,25 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import solve_states
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
-SHARE = 0.6  # of the estimated error that the marked elements make; Doerfler's marking allows anything between 0 and 1
+# of the estimated error that the marked elements make; Doerfler's marking allows anything between 0
+# and 1
+SHARE = 0.6
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
 
 
 class Locally:
     """Divided meshes of a scene, or of the states of its load path.
 
-    whole    whether all elements are divided; the error is then read from differences of nested solutions, as in
-             contactopt.accuracy.everywhere, and otherwise element by element (contactopt.accuracy.indicators)
+    whole    whether all elements are divided; the error is then read from differences of nested
+             solutions, as in contactopt.accuracy.everywhere, and otherwise element by element
+             (contactopt.accuracy.indicators)
     """
 
     usual = USUAL
 
-    def __init__(self, states: tuple[Scene, ...], quantity: Quantity, options: Options, whole: bool):
+    def __init__(
+        self, states: tuple[Scene, ...], quantity: Quantity, options: Options, whole: bool
+    ):
         check_refinable(states[-1])
         made = [divisible(scene, not whole) for scene in states]
         self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
@@ -80,7 +87,8 @@ class Locally:
         """One sentence that says why further refinement would be in vain, or an empty text."""
         if self.whole and stuck(self.values):
             return (
-                f"the {self.quantity.name} does not converge: every refinement changes it by as much as the one before"
+                f"the {self.quantity.name} does not converge: every refinement changes it by as"
+                " much as the one before"
             )
         return ""
 
@@ -91,19 +99,20 @@ class Locally:
 
     def facts(self, solved: Solved) -> dict[str, Any]:
         """What a Level says of the mesh beside its size."""
-        return {"elements": self.states[-1].elements, "splits": len(self.values)} if self.whole else {}
+        return (
+            {"elements": self.states[-1].elements, "splits": len(self.values)} if self.whole else {}
+        )
 
-    def advance(self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]) -> float:
+    def advance(
+        self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
+    ) -> float:
         """Divide elements; returns how many unknowns the next mesh has.
 
         Parameters
         ----------
-        judged, reading
-            Of the last mesh.
-        contacts
-            Numbers of contacts around which the mesh is too coarse to know.
-        rivals
-            Local maxima that may be the largest.
+        judged, reading : Of the last mesh.
+        contacts : Numbers of contacts around which the mesh is too coarse to know.
+        rivals : Local maxima that may be the largest.
         """
         marked = None
         if not self.whole:
@@ -116,7 +125,10 @@ class Locally:
             if rivals:
                 pressure = nodal_pressure(reduction.problem, self.last.solution)
                 near.append(plateau(reduction, pressure, rivals))
-            marks = [self.errors.marked(SHARE), at_contacts(reduction, np.concatenate(near).astype(int))]
+            marks = [
+                self.errors.marked(SHARE),
+                at_contacts(reduction, np.concatenate(near).astype(int)),
+            ]
             for peak in chosen:
                 if peak.body >= 0:
                     none = np.empty(0, dtype=int)
@@ -127,20 +139,19 @@ class Locally:
         return float(unknowns(self.states[-1]))
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
-        """By how much the quantity changes in the other shape of guessed boundaries, and one sentence on them.
+        """By how much the quantity changes in the other shape of guessed boundaries, and one
+        sentence on them.
 
         Parameters
         ----------
-        value
-            On the last mesh.
-        before
-            The states on that mesh.
+        value : On the last mesh.
+        before : The states on that mesh.
         """
         if not self.shapes.names:
             return 0.0, ""
         sentence = (
-            f"the mesh gives boundary {self.shapes.names} by straight edges only, which are taken for chords of a smooth "
-            "line: give its `curve`, or a mesh of second order"
+            f"the mesh gives boundary {self.shapes.names} by straight edges only, which are taken"
+            " for chords of a smooth line: give its `curve`, or a mesh of second order"
         )
         if not self.shapes.doubtful:
             return 0.0, sentence

@@ -26,7 +26,8 @@ from contactopt.solving.solve_scene import Options, Solved
 
 log = logging.getLogger(__name__)
 MOST_LEVELS = 60
-WATCHED = 1.5  # by how much larger the elements at a peak must have been for its change to tell its error
+# by how much larger the elements at a peak must have been for its change to tell its error
+WATCHED = 1.5
 SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
 ROUNDING = 1e-15  # least relative error: no reading is exact
@@ -42,47 +43,44 @@ def refine(
 ) -> tuple[Solved, Estimate]:
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
-    Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by itself; a mortar coupling
-    joins what no longer matches, and quadrilaterals and hexahedra become triangles and tetrahedra. Each solve
-    begins with the last answer. The search ends short of the target, with a sentence in the estimate, where the quantity
-    does not converge or does not exist, where the next mesh would pass a limit, and where a solve or a refinement fails.
+    Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by
+    itself; a mortar coupling joins what no longer matches, and quadrilaterals and hexahedra become
+    triangles and tetrahedra. Each solve begins with the last answer. The search ends short of the
+    target, with a sentence in the estimate, where the quantity does not converge or does not exist,
+    where the next mesh would pass a limit, and where a solve or a refinement fails.
 
     Parameters
     ----------
-    states
-        The scene, or the states of its load path.
-    quantity
-        A name of contactopt.derivatives.outputs, such as 'pressure', 'pressure:block-floor' or
-        'von_mises:block:fillet'.
-    accuracy
-        Bound on the estimated relative error of the quantity, between 0 and 1.
-    options
-        How each mesh is solved.
-    limits
-        On unknowns, time and memory.
-    adaptive
-        Whether meshes are refined only where the quantity needs it.
+    states : The scene, or the states of its load path.
+    quantity : A name of contactopt.derivatives.outputs, such as 'pressure', 'pressure:block-floor'
+        or 'von_mises:block:fillet'.
+    accuracy : Bound on the estimated relative error of the quantity, between 0 and 1.
+    options : How each mesh is solved.
+    limits : On unknowns, time and memory.
+    adaptive : Whether meshes are refined only where the quantity needs it.
 
     Returns
     -------
-    tuple
-        The scene solved on the last mesh, which is the best answer where a bound ended the search, and the Estimate.
+    The scene solved on the last mesh, which is the best answer where a bound ended the search, and
+    the Estimate.
 
     Raises
     ------
-    InputError
-        For an unknown quantity, body, boundary, pair or place and an accuracy out of range, before anything is
-        solved; and where the first mesh has no solution.
+    InputError : For an unknown quantity, body, boundary, pair or place and an accuracy out of
+        range, before anything is solved; and where the first mesh has no solution.
     """
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     scene = states[-1]
     asked = find_quantity(quantity, scene)
     if asked.nodal:
         raise InputError(
-            f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as in 'pressure@X,Y'."
+            f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as"
+            " in 'pressure@X,Y'."
         )
     if adaptive and len(states) > 1:
-        raise InputError(f"scene '{scene.name}' has a load path, which adaptive refinement does not follow.")
+        raise InputError(
+            f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
+        )
     options = options or Options()
     search = (
         Locally(tuple(states), asked, options, not adaptive)
@@ -96,7 +94,8 @@ def refine(
 class _Loop:
     """The state of one search.
 
-    solved, reading, judged   of the best answer so far;   states  its scenes, where these are divided
+    solved, reading, judged   of the best answer so far;   states  its scenes, where these are
+                              divided
     levels, peaks             of every mesh
     """
 
@@ -133,9 +132,14 @@ class _Loop:
         states = list(self.search.states)
         solved = self.search.solve()
         if not solved.solution.solved:
-            sentence = f"the mesh of {solved.reduction.dofs} unknowns was not solved: {solved.solution.message}"
+            sentence = (
+                f"the mesh of {solved.reduction.dofs} unknowns was not solved:"
+                f" {solved.solution.message}"
+            )
             if not self.levels:
-                raise InputError(f"scene '{states[-1].name}': {sentence}; begin with another mesh or load.")
+                raise InputError(
+                    f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
+                )
             return sentence
         reading = self.quantity.read(solved.reduction, solved.solution)
         facts = self.search.facts(solved)
@@ -209,7 +213,8 @@ class _Loop:
     def _change(self, peak: Peak) -> float:
         """By how much a peak differed on the last mesh of larger elements there, or half the value.
 
-        What nodes scatter about a fit is no measure here: where facets change their length, it is large on every mesh.
+        What nodes scatter about a fit is no measure here: where facets change their length, it is
+        large on every mesh.
         """
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
@@ -246,7 +251,9 @@ class _Loop:
         return self.limits.refusal(unknowns, self.search.usual, spent + last, held)
 
     def _geometry(self) -> tuple[float, str]:
-        """The error that the shape of guessed boundaries makes [unit of the quantity], and a sentence on it."""
+        """The error that the shape of guessed boundaries makes [unit of the quantity], and a
+        sentence on it.
+        """
         if not isinstance(self.search, Locally) or self.vain or self.reading.missing:
             return 0.0, ""
         try:
@@ -265,11 +272,21 @@ class _Loop:
         error = last.error + geometry / scale if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy
         if sentence:
-            start = message if reached or not self.reached else "the geometry keeps the target out of reach"
-            part = f"{geometry / scale:.1e} of the error is that of the geometry, since " if geometry > 0 else ""
+            start = (
+                message
+                if reached or not self.reached
+                else "the geometry keeps the target out of reach"
+            )
+            part = (
+                f"{geometry / scale:.1e} of the error is that of the geometry, since "
+                if geometry > 0
+                else ""
+            )
             message = f"{start}; {part}{sentence}"
         seconds = dict(self.solved.solution.seconds)
-        seconds["coarse"] = seconds.get("coarse", 0.0) + max(last.seconds - sum(seconds.values()), 0.0)
+        seconds["coarse"] = seconds.get("coarse", 0.0) + max(
+            last.seconds - sum(seconds.values()), 0.0
+        )
         solution = replace(self.solved.solution, seconds=seconds)
         signed = known and np.isfinite(judged.mesh)
         return replace(self.solved, solution=solution), Estimate(

@@ -40,7 +40,12 @@ class Shapes:
     @property
     def names(self) -> str:
         """The guessed boundaries in words."""
-        found = [f"'{name}' of body '{body}'" for body, own in self.guessed.items() for name in own if name]
+        found = [
+            f"'{name}' of body '{body}'"
+            for body, own in self.guessed.items()
+            for name in own
+            if name
+        ]
         return ", ".join(found[:3]) + (" and more" if len(found) > 3 else "")
 
     @property
@@ -56,20 +61,18 @@ class Shapes:
 def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
     """Put a scene on meshes of straight elements, and find the curves of their boundaries.
 
-    A boundary follows the `curve` of its part or the edges of second order of its file. Without them the curve is a
-    guess, the smooth outline through the nodes of the first mesh (contactopt.meshes.curves).
+    A boundary follows the `curve` of its part or the edges of second order of its file. Without
+    them the curve is a guess, the smooth outline through the nodes of the first mesh
+    (contactopt.meshes.curves).
 
     Parameters
     ----------
-    scene
-        The scene, whose mesh functions make coarse first meshes.
-    simplicial
-        Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
+    scene : The scene, whose mesh functions make coarse first meshes.
+    simplicial : Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
 
     Returns
     -------
-    tuple
-        The scene with its meshes, and their Shapes.
+    The scene with its meshes, and their Shapes.
     """
     curves: dict[str, dict[str, Curve]] = {}
     guessed: dict[str, dict[str, Chords]] = {}
@@ -82,7 +85,9 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
         cut = simplices(corners) if simplicial else corners
         found = curves[part.name] = part_curves(part, given)
         unsure = [name for name, curve in found.items() if not getattr(curve, "known", False)]
-        guessed[part.name] = {name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2}
+        guessed[part.name] = {
+            name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2
+        }
         own = {name: found[name] for name in scene.surfaces_of(part) if name in found}
         return replace(part, mesh=cut, curve=own or None)
 
@@ -90,14 +95,18 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
 
 
 def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
-    """The scene as it is solved: with quadratic displacements the edges follow the curved boundaries."""
+    """The scene as it is solved: with quadratic displacements the edges follow the curved
+    boundaries.
+    """
     if scene.degree == 1:
         return scene
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
 
 
 def otherwise(scene: Scene, shapes: Shapes) -> Scene:
-    """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon), as it is solved."""
+    """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon), as it
+    is solved.
+    """
 
     def moved(part: Part) -> Any:
         points, curves = part.mesh.p.copy(), dict[str, Any](shapes.of(part))
@@ -116,9 +125,11 @@ def _flattened(curve: Curve, chords: Chords, points: np.ndarray) -> np.ndarray:
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
-    """The scene with the marked elements of every body divided; with all of them where nothing is said.
+    """The scene with the marked elements of every body divided; with all of them where nothing is
+    said.
 
-    Facets that face much finer ones of another body are divided with them (`balanced`), until none is left.
+    Facets that face much finer ones of another body are divided with them (`balanced`), until none
+    is left.
     """
     if marked is None:
         return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
@@ -144,11 +155,15 @@ def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Sc
 
 
 def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
-    return scene.with_parts(lambda part: replace(part, mesh=mesh(part)) if isinstance(part, Part) else part)
+    return scene.with_parts(
+        lambda part: replace(part, mesh=mesh(part)) if isinstance(part, Part) else part
+    )
 
 
 def unknowns(scene: Scene) -> int:
-    """The displacement components of all nodes of the meshes, at least as many as a mesh has unknowns."""
+    """The displacement components of all nodes of the meshes, at least as many as a mesh has
+    unknowns.
+    """
     total = 0
     for part in scene.parts:
         if isinstance(part, Part):
@@ -161,20 +176,17 @@ def unknowns(scene: Scene) -> int:
 def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     """Mark more elements, so that surfaces that face each other stay about as fine as each other.
 
-    A surface that is much finer than the one that it touches sees the facets of the other one as a polygon, whose corners
-    press with a pressure that grows with every refinement of the fine side.
+    A surface that is much finer than the one that it touches sees the facets of the other one as a
+    polygon, whose corners press with a pressure that grows with every refinement of the fine side.
 
     Parameters
     ----------
-    scene
-        The scene on meshes of simplices.
-    marked
-        For each body the elements that will be divided.
+    scene : The scene on meshes of simplices.
+    marked : For each body the elements that will be divided.
 
     Returns
     -------
-    tuple
-        For each body the elements, those of `marked` among them.
+    For each body the elements, those of `marked` among them.
     """
     chosen = [set(elements.tolist()) for elements in marked]
     names = [part.name for part in scene.parts]
@@ -183,7 +195,9 @@ def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, 
         parts = [part for part in (scene.parts[i] for i in sides) if isinstance(part, Part)]
         if len(parts) < 2:
             continue
-        faces = [_facets(part, surface or part.contact) for part, surface in zip(parts, pair.surfaces)]
+        faces = [
+            _facets(part, surface or part.contact) for part, surface in zip(parts, pair.surfaces)
+        ]
         for one, other in ((0, 1), (1, 0)):
             middle, size, element = faces[one]
             facing, small, theirs = faces[other]
@@ -212,18 +226,25 @@ def at_contacts(reduction: Reduction, contacts: np.ndarray) -> tuple[np.ndarray,
     weights = np.zeros(reduction.problem.q.shape)
     weights[contacts] = 1.0
     made = (np.asarray(abs(B).T @ weights.ravel()) for B in reduction.maps)
-    return tuple(np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made))
+    return tuple(
+        np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made)
+    )
 
 
 def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
-    """Numbers of the contacts that press at least as much as the least of some peaks on their own pair of surfaces.
+    """Numbers of the contacts that press at least as much as the least of some peaks on their own
+    pair of surfaces.
 
-    Where many peaks come close to the largest one, the pressure is nearly even: its surface is then divided as one, since
-    facets of different lengths would make peaks of their own.
+    Where many peaks come close to the largest one, the pressure is nearly even: its surface is then
+    divided as one, since facets of different lengths would make peaks of their own.
     """
     found = [np.empty(0, dtype=int)]
     for pair in reduction.problem.pairs:
-        own = [one.value for one in peaks if len(one.contacts) and pair.start <= one.contacts[0] < pair.stop]
+        own = [
+            one.value
+            for one in peaks
+            if len(one.contacts) and pair.start <= one.contacts[0] < pair.stop
+        ]
         if own:
             found.append(np.flatnonzero(pressure[pair.contacts] >= min(own)) + pair.start)
     return np.concatenate(found)
@@ -237,22 +258,19 @@ def joined(*marks: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
 def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:
     """Find the contacts between which the gap of a rigid body is smaller than at the contacts.
 
-    Gap functions are sampled within every facet. Counted is where the sample undercuts what the facet has between its nodes
-    by more than the surfaces are apart there and CLOSURE of the closure.
+    Gap functions are sampled within every facet. Counted is where the sample undercuts what the
+    facet has between its nodes by more than the surfaces are apart there and CLOSURE of the
+    closure.
 
     Parameters
     ----------
-    reduction
-        The reduced scene.
-    touching
-        (k,) mask of the contacts that touch.
-    apart
-        (k,) distance of the surfaces in the solution [length].
+    reduction : The reduced scene.
+    touching : (k,) mask of the contacts that touch.
+    apart : (k,) distance of the surfaces in the solution [length].
 
     Returns
     -------
-    ndarray
-        Numbers of the contacts at the corners of such facets.
+    Numbers of the contacts at the corners of such facets.
     """
     scene, problem = reduction.scene, reduction.problem
     found = [np.empty(0, dtype=int)]
@@ -267,9 +285,13 @@ def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) ->
         shares = _lattice(scene.dim)
         own, clear = coupling.gap, np.maximum(apart[made.contacts], 0.0)
         points = np.einsum("sc,dvc->dvs", shares, problem.coordinates[:, made.contacts][:, corners])
-        sampled = np.asarray(gap(points.reshape(scene.dim, -1)), dtype=float).reshape(points.shape[1:])
+        sampled = np.asarray(gap(points.reshape(scene.dim, -1)), dtype=float).reshape(
+            points.shape[1:]
+        )
         between = own[corners] @ shares.T
-        closure = float(np.ptp(own[touching[made.contacts]])) if touching[made.contacts].any() else 0.0
+        closure = (
+            float(np.ptp(own[touching[made.contacts]])) if touching[made.contacts].any() else 0.0
+        )
         bound = clear[corners] @ shares.T + CLOSURE * closure
         rounding = 1e-9 * float(np.abs(problem.coordinates).max())
         hidden = np.any(between - sampled > bound + rounding, axis=1)
@@ -292,6 +314,6 @@ def check_refinable(scene: Scene) -> None:
     """InputError, before anything is solved, for a scene that has no mesh to refine."""
     if not any(isinstance(part, Part) for part in scene.parts):
         raise InputError(
-            f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a function "
-            "(elements, zone) -> points."
+            f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a"
+            " function (elements, zone) -> points."
         )

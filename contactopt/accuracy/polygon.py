@@ -1,14 +1,15 @@
 """What is not known of a boundary that a mesh gives by straight edges alone.
 
-The smooth line through the nodes of a polygon is a guess. At every node the circle through it and its neighbours has a
-curvature. Where the two ends of an edge have the same one, the line between them is well known; where they differ, as
-where a straight flank meets a fillet, the curvature of the edge may be that of either end. An edge of length c whose
-curvature is uncertain by dk leaves its place open by
+The smooth line through the nodes of a polygon is a guess. At every node the circle through it and
+its neighbours has a curvature. Where the two ends of an edge have the same one, the line between
+them is well known; where they differ, as where a straight flank meets a fillet, the curvature of
+the edge may be that of either end. An edge of length c whose curvature is uncertain by dk leaves
+its place open by
 
     dk c^2 / 8 * 4 t (1 - t)    at the share t of its length,    dk half of what the ends differ.
 
-The quantity is read once more from the other shape, in which every edge has the smaller curvature of its two ends. What it
-changes is the error of the geometry, which no refinement removes.
+The quantity is read once more from the other shape, in which every edge has the smaller curvature
+of its two ends. What it changes is the error of the geometry, which no refinement removes.
 """
 
 from __future__ import annotations
@@ -18,25 +19,24 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-Chords = tuple[np.ndarray, np.ndarray, np.ndarray]  # begin, end (2, f) and sagitta in doubt (f,) [length]
+# begin, end (2, f) and sagitta in doubt (f,) [length]
+Chords = tuple[np.ndarray, np.ndarray, np.ndarray]
 SAME = 1e-3  # relative difference of curvatures that rounding of files makes
 NEAREST = 8  # edges among which that of a point is looked for
 
 
 def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
-    """The straight edges of a boundary of a plane mesh, and by how far the middle of each is in doubt.
+    """The straight edges of a boundary of a plane mesh, and by how far the middle of each is in
+    doubt.
 
     Parameters
     ----------
-    mesh
-        A plane mesh of straight elements.
-    facets
-        Numbers of the facets of the boundary.
+    mesh : A plane mesh of straight elements.
+    facets : Numbers of the facets of the boundary.
 
     Returns
     -------
-    Chords
-        Begin and end of every edge, and its doubtful sagitta [length].
+    Begin and end of every edge, and its doubtful sagitta [length].
     """
     edges, points = mesh.facets[:, facets], mesh.p
     count = points.shape[1]
@@ -45,7 +45,11 @@ def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
     nodes, first, each = np.unique(edges.ravel()[order], return_index=True, return_counts=True)
     other = np.roll(edges, 1, axis=0).ravel()[order]
     inner = each == 2
-    a, b, c = points[:, other[first[inner]]], points[:, nodes[inner]], points[:, other[first[inner] + 1]]
+    a, b, c = (
+        points[:, other[first[inner]]],
+        points[:, nodes[inner]],
+        points[:, other[first[inner] + 1]],
+    )
     u, v = b - a, c - b
     area = u[0] * v[1] - u[1] * v[0]
     product = np.prod([np.linalg.norm(side, axis=0) for side in (u, v, c - a)], axis=0)
@@ -58,19 +62,17 @@ def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
 
 
 def flatter(points: np.ndarray, chords: Chords) -> np.ndarray:
-    """Move points on the smooth line to the other shape, towards the edges of the polygon by what is in doubt.
+    """Move points on the smooth line to the other shape, towards the edges of the polygon by what
+    is in doubt.
 
     Parameters
     ----------
-    points
-        (2, m) on the line [length].
-    chords
-        Of the polygon.
+    points : (2, m) on the line [length].
+    chords : Of the polygon.
 
     Returns
     -------
-    ndarray
-        (2, m) points; no further than the polygon itself.
+    (2, m) points; no further than the polygon itself.
     """
     begin, end, doubt = chords
     count = min(NEAREST, begin.shape[1])
@@ -85,4 +87,6 @@ def flatter(points: np.ndarray, chords: Chords) -> np.ndarray:
     t, size = share[rows, best], distance[rows, best]
     moved = np.minimum(doubt[near[rows, best]] * 4 * t * (1 - t), size)
     way = foot[:, rows, best] - points
-    return np.asarray(points + way * np.divide(moved, size, out=np.zeros_like(size), where=size > 0))
+    return np.asarray(
+        points + way * np.divide(moved, size, out=np.zeros_like(size), where=size > 0)
+    )

@@ -1,8 +1,10 @@
-"""Exact solutions of contact mechanics: closed forms where they exist, else integral equations solved to many digits.
+"""Exact solutions of contact mechanics: closed forms where they exist, else integral equations
+solved to many digits.
 
 reference   the record of a solution; E*, Gs, Dundurs' constants
 normal      Hertz; rigid flat punches, frictionless and bonded
-friction    rigid flat punches and Hertz's geometry with Coulomb friction between dissimilar materials (spence, panels)
+friction    rigid flat punches and Hertz's geometry with Coulomb friction between dissimilar
+            materials (spence, panels)
 mindlin     Cattaneo-Mindlin: tangential loading, unloading, cyclic loss
 conforming  a pin in a hole with clearance (Persson), the press fit (Lame)
 corner      exponents of the stress at the edge of an elastic punch

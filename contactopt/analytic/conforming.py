@@ -10,10 +10,13 @@ from contactopt.errors import InputError
 from contactopt.material import Material
 
 
-def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulus: float) -> Reference:
+def pin_in_hole(
+    force_per_length: float, radius: float, clearance: float, modulus: float
+) -> Reference:
     """A pin in the hole of an infinite plate of the same material, plane strain, frictionless.
 
-    With b = tan(eps / 2), eps the semi-angle of contact, y = tan(phi / 2) and E1* = E / (1 - nu^2) = 2 E*,
+    With b = tan(eps / 2), eps the semi-angle of contact, y = tan(phi / 2) and E1* = E / (1 - nu^2)
+    = 2 E*,
 
         E1* c / Q = [2 - ln(1 + b^2) - 2 b^4] / [pi b^2 (1 + b^2)],
         p = Q / (pi R) {2 sqrt(b^2 - y^2) / [sqrt(1 + b^2) (1 + y^2)] + artanh[sqrt((b^2 - y^2) / (b^2 + 1))] / [b^2 (1 + b^2)]}.
@@ -33,17 +36,20 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
 
     Raises
     ------
-    InputError : if an argument is not positive, and for forces beyond those that numbers can resolve
+    InputError : if an argument is not positive, and for forces beyond those that numbers can
+        resolve
 
     Notes
     -----
-    Source: Persson (1964), On the stress distribution of cylindrical elastic bodies in contact (Chalmers); Ciavarella, Decuzzi
-    (2001), The state of stress induced by the plane frictionless cylindrical contact. I. The case of elastic similarity, Int. J.
-    Solids Struct. 38, 4507-4523.
+    Source: Persson (1964), On the stress distribution of cylindrical elastic bodies in contact
+    (Chalmers); Ciavarella, Decuzzi (2001), The state of stress induced by the plane frictionless
+    cylindrical contact. I. The case of elastic similarity, Int. J. Solids Struct. 38, 4507-4523.
     """
     from scipy.optimize import brentq
 
-    check_positive(force_per_length=force_per_length, radius=radius, clearance=clearance, modulus=modulus)
+    check_positive(
+        force_per_length=force_per_length, radius=radius, clearance=clearance, modulus=modulus
+    )
     ratio = 2 * modulus * clearance / force_per_length
 
     def excess(s: float) -> float:
@@ -55,7 +61,10 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
     ends = np.log(1e-8), np.log(full)
     if not excess(ends[0]) > 0 > excess(ends[1]):
         much = "large" if excess(ends[0]) > 0 else "small"
-        raise InputError(f"the force {force_per_length:g} per length is too {much} for this pin; take another force.")
+        raise InputError(
+            f"the force {force_per_length:g} per length is too {much} for this pin; take another"
+            " force."
+        )
     b = float(np.exp(brentq(excess, *ends, xtol=1e-15)))
 
     def pressure(x: np.ndarray) -> np.ndarray:
@@ -66,13 +75,16 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
         second = np.arctanh(root / np.sqrt(1 + b**2)) / (b**2 * (1 + b**2))
         return np.asarray(force_per_length / (np.pi * radius) * (first + second))
 
-    return Reference("Persson", pressure, 2 * radius * float(np.arctan(b)), float(pressure(np.zeros(1))[0]))
+    return Reference(
+        "Persson", pressure, 2 * radius * float(np.arctan(b)), float(pressure(np.zeros(1))[0])
+    )
 
 
 def press_fit(
     interference: float, bore: float, radius: float, outside: float, shaft: Material, hub: Material
 ) -> Reference:
-    """A shaft pressed into a hub that is too narrow for it, plane strain: Lame's uniform pressure p.
+    """A shaft pressed into a hub that is too narrow for it, plane strain: Lame's uniform pressure
+    p.
 
         d / (R p) = [(c^2 + R^2) / (c^2 - R^2) + m_h] / M_h + [(R^2 + a^2) / (R^2 - a^2) - m_s] / M_s,
 
@@ -80,7 +92,8 @@ def press_fit(
 
     Parameters
     ----------
-    interference : d, radius of the shaft less that of the hub before they are joined [length], small beside R
+    interference : d, radius of the shaft less that of the hub before they are joined [length],
+        small beside R
     bore, radius, outside : a of the shaft (0: solid), R of the interface, c of the hub [length]
     shaft, hub : the materials
 
@@ -99,7 +112,10 @@ def press_fit(
     check_positive(interference=interference, radius=radius, outside=outside)
     check_number("bore", bore, low=0.0, closed=True)
     if not bore < radius < outside:
-        raise InputError(f"the radii must grow from bore to radius to outside; got {bore:g}, {radius:g}, {outside:g}.")
+        raise InputError(
+            f"the radii must grow from bore to radius to outside; got {bore:g}, {radius:g},"
+            f" {outside:g}."
+        )
 
     def plane(material: Material) -> tuple[float, float]:
         return material.E / (1 - material.nu**2), material.nu / (1 - material.nu)

@@ -1,14 +1,17 @@
-"""Stress at the corner where the edge of one elastic body meets the surface of another: sigma ~ r^(lambda - 1).
+"""Stress at the corner where the edge of one elastic body meets the surface of another: sigma ~
+r^(lambda - 1).
 
-Two wedges in plane strain share the ray theta = 0, which runs from the corner into the contact: the upper body fills
-0 < theta < angle, the lower one -angle < theta < 0; the other faces are free. Williams' fields, in each wedge:
+Two wedges in plane strain share the ray theta = 0, which runs from the corner into the contact: the
+upper body fills 0 < theta < angle, the lower one -angle < theta < 0; the other faces are free.
+Williams' fields, in each wedge:
     sigma_tt = lambda (lambda + 1) r^(lambda-1) [A cos(m t) + B sin(m t) + C cos(k t) + D sin(k t)],
     sigma_rt = lambda r^(lambda-1) [m (A sin(m t) - B cos(m t)) + k (C sin(k t) - D cos(k t))],
     2 G u_r = r^lambda [-m (A cos(m t) + B sin(m t)) + (kappa - lambda) (C cos(k t) + D sin(k t))],
     2 G u_t = r^lambda [m (A sin(m t) - B cos(m t)) + (kappa + lambda) (C sin(k t) - D cos(k t))],
-m = lambda + 1, k = lambda - 1, kappa = 3 - 4 nu. Exponents are zeros of the determinant of the eight conditions on the
-three rays. Sources: Williams (1952), J. Appl. Mech. 19, 526-528; Bogy (1971), J. Appl. Mech. 38, 377-386 (bonded);
-Gdoutos and Theocaris (1975), J. Appl. Mech. 42, 688-692, and Comninou (1976), ZAMP 27, 493-499 (friction).
+m = lambda + 1, k = lambda - 1, kappa = 3 - 4 nu. Exponents are zeros of the determinant of the
+eight conditions on the three rays. Sources: Williams (1952), J. Appl. Mech. 19, 526-528; Bogy
+(1971), J. Appl. Mech. 38, 377-386 (bonded); Gdoutos and Theocaris (1975), J. Appl. Mech. 42,
+688-692, and Comninou (1976), ZAMP 27, 493-499 (friction).
 """
 
 from __future__ import annotations
@@ -32,11 +35,12 @@ WEAKEST = 0.999  # exponent that still counts as singular
 class Corner:
     """The strongest field at a corner.
 
-    exponent     Re lambda [-]: stress ~ r^(exponent - 1); errors of uniform meshes in the energy norm ~ h^exponent.
-                 1: no singularity
+    exponent     Re lambda [-]: stress ~ r^(exponent - 1); errors of uniform meshes in the energy
+                 norm ~ h^exponent. 1: no singularity
     oscillation  |Im lambda| [-]: the field changes sign with cos(oscillation ln r)
-    ratio        shear traction over pressure on the interface [-], positive where the lower body is pushed away from
-                 the contact's centre; nan without a singularity or with oscillation
+    ratio        shear traction over pressure on the interface [-], positive where the lower body is
+                 pushed away from the contact's centre; nan without a singularity or with
+                 oscillation
     """
 
     exponent: float
@@ -52,28 +56,24 @@ def corner(
 ) -> Corner:
     """The strongest singular field where the edge of a body lies on another body; plane strain.
 
-    Poisson's ratio enters through Dundurs' constants only. Equal materials give an exponent that does not depend on
-    it.
+    Poisson's ratio enters through Dundurs' constants only. Equal materials give an exponent that
+    does not depend on it.
 
     Parameters
     ----------
-    upper, lower
-        Materials; None is a rigid body.
-    mu
-        Shear traction over pressure on the sliding interface [-], positive where the lower body is pushed away from
-        the centre of the contact; its sign follows the slip. 0 is frictionless, None is bonded.
-    angles
-        Of the upper and of the lower body at the corner [rad], up to 2 pi.
+    upper, lower : Materials; None is a rigid body.
+    mu : Shear traction over pressure on the sliding interface [-], positive where the lower body is
+        pushed away from the centre of the contact; its sign follows the slip. 0 is frictionless,
+        None is bonded.
+    angles : Of the upper and of the lower body at the corner [rad], up to 2 pi.
 
     Returns
     -------
-    Corner
-        Exponent, oscillation, and ratio of the tractions.
+    Exponent, oscillation, and ratio of the tractions.
 
     Raises
     ------
-    InputError
-        For two rigid bodies, or angles out of range.
+    InputError : For two rigid bodies, or angles out of range.
     """
     if upper is None and lower is None:
         raise InputError("both bodies are rigid; at least one must be elastic.")
@@ -106,21 +106,17 @@ def edge_stick_threshold(
 
     Parameters
     ----------
-    upper, lower
-        Materials; None is a rigid body.
-    angles
-        Of the upper and of the lower body at the corner [rad], up to 2 pi.
+    upper, lower : Materials; None is a rigid body.
+    angles : Of the upper and of the lower body at the corner [rad], up to 2 pi.
 
     Returns
     -------
-    float
-        [-]; inf where the bonded field oscillates, because the edge slips for every mu then, and nan where it is
-        bounded.
+    [-]; inf where the bonded field oscillates, because the edge slips for every mu then, and nan
+    where it is bounded.
 
     Raises
     ------
-    InputError
-        For two rigid bodies, or angles out of range.
+    InputError : For two rigid bodies, or angles out of range.
     """
     bonded = corner(upper, lower, None, angles)
     return float("inf") if bonded.oscillation else abs(bonded.ratio)
@@ -136,16 +132,23 @@ def _zeros(determinant: Callable[[complex], complex]) -> np.ndarray:
 
     low, high = INTERVAL
     points = low + (high - low) * (1 + chebyshev.chebpts1(DEGREE + 1)) / 2
-    fit = chebyshev.Chebyshev.fit(points, [reduced(x).real for x in points], DEGREE, domain=INTERVAL)
+    fit = chebyshev.Chebyshev.fit(
+        points, [reduced(x).real for x in points], DEGREE, domain=INTERVAL
+    )
     roots = np.asarray(fit.roots(), dtype=complex).tolist()
     guesses = [z for z in roots if 0 < z.real < WEAKEST and abs(z.imag) < 0.5]
-    newton = np.array([2 * step * reduced(z) / (reduced(z + step) - reduced(z - step)) for z in guesses])
+    newton = np.array(
+        [2 * step * reduced(z) / (reduced(z + step) - reduced(z - step)) for z in guesses]
+    )
     close = np.abs(newton) < 1e-4  # the others are rounding noise of the fit
     return (np.array(guesses) - newton)[close]
 
 
 def _conditions(
-    exponent: complex, bodies: tuple[Material | None, Material | None], mu: float | None, angles: tuple[float, float]
+    exponent: complex,
+    bodies: tuple[Material | None, Material | None],
+    mu: float | None,
+    angles: tuple[float, float],
 ) -> np.ndarray:
     """Square matrix of the conditions, unknowns A, B, C, D of each elastic wedge."""
     stiffest = max(m.E / (1 + m.nu) for m in bodies if m is not None)
@@ -154,9 +157,14 @@ def _conditions(
         if body is not None:
             free.append(_tractions(exponent, end))
             tractions.append(_tractions(exponent, 0.0))
-            displacements.append(_displacements(exponent, 0.0, body) * stiffest * (1 + body.nu) / body.E)
+            displacements.append(
+                _displacements(exponent, 0.0, body) * stiffest * (1 + body.nu) / body.E
+            )
     n = len(free)
-    rows = [np.hstack([part if j == i else np.zeros((2, 4)) for j in range(n)]) for i, part in enumerate(free)]
+    rows = [
+        np.hstack([part if j == i else np.zeros((2, 4)) for j in range(n)])
+        for i, part in enumerate(free)
+    ]
     jump = np.hstack([displacements[0], -displacements[1]] if n == 2 else displacements)
     if n == 2:
         rows.append(np.hstack([tractions[0], -tractions[1]]))
@@ -178,4 +186,6 @@ def _displacements(exponent: complex, t: float, body: Material) -> np.ndarray:
     m, k, kappa = exponent + 1, exponent - 1, 3 - 4 * body.nu
     cm, sm, ck, sk = np.cos(m * t), np.sin(m * t), np.cos(k * t), np.sin(k * t)
     low, high = kappa - exponent, kappa + exponent
-    return np.array([[-m * cm, -m * sm, low * ck, low * sk], [m * sm, -m * cm, high * sk, -high * ck]])
+    return np.array(
+        [[-m * cm, -m * sm, low * ck, low * sk], [m * sm, -m * cm, high * sk, -high * ck]]
+    )

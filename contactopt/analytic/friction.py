@@ -1,4 +1,6 @@
-"""Coulomb friction under growing normal load between dissimilar materials: rigid flat punches and Hertz's geometry."""
+"""Coulomb friction under growing normal load between dissimilar materials: rigid flat punches and
+Hertz's geometry.
+"""
 
 from __future__ import annotations
 
@@ -20,67 +22,63 @@ from contactopt.analytic.spence import UnitPunch, unit_punch
 from contactopt.checks import check_number, check_positive
 
 
-def flat_punch_line_friction(force_per_length: float, half_width: float, mu: float, beta: float) -> Reference:
+def flat_punch_line_friction(
+    force_per_length: float, half_width: float, mu: float, beta: float
+) -> Reference:
     """A rigid flat punch pressed on a half-plane with Coulomb friction, from zero load.
 
-    The fully coupled equations and their sources stand in contactopt.analytic.spence. The stick ratio c / a is right
-    to 1e-6, and the tractions to 1e-5 of themselves. At the edges they grow like (a - |x|)^(atan(mu |beta|) / pi -
-    1/2).
+    The fully coupled equations and their sources stand in contactopt.analytic.spence. The stick
+    ratio c / a is right to 1e-6, and the tractions to 1e-5 of themselves. At the edges they grow
+    like (a - |x|)^(atan(mu |beta|) / pi - 1/2).
 
     Parameters
     ----------
-    force_per_length
-        Normal force per length of the contact, positive in compression [force / length].
-    half_width
-        Half-width a of the punch [length].
-    mu
-        Friction coefficient, at least 0 [-].
-    beta
-        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+    force_per_length : Normal force per length of the contact, positive in compression [force /
+        length].
+    half_width : Half-width a of the punch [length].
+    mu : Friction coefficient, at least 0 [-].
+    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
+        a rigid punch.
 
     Returns
     -------
-    Reference
-        Pressure and shear traction, half-width of contact and stick.
+    Pressure and shear traction, half-width of contact and stick.
 
     Raises
     ------
-    InputError
-        If an argument is out of range.
+    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(flat_punch_line(force_per_length, half_width), mu)
     check_positive(force_per_length=force_per_length, half_width=half_width)
-    return _flat_punch(unit_punch(mu, abs(beta), False), force_per_length, half_width, 1, beta, None)
+    return _flat_punch(
+        unit_punch(mu, abs(beta), False), force_per_length, half_width, 1, beta, None
+    )
 
 
-def flat_punch_axisymmetric_friction(force: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
+def flat_punch_axisymmetric_friction(
+    force: float, radius: float, modulus: float, mu: float, beta: float
+) -> Reference:
     """A rigid circular flat punch pressed on a half-space with Coulomb friction, from zero load.
 
     The accuracy is that of flat_punch_line_friction().
 
     Parameters
     ----------
-    force
-        Normal force, positive in compression [force].
-    radius
-        Radius a of the punch [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
-    mu
-        Friction coefficient, at least 0 [-].
-    beta
-        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+    force : Normal force, positive in compression [force].
+    radius : Radius a of the punch [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
+    mu : Friction coefficient, at least 0 [-].
+    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
+        a rigid punch.
 
     Returns
     -------
-    Reference
-        Pressure and shear traction, half-width of contact and stick, and approach.
+    Pressure and shear traction, half-width of contact and stick, and approach.
 
     Raises
     ------
-    InputError
-        If an argument is out of range.
+    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(flat_punch_axisymmetric(force, radius, modulus), mu)
@@ -89,76 +87,75 @@ def flat_punch_axisymmetric_friction(force: float, radius: float, modulus: float
     return _flat_punch(punch, force, radius, 2, beta, punch.approach * force / (radius * modulus))
 
 
-def hertz_line_friction(force_per_length: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
-    """A cylinder on a half-plane of another material with Coulomb friction, under a load that never fell.
+def hertz_line_friction(
+    force_per_length: float, radius: float, modulus: float, mu: float, beta: float
+) -> Reference:
+    """A cylinder on a half-plane of another material with Coulomb friction, under a load that never
+    fell.
 
-    While the load grows by dP the contact is that of a rigid flat punch of its present half-width a. The tractions
-    are therefore an integral over those of growing punches, with their ratio c / a, and a follows from the slope -x /
-    R of the surface. This holds for a much smaller than R. Source: Spence (1975), J. Elasticity 5, 297-319.
+    While the load grows by dP the contact is that of a rigid flat punch of its present half-width
+    a. The tractions are therefore an integral over those of growing punches, with their ratio c /
+    a, and a follows from the slope -x / R of the surface. This holds for a much smaller than R.
+    Source: Spence (1975), J. Elasticity 5, 297-319.
 
     Parameters
     ----------
-    force_per_length
-        Normal force per length of the contact, positive in compression [force / length].
-    radius
-        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
-    mu
-        Friction coefficient, at least 0 [-].
-    beta
-        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+    force_per_length : Normal force per length of the contact, positive in compression [force /
+        length].
+    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
+        [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
+    mu : Friction coefficient, at least 0 [-].
+    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
+        a rigid punch.
 
     Returns
     -------
-    Reference
-        Pressure and shear traction, half-width of contact and stick.
+    Pressure and shear traction, half-width of contact and stick.
 
     Raises
     ------
-    InputError
-        If an argument is out of range.
+    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(hertz_line(force_per_length, radius, modulus), mu)
     check_positive(force_per_length=force_per_length, radius=radius, modulus=modulus)
     punch = unit_punch(mu, abs(beta), False)
     v, weights = punch.panels.v, punch.panels.weights
-    # slope of the gap x/R = 2 kappa x J / E* for P = kappa a^2 / 2 with J = int_1^inf H p(t) / t^2 dt of the unit punch
+    # slope of the gap x/R = 2 kappa x J / E* for P = kappa a^2 / 2 with J = int_1^inf H p(t) / t^2
+    # dt of the unit punch
     slope = 2 / np.pi * weights @ (punch.p * _log_cosh(v) * np.cosh(v) / np.sinh(v) ** 2)
     a = float(np.sqrt(4 * force_per_length * radius * slope / modulus))
     return _round(punch, 2 * force_per_length / a, a, beta, None)
 
 
-def hertz_point_friction(force: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
-    """A sphere on a half-space of another material with Coulomb friction, under a load that never fell.
+def hertz_point_friction(
+    force: float, radius: float, modulus: float, mu: float, beta: float
+) -> Reference:
+    """A sphere on a half-space of another material with Coulomb friction, under a load that never
+    fell.
 
-    As in hertz_line_friction(), the tractions are an integral over those of growing flat punches, where dP / da is
-    proportional to a^2. The contact radius and the approach follow from the depth of the surface, approach - r^2 / (2
-    R).
+    As in hertz_line_friction(), the tractions are an integral over those of growing flat punches,
+    where dP / da is proportional to a^2. The contact radius and the approach follow from the depth
+    of the surface, approach - r^2 / (2 R).
 
     Parameters
     ----------
-    force
-        Normal force, positive in compression [force].
-    radius
-        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
-    mu
-        Friction coefficient, at least 0 [-].
-    beta
-        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+    force : Normal force, positive in compression [force].
+    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
+        [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
+    mu : Friction coefficient, at least 0 [-].
+    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
+        a rigid punch.
 
     Returns
     -------
-    Reference
-        Pressure and shear traction, half-width of contact and stick, and approach.
+    Pressure and shear traction, half-width of contact and stick, and approach.
 
     Raises
     ------
-    InputError
-        If an argument is out of range.
+    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(hertz_point(force, radius, modulus), mu)
@@ -166,9 +163,16 @@ def hertz_point_friction(force: float, radius: float, modulus: float, mu: float,
     punch = unit_punch(mu, abs(beta), True)
     v, weights = punch.panels.v, punch.panels.weights
     s = np.tanh(v)
-    # displacement outside a unit punch, beta H Q, over that below it, integrated with t^-3 from 1 to infinity
+    # displacement outside a unit punch, beta H Q, over that below it, integrated with t^-3 from 1
+    # to infinity
     moment = (2 * _log_cosh(v) - s**2) / (2 * s**3) / np.cosh(v) ** 2
-    outside = 4 * abs(beta) / (np.pi * punch.approach) * weights @ ((punch.panels.abel(ODD) @ punch.q) * moment)
+    outside = (
+        4
+        * abs(beta)
+        / (np.pi * punch.approach)
+        * weights
+        @ ((punch.panels.abel(ODD) @ punch.q) * moment)
+    )
     curvature = 1 - 2 * outside
     a = float((1.5 * punch.approach * force * radius * curvature / modulus) ** (1 / 3))
     return _round(punch, 3 * force / a**2, a, beta, a**2 / (radius * curvature))
@@ -181,7 +185,9 @@ def _slips(mu: float, beta: float) -> bool:
 
 
 def _without_slip(frictionless: Reference, mu: float) -> Reference:
-    """The same pressure, no shear traction: mu = 0, or sticking because the surfaces move alike (beta = 0)."""
+    """The same pressure, no shear traction: mu = 0, or sticking because the surfaces move alike
+    (beta = 0).
+    """
     return replace(
         frictionless,
         shear=lambda x: 0 * frictionless.pressure(x),
@@ -189,7 +195,9 @@ def _without_slip(frictionless: Reference, mu: float) -> Reference:
     )
 
 
-def _flat_punch(punch: UnitPunch, force: float, a: float, power: int, beta: float, approach: float | None) -> Reference:
+def _flat_punch(
+    punch: UnitPunch, force: float, a: float, power: int, beta: float, approach: float | None
+) -> Reference:
     sign = np.sign(beta)
     return Reference(
         "rigid punch, Coulomb friction",
@@ -201,12 +209,15 @@ def _flat_punch(punch: UnitPunch, force: float, a: float, power: int, beta: floa
     )
 
 
-def _round(punch: UnitPunch, size: float, a: float, beta: float, approach: float | None) -> Reference:
+def _round(
+    punch: UnitPunch, size: float, a: float, beta: float, approach: float | None
+) -> Reference:
     def grown(part: Callable[[np.ndarray, np.ndarray], np.ndarray], odd: bool) -> Field:
         def field(x: np.ndarray) -> np.ndarray:
             x = np.asarray(x, dtype=float)
             s = np.minimum(np.abs(x) / a, 1 - 1e-15)
-            value = size * np.maximum(part(s, np.log1p(2 * s / (1 - s)) / 2), 0.0)  # -1e-9 at the very edge
+            # -1e-9 at the very edge
+            value = size * np.maximum(part(s, np.log1p(2 * s / (1 - s)) / 2), 0.0)
             return np.where(np.abs(x) < a, np.sign(beta * x) * value if odd else value, 0.0)
 
         return field

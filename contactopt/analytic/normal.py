@@ -11,28 +11,25 @@ from contactopt.checks import check_positive
 def hertz_point(force: float, radius: float, modulus: float) -> Reference:
     """A sphere pressed on a half-space (Hertz).
 
-    The contact radius has a^3 = 3 P R / (4 E*). The pressure is p0 sqrt(1 - r^2 / a^2) with p0 = 3 P / (2 pi a^2),
-    and the approach of distant points is a^2 / R. This holds for a much smaller than R, without friction or between
-    similar materials (beta = 0). Source: Johnson (1985), Contact Mechanics, section 4.2(a).
+    The contact radius has a^3 = 3 P R / (4 E*). The pressure is p0 sqrt(1 - r^2 / a^2) with p0 = 3
+    P / (2 pi a^2), and the approach of distant points is a^2 / R. This holds for a much smaller
+    than R, without friction or between similar materials (beta = 0). Source: Johnson (1985),
+    Contact Mechanics, section 4.2(a).
 
     Parameters
     ----------
-    force
-        Normal force, positive in compression [force].
-    radius
-        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
+    force : Normal force, positive in compression [force].
+    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
+        [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
 
     Returns
     -------
-    Reference
-        Pressure over the radius, contact radius, peak and approach.
+    Pressure over the radius, contact radius, peak and approach.
 
     Raises
     ------
-    InputError
-        If an argument is not positive or not finite.
+    InputError : If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     a = (3 * force * radius / (4 * modulus)) ** (1 / 3)
@@ -43,28 +40,25 @@ def hertz_point(force: float, radius: float, modulus: float) -> Reference:
 def hertz_line(force_per_length: float, radius: float, modulus: float) -> Reference:
     """A cylinder pressed on a half-plane (Hertz).
 
-    The contact half-width has a^2 = 4 P R / (pi E*). The pressure is p0 sqrt(1 - x^2 / a^2) with p0 = 2 P / (pi a).
-    There is no approach, which depends on the size of the bodies. The solution is valid where that of hertz_point()
-    is. Source: Johnson (1985), Contact Mechanics, section 4.2(c).
+    The contact half-width has a^2 = 4 P R / (pi E*). The pressure is p0 sqrt(1 - x^2 / a^2) with p0
+    = 2 P / (pi a). There is no approach, which depends on the size of the bodies. The solution is
+    valid where that of hertz_point() is. Source: Johnson (1985), Contact Mechanics, section 4.2(c).
 
     Parameters
     ----------
-    force_per_length
-        Normal force per length of the contact, positive in compression [force / length].
-    radius
-        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
+    force_per_length : Normal force per length of the contact, positive in compression [force /
+        length].
+    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
+        [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
 
     Returns
     -------
-    Reference
-        Pressure over the place, half-width and peak.
+    Pressure over the place, half-width and peak.
 
     Raises
     ------
-    InputError
-        If an argument is not positive or not finite.
+    InputError : If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, radius=radius, modulus=modulus)
     a = float(np.sqrt(4 * force_per_length * radius / (np.pi * modulus)))
@@ -79,20 +73,17 @@ def flat_punch_line(force_per_length: float, half_width: float) -> Reference:
 
     Parameters
     ----------
-    force_per_length
-        Normal force per length of the contact, positive in compression [force / length].
-    half_width
-        Half-width a of the punch [length].
+    force_per_length : Normal force per length of the contact, positive in compression [force /
+        length].
+    half_width : Half-width a of the punch [length].
 
     Returns
     -------
-    Reference
-        Pressure over the place, and the half-width.
+    Pressure over the place, and the half-width.
 
     Raises
     ------
-    InputError
-        If an argument is not positive or not finite.
+    InputError : If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, half_width=half_width)
     pressure = under_punch(lambda u: force_per_length / np.pi + 0 * u, half_width, 1)
@@ -100,59 +91,56 @@ def flat_punch_line(force_per_length: float, half_width: float) -> Reference:
 
 
 def flat_punch_axisymmetric(force: float, radius: float, modulus: float) -> Reference:
-    """A rigid circular flat punch on a half-space without friction:  p = P / (2 pi a sqrt(a^2 - r^2)).
+    """A rigid circular flat punch on a half-space without friction:  p = P / (2 pi a sqrt(a^2 -
+    r^2)).
 
     The approach is P / (2 a E*). Source: Johnson (1985), Contact Mechanics, section 3.4.
 
     Parameters
     ----------
-    force
-        Normal force, positive in compression [force].
-    radius
-        Radius a of the punch [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
+    force : Normal force, positive in compression [force].
+    radius : Radius a of the punch [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
 
     Returns
     -------
-    Reference
-        Pressure over the radius, contact radius and approach.
+    Pressure over the radius, contact radius and approach.
 
     Raises
     ------
-    InputError
-        If an argument is not positive or not finite.
+    InputError : If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     pressure = under_punch(lambda u: force / (2 * np.pi) + 0 * u, radius, 2)
-    return Reference("rigid punch, frictionless", pressure, radius, approach=force / (2 * radius * modulus))
+    return Reference(
+        "rigid punch, frictionless", pressure, radius, approach=force / (2 * radius * modulus)
+    )
 
 
 def flat_punch_line_bonded(force_per_length: float, half_width: float, beta: float) -> Reference:
-    """A rigid flat punch bonded to a half-plane:  p + i q = P / (pi sqrt((1 - beta^2) (a^2 - x^2))) e^(2 i eta u).
+    """A rigid flat punch bonded to a half-plane:  p + i q = P / (pi sqrt((1 - beta^2) (a^2 - x^2)))
+    e^(2 i eta u).
 
-    Here u = artanh(x / a) and eta = artanh(beta) / pi; on a half-plane of Poisson's ratio nu, eta = ln(3 - 4 nu) / (2
-    pi). The solution is exact for the linear problem. Its tractions change sign without end within about 2 a e^(-pi /
-    (2 eta)) of the edges. Source: Johnson (1985), Contact Mechanics, section 2.8(b).
+    Here u = artanh(x / a) and eta = artanh(beta) / pi; on a half-plane of Poisson's ratio nu, eta =
+    ln(3 - 4 nu) / (2 pi). The solution is exact for the linear problem. Its tractions change sign
+    without end within about 2 a e^(-pi / (2 eta)) of the edges. Source: Johnson (1985), Contact
+    Mechanics, section 2.8(b).
 
     Parameters
     ----------
-    force_per_length
-        Normal force per length of the contact, positive in compression [force / length].
-    half_width
-        Half-width a of the punch [length].
-    beta
-        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+    force_per_length : Normal force per length of the contact, positive in compression [force /
+        length].
+    half_width : Half-width a of the punch [length].
+    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
+        a rigid punch.
 
     Returns
     -------
-    Reference
-        Pressure and shear traction over the place, and the half-width.
+    Pressure and shear traction over the place, and the half-width.
 
     Raises
     ------
-    InputError
-        If an argument is not positive or not finite.
+    InputError : If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, half_width=half_width)
     check_beta(beta)
@@ -166,35 +154,35 @@ def flat_punch_line_bonded(force_per_length: float, half_width: float, beta: flo
     )
 
 
-def flat_punch_axisymmetric_bonded(force: float, radius: float, modulus: float, beta: float) -> Reference:
-    """A rigid circular flat punch bonded to a half-space:  approach (P / (2 a E*)) beta / artanh(beta).
+def flat_punch_axisymmetric_bonded(
+    force: float, radius: float, modulus: float, beta: float
+) -> Reference:
+    """A rigid circular flat punch bonded to a half-space:  approach (P / (2 a E*)) beta /
+    artanh(beta).
 
-    The Abel transforms of the tractions are P(t) = int_t^a r p / sqrt(r^2 - t^2) dr and Q(t) = t int_t^a q / sqrt(r^2
-    - t^2) dr. They are P + i Q = D cosh(pi eta) e^(2 i eta u) with u = artanh(t / a), D = E* approach / 2 and eta =
-    artanh(beta) / pi. The stiffness over that without friction is (1 - nu) ln(3 - 4 nu) / (1 - 2 nu). At the edges
-    the tractions behave as in flat_punch_line_bonded(). Sources: Mossakovskii (1954), PMM 18, 187-196; Spence (1968),
-    Proc. R. Soc. A 305, 55-80.
+    The Abel transforms of the tractions are P(t) = int_t^a r p / sqrt(r^2 - t^2) dr and Q(t) = t
+    int_t^a q / sqrt(r^2
+    - t^2) dr. They are P + i Q = D cosh(pi eta) e^(2 i eta u) with u = artanh(t / a), D = E*
+      approach / 2 and eta =
+    artanh(beta) / pi. The stiffness over that without friction is (1 - nu) ln(3 - 4 nu) / (1 - 2
+    nu). At the edges the tractions behave as in flat_punch_line_bonded(). Sources: Mossakovskii
+    (1954), PMM 18, 187-196; Spence (1968), Proc. R. Soc. A 305, 55-80.
 
     Parameters
     ----------
-    force
-        Normal force, positive in compression [force].
-    radius
-        Radius a of the punch [length].
-    modulus
-        Contact modulus E* as in contact_modulus() [stress].
-    beta
-        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+    force : Normal force, positive in compression [force].
+    radius : Radius a of the punch [length].
+    modulus : Contact modulus E* as in contact_modulus() [stress].
+    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
+        a rigid punch.
 
     Returns
     -------
-    Reference
-        Pressure and shear traction over the radius, contact radius and approach.
+    Pressure and shear traction over the radius, contact radius and approach.
 
     Raises
     ------
-    InputError
-        If an argument is not positive or not finite.
+    InputError : If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     check_beta(beta)
@@ -212,38 +200,38 @@ def flat_punch_axisymmetric_bonded(force: float, radius: float, modulus: float, 
 
 
 def under_punch(value: Field, a: float, power: int, odd: bool = False) -> Field:
-    """Make a traction under a punch from its bounded factor: value(u) / (a^(power - 1) sqrt(a^2 - x^2)), u = artanh(|x|
+    """Make a traction under a punch from its bounded factor: value(u) / (a^(power - 1) sqrt(a^2 -
+    x^2)), u = artanh(|x|
     / a).
 
     Parameters
     ----------
-    value
-        A function of u (n,) that gives the bounded factor (n,).
-    a
-        Half-width of the punch [length].
-    power
-        The power of 1 / length that the traction has: 1 for a line, 2 for a disc.
-    odd
-        Whether the traction is odd in x. Then it is multiplied by the sign of x.
+    value : A function of u (n,) that gives the bounded factor (n,).
+    a : Half-width of the punch [length].
+    power : The power of 1 / length that the traction has: 1 for a line, 2 for a disc.
+    odd : Whether the traction is odd in x. Then it is multiplied by the sign of x.
 
     Returns
     -------
-    callable
-        The traction (n,) as a function of places x (n,) [length]; it is nan where |x| >= a.
+    The traction (n,) as a function of places x (n,) [length]; it is nan where |x| >= a.
     """
 
     def field(x: np.ndarray) -> np.ndarray:
         x = np.asarray(x, dtype=float)
         inside = np.abs(x) < a
         s = np.where(inside, np.abs(x), 0.0)
-        size = value(np.log1p(2 * s / (a - s)) / 2) / (a ** (power - 1) * np.sqrt((a - s) * (a + s)))
+        size = value(np.log1p(2 * s / (a - s)) / 2) / (
+            a ** (power - 1) * np.sqrt((a - s) * (a + s))
+        )
         return np.where(inside, size * np.sign(x) if odd else size, np.nan)
 
     return field
 
 
-# The inverse Abel transform of cos(2 eta v) over a line that oscillates without end: the part that the kernel has at
-# infinity, cosh(u), is integrated in the mean (Abel's sum), what remains decays. With sinh^2 v = sinh^2 u + w^2 and
+# The inverse Abel transform of cos(2 eta v) over a line that oscillates without end: the part that
+# the kernel has at
+# infinity, cosh(u), is integrated in the mean (Abel's sum), what remains decays. With sinh^2 v =
+# sinh^2 u + w^2 and
 # w = y cosh u the rest is analytic in y up to i.
 def _bonded_pressure(u: np.ndarray, eta: float) -> np.ndarray:
     """p sqrt(a^2 - r^2) over that of the frictionless punch and D cosh(pi eta) [-]."""
@@ -253,7 +241,9 @@ def _bonded_pressure(u: np.ndarray, eta: float) -> np.ndarray:
 
 def _bonded_shear(u: np.ndarray, eta: float) -> np.ndarray:
     def slope(v: np.ndarray) -> np.ndarray:  # of sin(2 eta v) / tanh(v)
-        return (2 * eta * np.cos(2 * eta * v) / np.tanh(v) - np.sin(2 * eta * v) / np.sinh(v) ** 2) / np.sinh(v)
+        return (
+            2 * eta * np.cos(2 * eta * v) / np.tanh(v) - np.sin(2 * eta * v) / np.sinh(v) ** 2
+        ) / np.sinh(v)
 
     return np.sin(2 * eta * u) - np.tanh(u) * _decaying_part(u, slope)
 
@@ -264,4 +254,6 @@ def _decaying_part(u: np.ndarray, value: Field) -> np.ndarray:
     y, dy = (1 + nodes) / (1 - nodes), 2 * weights / (1 - nodes) ** 2
     cosh = np.cosh(u)[..., None]
     v = np.arcsinh(np.hypot(np.sinh(u)[..., None], y * cosh))
-    return np.asarray(np.sum(dy * value(v) * cosh**3 / (np.cosh(v) * (np.cosh(v) + y * cosh)), axis=-1))
+    return np.asarray(
+        np.sum(dy * value(v) * cosh**3 / (np.cosh(v) * (np.cosh(v) + y * cosh)), axis=-1)
+    )

@@ -1,9 +1,10 @@
 """Integral equations on the contact |x| < a, mapped to the whole line by x = a tanh(v).
 
-In v the edges lie at infinity and Cauchy's kernel depends on a difference alone: dx / (t - x) becomes
-cosh(u) dv / (cosh(v) sinh(u - v)), so that stick and slip zones of every size are resolved alike. Functions are even
-or odd: the unknowns are values at nodes v > 0. Between them stand polynomials, on panels that shrink towards the stick
-limit v = b where the tractions are not smooth; singular integrals of the polynomials are exact.
+In v the edges lie at infinity and Cauchy's kernel depends on a difference alone: dx / (t - x)
+becomes cosh(u) dv / (cosh(v) sinh(u - v)), so that stick and slip zones of every size are resolved
+alike. Functions are even or odd: the unknowns are values at nodes v > 0. Between them stand
+polynomials, on panels that shrink towards the stick limit v = b where the tractions are not smooth;
+singular integrals of the polynomials are exact.
 """
 
 from __future__ import annotations
@@ -21,15 +22,18 @@ SMALLEST = 1e-5  # panel, relative to min(b, 1)
 LARGEST_PANEL = 1.5  # panel; the kernels have poles at a distance of pi from the real line
 TAIL = 16.0  # the grid ends at b + TAIL: with what lies beyond, e^-TAIL is lost
 NEAR = 2.0  # half-lengths from a panel's centre up to which a singular kernel needs the exact rule
-AWAY = 1.2  # half-lengths from which a rule of 40 nodes is exact, while the recurrence for Q_m loses digits
+# half-lengths from which a rule of 40 nodes is exact, while the recurrence for Q_m loses digits
+AWAY = 1.2
 
 NODES, WEIGHTS = legendre.leggauss(ORDER)
-TRANSFORM = (legendre.legvander(NODES, ORDER - 1) * WEIGHTS[:, None] * (np.arange(ORDER) + 0.5)).T  # values -> P_m
+# values -> P_m
+TRANSFORM = (legendre.legvander(NODES, ORDER - 1) * WEIGHTS[:, None] * (np.arange(ORDER) + 0.5)).T
 LEFT = ORDER // 2  # nodes of the central panel at v < 0
 
 
 def _panel_edges(b: float) -> np.ndarray:
-    """Right ends of the panels, less b: equal panels from the centre, refined on both sides of b, ended at TAIL.
+    """Right ends of the panels, less b: equal panels from the centre, refined on both sides of b,
+    ended at TAIL.
 
     The first panel is central: it reaches as far to the left of v = 0 as to its right.
     """
@@ -48,7 +52,9 @@ def _panel_edges(b: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """The grid for a stick limit b. Matrices take values (N,) of an even or odd function at the nodes to such values.
+    """The grid for a stick limit b.
+
+    Matrices take values (N,) of an even or odd function at the nodes to such values.
 
     Positions are kept as distances from b, exact where the panels are smallest.
     """
@@ -86,11 +92,17 @@ class Panels:
     def stick(self) -> np.ndarray:
         return self.columns[LEFT:] < 0
 
-    def evaluate(self, values: np.ndarray, v: np.ndarray, parity: int, mean: float = 0.0) -> np.ndarray:
-        """The function with these values at the nodes, at v >= 0; even or odd about a mean; constant past the grid."""
+    def evaluate(
+        self, values: np.ndarray, v: np.ndarray, parity: int, mean: float = 0.0
+    ) -> np.ndarray:
+        """The function with these values at the nodes, at v >= 0; even or odd about a mean;
+        constant past the grid.
+        """
         y = np.minimum(np.atleast_1d(v) - self.b, self.edges[-1])
         panel = np.searchsorted(self.edges[:-1], y, side="left")
-        full = np.concatenate([mean + parity * (values[LEFT - 1 :: -1] - mean), values]).reshape(-1, ORDER)
+        full = np.concatenate([mean + parity * (values[LEFT - 1 :: -1] - mean), values]).reshape(
+            -1, ORDER
+        )
         basis = legendre.legvander((y - self.centre[panel]) / self.half[panel], ORDER - 1)
         return np.asarray(np.sum(basis * (full @ TRANSFORM.T)[panel], axis=-1).reshape(np.shape(v)))
 
@@ -115,9 +127,12 @@ class Panels:
         return matrix
 
     def _inside(self, parity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Integrals from each panel's left end to its nodes; in the central panel from 0 to nodes and end."""
+        """Integrals from each panel's left end to its nodes; in the central panel from 0 to nodes
+        and end.
+        """
         from_zero, from_left = (
-            legendre.legval(np.append(NODES, 1.0), legendre.legint(np.eye(ORDER), lbnd=low)).T @ TRANSFORM
+            legendre.legval(np.append(NODES, 1.0), legendre.legint(np.eye(ORDER), lbnd=low)).T
+            @ TRANSFORM
             for low in (0.0, -1.0)
         )
         central = self.half[0] * _fold(from_zero, parity)
@@ -127,15 +142,23 @@ class Panels:
         return matrix, central[LEFT:-1], central[-1]
 
     def log_tanh(self, parity: int) -> np.ndarray:
-        """(1/pi) int f(v) ln |tanh((u - v) / 2)| dv over the line: the primitive of the kernel 1 / (pi sinh)."""
+        """(1/pi) int f(v) ln |tanh((u - v) / 2)| dv over the line: the primitive of the kernel 1 /
+        (pi sinh).
+        """
         u, v, same = self.v[:, None], self.v, np.eye(len(self.v), dtype=bool)
-        direct, mirror = np.abs(np.tanh(np.where(same, 1.0, self._distance()) / 2)), np.tanh((u + v) / 2)
+        direct, mirror = (
+            np.abs(np.tanh(np.where(same, 1.0, self._distance()) / 2)),
+            np.tanh((u + v) / 2),
+        )
         if parity == EVEN:
             kernel = np.log(direct * mirror)
-        else:  # direct / mirror = (sinh u - sinh v) / (sinh u + sinh v), without cancellation where u << v
+        # direct / mirror = (sinh u - sinh v) / (sinh u + sinh v), without cancellation where u << v
+        else:
             ratio = np.sinh(np.minimum(u, v)) / np.sinh(np.maximum(u, v))
             far = ratio < 0.5
-            kernel = np.where(far, -2 * np.arctanh(np.where(far, ratio, 0.0)), np.log(direct / mirror))
+            kernel = np.where(
+                far, -2 * np.arctanh(np.where(far, ratio, 0.0)), np.log(direct / mirror)
+            )
         kernel = np.where(same, -np.log(2) + parity * np.log(mirror), kernel)
         return (kernel * self.weights + _fold(self._correction(log=True), parity)) / np.pi
 
@@ -143,13 +166,19 @@ class Panels:
         """(1/pi) int F(s) / (t - s) ds over |s| < 1, from values of F at s = tanh(v)."""
         u, v, same = self.v[:, None], self.v, np.eye(len(self.v), dtype=bool)
         product = np.where(same, 1.0, np.sinh(self._distance()) * np.sinh(u + v))
-        kernel = np.sinh(2 * u) / product if parity == EVEN else 2 * np.cosh(u) ** 2 * np.tanh(v) / product
+        kernel = (
+            np.sinh(2 * u) / product
+            if parity == EVEN
+            else 2 * np.cosh(u) ** 2 * np.tanh(v) / product
+        )
         kernel = np.where(same, parity / np.sinh(2 * u), kernel)
         correction = self._correction(log=False) * (np.cosh(u) / np.cosh(self.b + self.columns))
         return (kernel * self.weights + _fold(correction, parity)) / np.pi
 
     def abel(self, parity: int) -> np.ndarray:
-        """With p(x) = f(v) cosh(v): int_t^1 r p / sqrt(r^2 - t^2) dr (f even) or t int_t^1 p / sqrt(r^2 - t^2) dr."""
+        """With p(x) = f(v) cosh(v): int_t^1 r p / sqrt(r^2 - t^2) dr (f even) or t int_t^1 p /
+        sqrt(r^2 - t^2) dr.
+        """
         u, v, y = self.v[:, None], self.b + self.columns, self.columns[LEFT:]
         local, panel = self._local(), np.arange(len(self.half))
         own = (np.arange(len(y)) + LEFT)[:, None] // ORDER
@@ -160,18 +189,29 @@ class Panels:
         full = np.where(beyond, shape * (self.half[:, None] * WEIGHTS).ravel() / root, 0.0)
 
         i, k = np.nonzero(near & (panel >= own))
-        t, low, high = self.v[i], np.maximum(self.centre[k] - self.half[k] - y[i], 0.0), self.edges[k] - y[i]
+        t, low, high = (
+            self.v[i],
+            np.maximum(self.centre[k] - self.half[k] - y[i], 0.0),
+            self.edges[k] - y[i],
+        )
         first, last = (np.sqrt(np.sinh(d) * np.sinh(2 * t + d))[:, None] for d in (low, high))
         nodes, weights = legendre.leggauss(ORDER + 4)
-        w = (first + last) / 2 + (last - first) / 2 * nodes  # w^2 = sinh^2 v - sinh^2 u takes the root away
+        # w^2 = sinh^2 v - sinh^2 u takes the root away
+        w = (first + last) / 2 + (last - first) / 2 * nodes
         v = np.arcsinh(np.hypot(np.sinh(t)[:, None], w))
         distance = np.arcsinh(w**2 / np.sinh(v + t[:, None]))
         weights = (last - first) / 2 * weights / np.cosh(v)
         weights = (
-            np.cosh(t)[:, None] * weights / np.cosh(v) if parity == EVEN else np.sinh(t)[:, None] * weights / np.sinh(v)
+            np.cosh(t)[:, None] * weights / np.cosh(v)
+            if parity == EVEN
+            else np.sinh(t)[:, None] * weights / np.sinh(v)
         )
-        basis = legendre.legvander((distance + (y[i] - self.centre[k])[:, None]) / self.half[k][:, None], ORDER - 1)
-        full[i[:, None], k[:, None] * ORDER + np.arange(ORDER)] = np.einsum("pg,pgm->pm", weights, basis) @ TRANSFORM
+        basis = legendre.legvander(
+            (distance + (y[i] - self.centre[k])[:, None]) / self.half[k][:, None], ORDER - 1
+        )
+        full[i[:, None], k[:, None] * ORDER + np.arange(ORDER)] = (
+            np.einsum("pg,pgm->pm", weights, basis) @ TRANSFORM
+        )
         return _fold(full, parity)
 
     def _distance(self) -> np.ndarray:
@@ -182,7 +222,9 @@ class Panels:
         return (self.columns[LEFT:, None] - self.centre) / self.half
 
     def _correction(self, log: bool) -> np.ndarray:
-        """Exact less Gauss rule for ln |u - v| or 1 / (u - v) on near panels; the Gauss rule leaves out u = v."""
+        """Exact less Gauss rule for ln |u - v| or 1 / (u - v) on near panels; the Gauss rule leaves
+        out u = v.
+        """
         local = self._local()
         i, k = np.nonzero(np.abs(local) < NEAR)
         moments = (_log_moments if log else _cauchy_moments)(local[i, k]) @ TRANSFORM
@@ -206,12 +248,17 @@ def _fold(full: np.ndarray, parity: int) -> np.ndarray:
 
 
 def _cauchy_moments(x: np.ndarray) -> np.ndarray:
-    """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER); the principal value inside. Source: DLMF 14.12.13."""
+    """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER); the principal value inside.
+
+    Source: DLMF 14.12.13.
+    """
     return np.where(_away(x), _by_quadrature(x, log=False), 2 * _second_kind(x)[:, :ORDER])
 
 
 def _log_moments(x: np.ndarray) -> np.ndarray:
-    """int_-1^1 P_m(t) ln |x - t| dt, (k, ORDER): primitives of the Cauchy moments, (2 m + 1) P_m = (P_m+1 - P_m-1)'."""
+    """int_-1^1 P_m(t) ln |x - t| dt, (k, ORDER): primitives of the Cauchy moments, (2 m + 1) P_m =
+    (P_m+1 - P_m-1)'.
+    """
     second = _second_kind(x)
     higher = 2 * (second[:, 2:] - second[:, : ORDER - 1]) / (2 * np.arange(1, ORDER) + 1)
     zeroth = (x + 1) * np.log(np.abs(x + 1)) - (x - 1) * np.log(np.abs(x - 1)) - 2

@@ -1,4 +1,6 @@
-"""What exact solutions have in common: the record of one, the elastic constants of a pair of bodies."""
+"""What exact solutions have in common: the record of one, the elastic constants of a pair of
+bodies.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,14 @@ Field = Callable[[np.ndarray], np.ndarray]
 class Reference:
     """What a scene is compared with.
 
-    pressure    position from the centre (k,) [length] -> contact pressure (k,) [stress]; nan under a punch's edge and
-                beyond, where it is infinite or there is no contact
+    pressure    position from the centre (k,) [length] -> contact pressure (k,) [stress]; nan under
+                a punch's edge and beyond, where it is infinite or there is no contact
     half_width  of the contact zone [length]
     peak        largest pressure [stress], None where it is infinite
     approach    of the two bodies [length], None where it depends on their size
-    shear       like pressure: traction on the lower body [stress]. Under normal load it points away from the centre
-                (positive at x > 0), under a tangential load in the direction of that load. None: there is none
+    shear       like pressure: traction on the lower body [stress]. Under normal load it points away
+                from the centre (positive at x > 0), under a tangential load in the direction of
+                that load. None: there is none
     stick_half_width  of the zone without slip [length], None: no friction
     shift       of the two bodies along a tangential load [length], None without one
     """
@@ -46,18 +49,15 @@ def contact_modulus(first: Material | None, second: Material | None = None) -> f
 
     Parameters
     ----------
-    first, second
-        Materials of the two bodies; None is a rigid body.
+    first, second : Materials of the two bodies; None is a rigid body.
 
     Returns
     -------
-    float
-        E* [stress].
+    E* [stress].
 
     Raises
     ------
-    InputError
-        If both bodies are rigid.
+    InputError : If both bodies are rigid.
     """
     return 1 / sum((1 - m.nu**2) / m.E for m in _elastic(first, second))
 
@@ -65,23 +65,20 @@ def contact_modulus(first: Material | None, second: Material | None = None) -> f
 def tangential_modulus(first: Material | None, second: Material | None = None) -> float:
     """The tangential modulus Gs with 1 / Gs = (2 - nu1) / G1 + (2 - nu2) / G2.
 
-    A circular contact of radius a without slip has the tangential stiffness 8 a Gs. Source: Johnson (1985), Contact
-    Mechanics, section 7.2.
+    A circular contact of radius a without slip has the tangential stiffness 8 a Gs. Source: Johnson
+    (1985), Contact Mechanics, section 7.2.
 
     Parameters
     ----------
-    first, second
-        Materials of the two bodies; None is a rigid body.
+    first, second : Materials of the two bodies; None is a rigid body.
 
     Returns
     -------
-    float
-        Gs [stress].
+    Gs [stress].
 
     Raises
     ------
-    InputError
-        If both bodies are rigid.
+    InputError : If both bodies are rigid.
     """
     return 1 / sum((2 - m.nu) * 2 * (1 + m.nu) / m.E for m in _elastic(first, second))
 
@@ -89,26 +86,26 @@ def tangential_modulus(first: Material | None, second: Material | None = None) -
 def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, float]:
     """Dundurs' constants of two bodies in plane strain.
 
-    With A = (1 - nu) / G and B = (1 - 2 nu) / (2 G) of the upper body (1) and the lower body (2) they are alpha = (A2
-    - A1) / (A2 + A1) and beta = (B2 - B1) / (A2 + A1). Both are zero for equal materials and positive where the upper
-    body is the stiffer. A rigid upper body has alpha = 1 and beta = (1 - 2 nu) / (2 (1 - nu)). |alpha| <= 1, and
+    With A = (1 - nu) / G and B = (1 - 2 nu) / (2 G) of the upper body (1) and the lower body (2)
+    they are alpha = (A2
+    - A1) / (A2 + A1) and beta = (B2 - B1) / (A2 + A1). Both are zero for equal materials and
+      positive where the upper
+    body is the stiffer. A rigid upper body has alpha = 1 and beta = (1 - 2 nu) / (2 (1 - nu)).
+    |alpha| <= 1, and
     |beta| <= 1/2 for nu >= 0. Source: Dundurs (1969), J. Appl. Mech. 36, 650-652. Johnson (1985), section 5.1, has
     beta with the opposite sign.
 
     Parameters
     ----------
-    upper, lower
-        Materials; None is a rigid body.
+    upper, lower : Materials; None is a rigid body.
 
     Returns
     -------
-    (float, float)
-        alpha and beta [-].
+    (float, float) : alpha and beta [-].
 
     Raises
     ------
-    InputError
-        If both bodies are rigid.
+    InputError : If both bodies are rigid.
     """
     _elastic(upper, lower)
     compliance = [0.0 if m is None else 2 * (1 + m.nu) / m.E for m in (upper, lower)]
@@ -123,17 +120,13 @@ def ellipse(x: np.ndarray, a: float, peak: float) -> np.ndarray:
 
     Parameters
     ----------
-    x
-        (n,) places [length].
-    a
-        The half-width [length].
-    peak
-        The value at x = 0 [stress].
+    x : (n,) places [length].
+    a : The half-width [length].
+    peak : The value at x = 0 [stress].
 
     Returns
     -------
-    ndarray
-        (n,) values [stress].
+    (n,) values [stress].
     """
     return np.asarray(peak * np.sqrt(np.maximum(0.0, 1 - np.square(np.asarray(x) / a))))
 
@@ -143,13 +136,11 @@ def check_beta(beta: float) -> None:
 
     Parameters
     ----------
-    beta
-        The constant [-].
+    beta : The constant [-].
 
     Raises
     ------
-    InputError
-        Unless beta is a finite number between -1 and 1.
+    InputError : Unless beta is a finite number between -1 and 1.
     """
     check_number("Dundurs' constant beta", beta, low=-1.0, high=1.0)
 

@@ -1,15 +1,20 @@
-"""Coulomb friction under monotone normal load, fully coupled: rigid flat punches, and round bodies built from them.
+"""Coulomb friction under monotone normal load, fully coupled: rigid flat punches, and round bodies
+built from them.
 
-Self-similar: one static step from zero is exact (Spence's theorem). On a contact |x| < a, with E*/2 the unit of stress,
-p the pressure, q the shear traction on the lower body away from the centre and Dundurs' beta:
-    normal displacement constant on |x| < a,   no tangential displacement on |x| < c,   q = mu p sign(x) on c < |x| < a.
-Plane strain, H f = (1/pi) int f(s) / (x - s) ds:     H p = beta q on |x| < a,   H q = -beta p on |x| < c.
-Axisymmetric, Abel transforms P = int_t^a r p / sqrt(r^2 - t^2) dr and Q = t int_t^a q / sqrt(r^2 - t^2) dr:
+Self-similar: one static step from zero is exact (Spence's theorem). On a contact |x| < a, with E*/2
+the unit of stress, p the pressure, q the shear traction on the lower body away from the centre and
+Dundurs' beta:
+    normal displacement constant on |x| < a,   no tangential displacement on |x| < c,   q = mu p
+                                               sign(x) on c < |x| < a.
+Plane strain, H f = (1/pi) int f(s) / (x - s) ds:     H p = beta q on |x| < a,   H q = -beta p on
+|x| < c. Axisymmetric, Abel transforms P = int_t^a r p / sqrt(r^2 - t^2) dr and Q = t int_t^a q /
+sqrt(r^2 - t^2) dr:
     P + beta H Q = E* approach / 2 on t < a,   Q - beta H P = 0 on t < c.
-c is where the tractions join without a singularity: with a larger stick zone q would go to +inf there, with a smaller
-one to -inf. Textbook formulas drop beta q (Goodman's approximation); here they give the first guess. Sources: Spence
-(1968), Proc. R. Soc. A 305, 55-80; Spence (1973), An eigenvalue problem for elastic contact with finite friction, Proc.
-Camb. Phil. Soc. 73, 249-268; Spence (1975), J. Elasticity 5, 297-319. Half-space: Johnson (1985), eq (2.25), (3.18).
+c is where the tractions join without a singularity: with a larger stick zone q would go to +inf
+there, with a smaller one to -inf. Textbook formulas drop beta q (Goodman's approximation); here
+they give the first guess. Sources: Spence (1968), Proc. R. Soc. A 305, 55-80; Spence (1973), An
+eigenvalue problem for elastic contact with finite friction, Proc. Camb. Phil. Soc. 73, 249-268;
+Spence (1975), J. Elasticity 5, 297-319. Half-space: Johnson (1985), eq (2.25), (3.18).
 """
 
 from __future__ import annotations
@@ -61,8 +66,14 @@ class UnitPunch:
 
     @cached_property
     def _history(self) -> tuple[np.ndarray, np.ndarray]:
-        """int_v^inf of p / x^2 and q / x^2, dx; in the central panel without their poles. Last entry: from 0."""
-        v, (p0, slope) = self.panels.v, np.array(self.centre)[:, None] * (np.arange(len(self.p)) < LEFT)
+        """int_v^inf of p / x^2 and q / x^2, dx; in the central panel without their poles.
+
+        Last entry: from 0.
+        """
+        v, (p0, slope) = (
+            self.panels.v,
+            np.array(self.centre)[:, None] * (np.arange(len(self.p)) < LEFT),
+        )
         p = (self.p * np.cosh(v) - p0) / np.sinh(v) ** 2
         q = (self.q * np.cosh(v) / np.tanh(v) - slope) / (np.sinh(v) * np.cosh(v))
         return self.panels.remainder(EVEN) @ p, self.panels.remainder(ODD) @ q
@@ -83,27 +94,22 @@ class UnitPunch:
 def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
     """Solve for the stick zone under a rigid flat punch of unit half-width.
 
-    The ratio c/a is within about 1e-7 of the exact one. The tractions are within about 1e-6 away from x = c and the
-    edges.
+    The ratio c/a is within about 1e-7 of the exact one. The tractions are within about 1e-6 away
+    from x = c and the edges.
 
     Parameters
     ----------
-    mu
-        The friction coefficient, greater than 0.
-    beta
-        Dundurs' constant, between 0 and 1.
-    axisymmetric
-        Whether the punch is a disc. Otherwise it is a strip in plane strain.
+    mu : The friction coefficient, greater than 0.
+    beta : Dundurs' constant, between 0 and 1.
+    axisymmetric : Whether the punch is a disc. Otherwise it is a strip in plane strain.
 
     Returns
     -------
-    UnitPunch
-        The stick zone and the tractions.
+    The stick zone and the tractions.
 
     Raises
     ------
-    InputError
-        For values of mu and beta out of range.
+    InputError : For values of mu and beta out of range.
     """
     from scipy.optimize import brentq
 
@@ -115,7 +121,8 @@ def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
         return _excess(solve(float(np.exp(log_b)), mu, beta), mu)
 
     low, high = np.log(SMALLEST_ARTANH), np.log(LARGEST_ARTANH)
-    # The right zone is the smallest whose excess vanishes; under a bonded punch q = mu p at 2 eta v = atan(mu).
+    # The right zone is the smallest whose excess vanishes; under a bonded punch q = mu p at 2 eta v
+    # = atan(mu).
     bonded = np.log(np.arctan(mu) * np.pi / (2 * np.arctanh(beta)))
     start = float(np.clip(min(bonded, _uncoupled(mu, beta, axisymmetric)), low, high))
     step, sign = 0.2, np.sign(excess(start))
@@ -131,28 +138,23 @@ def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
 def stick_ratio(mu: float, beta: float, axisymmetric: bool = False) -> float:
     """Half-width of the stick zone over that of contact, c / a, under growing normal load.
 
-    It is the same for a rigid flat punch and for round bodies with quadratic gaps. It is right to 1e-6; values below
-    1e-9 are returned as zero.
+    It is the same for a rigid flat punch and for round bodies with quadratic gaps. It is right to
+    1e-6; values below 1e-9 are returned as zero.
 
     Parameters
     ----------
-    mu
-        Friction coefficient, at least 0 [-].
-    beta
-        Dundurs' constant, of size below one [-]. Its sign only turns the shear traction. Zero means no slip, c / a =
-        1.
-    axisymmetric
-        Whether the punch is a disc rather than a strip.
+    mu : Friction coefficient, at least 0 [-].
+    beta : Dundurs' constant, of size below one [-]. Its sign only turns the shear traction. Zero
+        means no slip, c / a = 1.
+    axisymmetric : Whether the punch is a disc rather than a strip.
 
     Returns
     -------
-    float
-        c / a [-].
+    c / a [-].
 
     Raises
     ------
-    InputError
-        If an argument is out of range.
+    InputError : If an argument is out of range.
     """
     check_number("the friction coefficient mu", mu, low=0.0, closed=True)
     check_beta(beta)
@@ -193,8 +195,12 @@ def _axisymmetric(b: float, mu: float, beta: float) -> UnitPunch:
     return UnitPunch(panels, p / force, np.concatenate([q, mu * p[slip]]) / force, 2 / force)
 
 
-def _eliminate(pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them would let rounding errors grow."""
+def _eliminate(
+    pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them would let rounding
+    errors grow.
+    """
     columns = np.linalg.solve(pp, np.column_stack([np.ones(len(pp)), pq]))
     matrix, right = qq - qp @ columns[:, 1:], -qp @ columns[:, 0]
     scale = 1 / np.abs(matrix).max(axis=1)
@@ -203,14 +209,18 @@ def _eliminate(pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray) -
 
 
 def _excess(punch: UnitPunch, mu: float) -> float:
-    """q - mu p at the end of the stick zone: zero for the right one, positive where it is too large."""
+    """q - mu p at the end of the stick zone: zero for the right one, positive where it is too
+    large.
+    """
     end = np.count_nonzero(punch.panels.stick)
     panel = slice(end - ORDER, end)
     return float(np.sum(TRANSFORM @ (punch.q[panel] - mu * punch.p[panel])))
 
 
 def _uncoupled(mu: float, beta: float, axisymmetric: bool) -> float:
-    """ln artanh(c/a) without beta q: K'(k)/K(k) = beta/mu in plane strain, b / tanh b = (mu/beta) K'(k) on a circle."""
+    """ln artanh(c/a) without beta q: K'(k)/K(k) = beta/mu in plane strain, b / tanh b = (mu/beta)
+    K'(k) on a circle.
+    """
 
     from scipy.optimize import brentq
     from scipy.special import ellipkm1

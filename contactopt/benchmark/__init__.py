@@ -1,14 +1,17 @@
-"""Benchmarks: an experiment file -> runs in processes of their own -> a table -> figures and reports.
+"""Benchmarks: an experiment file -> runs in processes of their own -> a table -> figures and
+reports.
 
     >>> from contactopt import benchmark
     >>> folder = benchmark.run_campaign("friction.toml", jobs=2)
-    >>> table = benchmark.load(folder)          # pandas.DataFrame, one row per run; columns: benchmark.COLUMNS
+    >>> table = benchmark.load(folder)          # pandas.DataFrame, one row per run; columns:
+                                                benchmark.COLUMNS
 
 An experiment file names problems, methods and settings; lists and ranges are multiplied out:
 
     name = "friction"
     plugins = ["mine.py"]                       # files beside this one
-    settings = ["low", "mid", "high", 1e-7]     # bounds on the certificate: 1e-3, 1e-6, 1e-9; "default": the method's own
+    settings = ["low", "mid", "high", 1e-7]     # bounds on the certificate: 1e-3, 1e-6, 1e-9;
+                                                "default": the method's own
     repeats = 3
     time_limit = 10.0                           # s per run, enforced
     [[problems]]
@@ -27,16 +30,19 @@ A method of your own is a function in `mine.py`; nothing in this package changes
     from contactopt.benchmark import method
 
     @method
-    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start are passed if asked for
+    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start are
+                                                passed if asked for
         r = np.zeros(problem.q.shape)
         ...
         return r                                # or (r, multipliers), or a contactopt.Solution
 
-Instead of a function it may be a dataclass with `iterate`, as in contactopt.methods: it then gets the driver's stopping
-rule and history. `@problem` registers a function that makes an InterfaceProblem in the same way, for `family = NAME`.
-An installed package offers methods as entry points of the group "contactopt.methods". What a method claims is never
-believed: each answer gets the certificate of contactopt.natural_map_residual, in the process of the campaign and from the
-problem that it holds. Plug-ins run in worker processes only, so that none can change how it is judged.
+Instead of a function it may be a dataclass with `iterate`, as in contactopt.methods: it then gets
+the driver's stopping rule and history. `@problem` registers a function that makes an
+InterfaceProblem in the same way, for `family = NAME`. An installed package offers methods as entry
+points of the group "contactopt.methods". What a method claims is never believed: each answer gets
+the certificate of contactopt.natural_map_residual, in the process of the campaign and from the
+problem that it holds. Plug-ins run in worker processes only, so that none can change how it is
+judged.
 """
 
 from importlib import import_module

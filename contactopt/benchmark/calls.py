@@ -1,4 +1,7 @@
-"""One run made: the method called, its answer in one form for all, its time and memory. Runs in a worker process."""
+"""One run made: the method called, its answer in one form for all, its time and memory.
+
+Runs in a worker process.
+"""
 
 from __future__ import annotations
 
@@ -40,28 +43,27 @@ class Outcome:
 
 
 def no_answer(status: str, error: object, measured: dict[str, float] | None = None) -> Answer:
-    """What is said of a run that ended without an answer: a word of the column `status`, and a text or an exception."""
+    """What is said of a run that ended without an answer: a word of the column `status`, and a text
+    or an exception.
+    """
     return Answer(status, one_line(error), measured or {})
 
 
-def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> Answer:
+def measure(
+    task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
+) -> Answer:
     """Run a method on a problem, and measure time and memory.
 
     Parameters
     ----------
-    task
-        The run and its limits.
-    problem
-        The interface problem.
-    start
-        The solution to start from, if there is one.
-    plugins
-        The methods of the user.
+    task : The run and its limits.
+    problem : The interface problem.
+    start : The solution to start from, if there is one.
+    plugins : The methods of the user.
 
     Returns
     -------
-    Answer
-        Its answer, or how it failed.
+    Its answer, or how it failed.
     """
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
@@ -70,11 +72,22 @@ def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugi
     try:
         outcome: Outcome | Exception = call(task, problem, start, plugins)
     except (Exception, SystemExit, KeyboardInterrupt) as error:
-        outcome = error if isinstance(error, Exception) else RuntimeError(f"it raised {type(error).__name__}({error})")
-    measured |= {"call_seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
+        outcome = (
+            error
+            if isinstance(error, Exception)
+            else RuntimeError(f"it raised {type(error).__name__}({error})")
+        )
+    measured |= {
+        "call_seconds": time.perf_counter() - wall,
+        "cpu_seconds": time.process_time() - cpu,
+    }
     measured["peak_mb"] = _peak()
     if not isinstance(outcome, Outcome):
-        kinds = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
+        kinds = {
+            MemoryError: "out_of_memory",
+            InputError: "refused",
+            BackendError: "backend_failed",
+        }
         word = next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error")
         full = isinstance(outcome, OSError) and outcome.errno == errno.ENOMEM
         return no_answer("out_of_memory" if full else word, outcome, measured)
@@ -84,11 +97,18 @@ def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugi
         return no_answer("error", f"its answer has the wrong form: {error}", measured)
 
 
-def _read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]) -> Answer:
+def _read_outcome(
+    outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]
+) -> Answer:
     """The answer in its one form; TypeError or ValueError if it has another."""
-    r, lam = _real(outcome.reactions), None if outcome.multipliers is None else _real(outcome.multipliers)
+    r, lam = (
+        _real(outcome.reactions),
+        None if outcome.multipliers is None else _real(outcome.multipliers),
+    )
     if r.size != problem.q.size:
-        raise ValueError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}")
+        raise ValueError(
+            f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}"
+        )
     if lam is not None and lam.shape != problem.s.shape:
         raise ValueError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}")
     if outcome.status not in STATUSES:
@@ -108,35 +128,52 @@ def _read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[st
 
 
 def _real(values: Any) -> np.ndarray:
-    """The values as an array of floats of its own; TypeError or ValueError if they are not real numbers."""
+    """The values as an array of floats of its own; TypeError or ValueError if they are not real
+    numbers.
+    """
     array = np.asarray(values)
     if np.iscomplexobj(array):
         raise TypeError("complex numbers")
     return np.array(array, dtype=float, order="C", subok=False)
 
 
-def call(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> Outcome:
+def call(
+    task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
+) -> Outcome:
     """Run a method on a problem. Its own errors pass through.
 
     Parameters
     ----------
-    task, problem, start, plugins
-        As for `measure`.
+    task, problem, start, plugins : As for `measure`.
 
     Returns
     -------
-    Outcome
-        The answer of the method, with what it says of itself.
+    The answer of the method, with what it says of itself.
     """
     spec, tol = task.run.method, None if task.run.setting == "default" else task.run.tolerance
     plugin = None if spec.name in METHODS else plugins.find(spec.name)
     if plugin is None or plugin.iterates:
-        method = find_method(spec.name, **spec.settings) if plugin is None else plugin.make(**spec.settings)
+        method = (
+            find_method(spec.name, **spec.settings)
+            if plugin is None
+            else plugin.make(**spec.settings)
+        )
         settings: dict[str, Any] = {} if tol is None else {"tol": tol}
-        settings |= {"max_iterations": task.max_iterations, "time_limit": task.time_limit, "start": start}
+        settings |= {
+            "max_iterations": task.max_iterations,
+            "time_limit": task.time_limit,
+            "start": start,
+        }
         s = solve(problem, method, **settings)
         return Outcome(
-            s.reactions, s.multipliers, s.status.label, s.message, s.method, s.iterations, s.seconds["solve"], s.history
+            s.reactions,
+            s.multipliers,
+            s.status.label,
+            s.message,
+            s.method,
+            s.iterations,
+            s.seconds["solve"],
+            s.history,
         )
     given = {
         "tol": task.run.tolerance,
@@ -158,19 +195,26 @@ def call(task: Task, problem: InterfaceProblem, start: Solution | None, plugins:
     return Outcome(reactions, multipliers, Status.SOLVED.label, label=spec.label)
 
 
-def _thinned(history: tuple[dict[str, float], ...]) -> tuple[list[float], list[float], list[int]] | None:
-    """Residuals, seconds and iterations, at most POINTS of them, the last included; None without a history."""
+def _thinned(
+    history: tuple[dict[str, float], ...],
+) -> tuple[list[float], list[float], list[int]] | None:
+    """Residuals, seconds and iterations, at most POINTS of them, the last included; None without a
+    history.
+    """
     if not len(history):
         return None
     index = np.unique(np.geomspace(1, len(history), POINTS).astype(int)) - 1
     residuals, seconds = (
-        [float(f"{history[i].get(key, np.nan):.3g}") for i in index] for key in ("residual", "seconds")
+        [float(f"{history[i].get(key, np.nan):.3g}") for i in index]
+        for key in ("residual", "seconds")
     )
     return residuals, seconds, [int(i) + 1 for i in index]
 
 
 def _reset_peak() -> float:
-    """Forget the largest resident memory so far; the present one [MB], nan where the system does not tell."""
+    """Forget the largest resident memory so far; the present one [MB], nan where the system does
+    not tell.
+    """
     try:
         with open("/proc/self/clear_refs", "w") as file:
             file.write("5")

@@ -1,4 +1,6 @@
-"""A campaign: the runs of an experiment that are not finished yet, executed, stored one by one, consolidated."""
+"""A campaign: the runs of an experiment that are not finished yet, executed, stored one by one,
+consolidated.
+"""
 
 from __future__ import annotations
 
@@ -38,31 +40,22 @@ def run_campaign(
 
     Parameters
     ----------
-    experiment
-        An experiment file, or what `read_experiment` made of it.
-    out
-        The folder of the results; by default out/bench/NAME.
-    jobs
-        Number of worker processes; by default one per core.
-    resume
-        Whether to go on where an interrupted campaign stopped. No finished run is repeated.
-    filters
-        "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match.
-    scheduler
-        Address of a Dask scheduler, instead of local processes.
-    quiet
-        Whether no progress is shown.
+    experiment : An experiment file, or what `read_experiment` made of it.
+    out : The folder of the results; by default out/bench/NAME.
+    jobs : Number of worker processes; by default one per core.
+    resume : Whether to go on where an interrupted campaign stopped. No finished run is repeated.
+    filters : "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match.
+    scheduler : Address of a Dask scheduler, instead of local processes.
+    quiet : Whether no progress is shown.
 
     Returns
     -------
-    Path
-        The folder of the results.
+    The folder of the results.
 
     Raises
     ------
-    InputError
-        On an experiment that cannot be run, filters that no run matches, results in the folder without `resume`, and a
-        folder that cannot be written to.
+    InputError : On an experiment that cannot be run, filters that no run matches, results in the
+        folder without `resume`, and a folder that cannot be written to.
     """
     require("loky", "pandas", "psutil", "pyarrow", "tqdm")
     end_orphans()
@@ -87,8 +80,16 @@ def run_campaign(
             with told(folder, "choose another --out"):
                 replace_file(folder / "experiment.toml", lambda file: file.write_bytes(text))
         finished = store.finished()
-        tasks = [Task(run, experiment.name, experiment.plugins, *limits) for run in runs if run.key not in finished]
-        rows = run_on_cluster(tasks, scheduler) if scheduler else run_locally(tasks, jobs or os.cpu_count() or 1)
+        tasks = [
+            Task(run, experiment.name, experiment.plugins, *limits)
+            for run in runs
+            if run.key not in finished
+        ]
+        rows = (
+            run_on_cluster(tasks, scheduler)
+            if scheduler
+            else run_locally(tasks, jobs or os.cpu_count() or 1)
+        )
         _execute(experiment, store, tasks, len(runs), rows, quiet)
         save(load(store.path), folder / "rows.parquet")
     return folder
@@ -108,27 +109,22 @@ def run_reports(
 
     Parameters
     ----------
-    experiments
-        The experiment files.
-    reports
-        The folder of the reports, with the table of each.
-    version
-        '': solve nothing. 'full': run the experiments first and renew their tables in `reports`. 'quick': run their
-        quick versions, with tables and reports in out/quick, so that `reports` stays as it is.
-    names
-        Stems of the experiment files to run; all by default.
-    jobs, quiet
-        As for `run_campaign`.
+    experiments : The experiment files.
+    reports : The folder of the reports, with the table of each.
+    version : '': solve nothing. 'full': run the experiments first and renew their tables in
+        `reports`. 'quick': run their quick versions, with tables and reports in out/quick, so that
+        `reports` stays as it is.
+    names : Stems of the experiment files to run; all by default.
+    jobs, quiet : As for `run_campaign`.
 
     Returns
     -------
-    Path
-        The page with all reports.
+    The page with all reports.
 
     Raises
     ------
-    InputError
-        On an unknown version or name, two experiments of one name, and as `run_campaign` and `build` raise it.
+    InputError : On an unknown version or name, two experiments of one name, and as `run_campaign`
+        and `build` raise it.
     """
     paths = [Path(path) for path in experiments]
     missing = set(names) - {path.stem for path in paths}
@@ -147,7 +143,10 @@ def run_reports(
             subfolder(target, layout.name)
         twice = [name for name, n in Counter(layout.name for layout in layouts).items() if n > 1]
         if twice:
-            raise InputError(f"two experiments are called {twice[0]!r}; their results would be mixed, rename one.")
+            raise InputError(
+                f"two experiments are called {twice[0]!r}; their results would be mixed, rename"
+                " one."
+            )
     for path in paths if version else ():
         if names and path.stem not in names:
             continue
@@ -171,19 +170,30 @@ def _execute(experiment, store, tasks, total, rows, quiet) -> None:  # type: ign
     with (
         closing(rows),
         tqdm(
-            total=total, initial=total - len(tasks), desc=experiment.name, unit="run", file=sys.stderr, disable=quiet
+            total=total,
+            initial=total - len(tasks),
+            desc=experiment.name,
+            unit="run",
+            file=sys.stderr,
+            disable=quiet,
         ) as bar,
     ):
         for row in rows:
             if row["key"] not in waiting:
-                raise InputError(f"a row arrived that was not asked for, or twice: {row['problem']}, {row['method']}.")
+                raise InputError(
+                    f"a row arrived that was not asked for, or twice: {row['problem']},"
+                    f" {row['method']}."
+                )
             waiting.remove(row["key"])
             store.append(row)
             if not row["success"]:
                 failed[row["status"]] += 1
-                bar.set_postfix_str(", ".join(f"{n} {status}" for status, n in failed.most_common()), refresh=False)
+                bar.set_postfix_str(
+                    ", ".join(f"{n} {status}" for status, n in failed.most_common()), refresh=False
+                )
             bar.update()
     if waiting:
         raise InputError(
-            f"{len(waiting)} of {len(tasks)} runs left no row; finished runs are kept, go on with --resume."
+            f"{len(waiting)} of {len(tasks)} runs left no row; finished runs are kept, go on with"
+            " --resume."
         )

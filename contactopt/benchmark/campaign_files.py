@@ -1,4 +1,6 @@
-"""Files of a campaign and of reports: written whole or not at all, and never outside the folder that the user gave."""
+"""Files of a campaign and of reports: written whole or not at all, and never outside the folder
+that the user gave.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +17,16 @@ def subfolder(parent: Path, name: str) -> Path:
 
     Parameters
     ----------
-    parent
-        The folder that the user gave.
-    name
-        The name of the folder in it.
+    parent : The folder that the user gave.
+    name : The name of the folder in it.
 
     Returns
     -------
-    Path
-        parent/name.
+    parent/name.
 
     Raises
     ------
-    InputError
-        If the name can lead out of `parent`.
+    InputError : If the name can lead out of `parent`.
     """
     check_name("the name", name)
     return parent / name
@@ -40,22 +38,20 @@ def told(place: Path, advice: str = "choose another directory") -> Iterator[None
 
     Parameters
     ----------
-    place
-        Where something is written.
-    advice
-        What to do.
+    place : Where something is written.
+    advice : What to do.
 
     Yields
     ------
-    None
-        Nothing.
+    Nothing.
 
     Raises
     ------
-    InputError
-        Where the block raises an OSError.
+    InputError : Where the block raises an OSError.
     """
     try:
         yield
     except OSError as error:
-        raise InputError(f"cannot write into '{place}': {error.strerror or error}; {advice}.") from error
+        raise InputError(
+            f"cannot write into '{place}': {error.strerror or error}; {advice}."
+        ) from error

@@ -1,4 +1,7 @@
-"""What plug-ins declare: names, laws and arguments. Read in a process of its own, where they may fail or hang."""
+"""What plug-ins declare: names, laws and arguments.
+
+Read in a process of its own, where they may fail or hang.
+"""
 
 from __future__ import annotations
 
@@ -33,24 +36,21 @@ class Catalogue:
 
 
 def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
-    """Read what plug-in files declare, and the entry points among names of methods, in a process of its own.
+    """Read what plug-in files declare, and the entry points among names of methods, in a process of
+    its own.
 
     Parameters
     ----------
-    paths
-        The plug-in files.
-    names
-        The methods that the experiment names.
+    paths : The plug-in files.
+    names : The methods that the experiment names.
 
     Returns
     -------
-    Catalogue
-        Methods and problems with their laws and arguments.
+    Methods and problems with their laws and arguments.
 
     Raises
     ------
-    InputError
-        If a plug-in fails, hangs or ends the process. The message names the file.
+    InputError : If a plug-in fails, hangs or ends the process. The message names the file.
     """
     asked = [name for name in dict.fromkeys(names) if name not in METHODS]
     if not paths and not asked:
@@ -62,7 +62,9 @@ def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
         found: Catalogue | str = process.ask(LIMIT, "load", look, tuple(paths), asked)
     except Ended as end:
         where = ", ".join(f"'{path}'" for path in paths) or "entry points"
-        raise InputError(f"plug-ins ({where}) could not be loaded: {end.status}, {end.message}.") from end
+        raise InputError(
+            f"plug-ins ({where}) could not be loaded: {end.status}, {end.message}."
+        ) from end
     finally:
         process.kill()
     if isinstance(found, str):
@@ -75,7 +77,10 @@ def declared(plugins: Registry, names: Sequence[str]) -> Catalogue:
     for name in names:
         plugins.find(name)
     return Catalogue(
-        {p.name: Declared(p.law, p.iterates, arguments_of(p.make)) for p in plugins.methods.values()},
+        {
+            p.name: Declared(p.law, p.iterates, arguments_of(p.make))
+            for p in plugins.methods.values()
+        },
         {name: arguments_of(make) for name, make in plugins.problems.items()},
     )
 

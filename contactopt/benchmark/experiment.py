@@ -1,4 +1,7 @@
-"""Experiment files: TOML -> validated problems, methods and settings -> runs. Errors name the file and the line."""
+"""Experiment files: TOML -> validated problems, methods and settings -> runs.
+
+Errors name the file and the line.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
 
 MOST_RUNS = 200_000  # of one experiment
-BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}  # s; GB: less than the least holds no NumPy and SciPy
+# s; GB: less than the least holds no NumPy and SciPy
+BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}
 MOST_ALLOWED = {
     "repeats": MOST_RUNS,
     "max_iterations": 10**9,
@@ -37,16 +41,20 @@ class NothingToRun(InputError):
 
 @dataclass(frozen=True)
 class Experiment:
-    """One experiment file. Its fields are the keys of the file; lists and ranges in problems and methods are expanded.
+    """One experiment file.
+
+    Its fields are the keys of the file; lists and ranges in problems and methods are expanded.
 
     plugins       files, relative to the experiment file
     settings      names of SETTINGS or bounds on the certificate
-    starts        "cold", "warm": from the certified solution at nine tenths of the load and of the friction
+    starts        "cold", "warm": from the certified solution at nine tenths of the load and of the
+                  friction
     time_limit    [s] wall clock of one run; memory_limit [GB] of data of its process
     seed          of NumPy's and Python's generators before each run
     diagnose      rank, condition and thresholds of friction with each problem (contactopt.diagnose)
     quick         keys that a quick version replaces
-    figures       of the report, see contactopt.benchmark.reports; findings: file with a function findings(table)
+    figures       of the report, see contactopt.benchmark.reports; findings: file with a function
+                  findings(table)
     """
 
     name: str
@@ -74,9 +82,18 @@ class Experiment:
         """All runs, those of a problem together; filters: COLUMN=PATTERN, of which all must match."""
         chosen = [_filter(text) for text in filters]
         runs = [
-            Run(problem, method, str(setting), SETTINGS.get(str(setting)) or float(setting), start, repeat)
+            Run(
+                problem,
+                method,
+                str(setting),
+                SETTINGS.get(str(setting)) or float(setting),
+                start,
+                repeat,
+            )
             for problem in self.problems
-            for repeat, setting, start, method in product(range(self.repeats), self.settings, self.starts, self.methods)
+            for repeat, setting, start, method in product(
+                range(self.repeats), self.settings, self.starts, self.methods
+            )
         ]
         return [run for run in runs if all(match(run) for match in chosen)]
 
@@ -85,7 +102,10 @@ def _filter(text: str) -> Any:
     columns = ("problem", "method", "setting", "start", "repeat")
     column, sign, pattern = text.partition("=")
     if column not in columns or not sign:
-        raise InputError(f"cannot filter by '{text}'; write COLUMN=PATTERN with a column of {', '.join(columns)}.")
+        raise InputError(
+            f"cannot filter by '{text}'; write COLUMN=PATTERN with a column of"
+            f" {', '.join(columns)}."
+        )
 
     def match(run: Run) -> bool:
         value = getattr(run, column)
@@ -100,20 +120,16 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
 
     Parameters
     ----------
-    path
-        The TOML file.
-    quick
-        Whether the keys of its quick version replace the others.
+    path : The TOML file.
+    quick : Whether the keys of its quick version replace the others.
 
     Returns
     -------
-    Experiment
-        The problems, methods and settings, checked.
+    The problems, methods and settings, checked.
 
     Raises
     ------
-    InputError
-        On anything that cannot be run. The message names file and line.
+    InputError : On anything that cannot be run. The message names file and line.
     """
     path = Path(path)
     root = read_table(path, "experiment")
@@ -140,14 +156,24 @@ class _Reader:
         for key in ("name", "problems", "methods"):
             if not data.get(key):
                 raise self.located(f"an experiment needs '{key}'", key)
-        data = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
+        data = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in data.items()
+        }
         self.scalars(data)
         self.count(data)
-        paths = tuple(str((self.path.parent / plugin).resolve()) for plugin in data.get("plugins", ()))
+        paths = tuple(
+            str((self.path.parent / plugin).resolve()) for plugin in data.get("plugins", ())
+        )
         catalogue = self.catalogue(paths, data["methods"])
         skipped: list[str] = []
-        problems = [p for i, e in enumerate(data["problems"]) for p in self.problems(i, e, catalogue, skipped)]
-        methods = [m for i, e in enumerate(data["methods"]) for m in self.methods(i, e, catalogue, skipped)]
+        problems = [
+            p
+            for i, e in enumerate(data["problems"])
+            for p in self.problems(i, e, catalogue, skipped)
+        ]
+        methods = [
+            m for i, e in enumerate(data["methods"]) for m in self.methods(i, e, catalogue, skipped)
+        ]
         for title, specs in (("problems", problems), ("methods", methods)):
             twice = [label for label, n in Counter(spec.label for spec in specs).items() if n > 1]
             if twice:
@@ -161,11 +187,19 @@ class _Reader:
         )
 
     def scalars(self, data: Mapping[str, Any]) -> None:
-        for key, kind in (("name", str), ("title", str), ("text", str), ("findings", str), ("quick", dict)):
+        for key, kind in (
+            ("name", str),
+            ("title", str),
+            ("text", str),
+            ("findings", str),
+            ("quick", dict),
+        ):
             if not isinstance(data.get(key, kind()), kind):
                 raise self.located(f"'{key}' must be a {'table' if kind is dict else 'text'}", key)
         if not re.fullmatch(r"[\w.-]+", data["name"]):
-            raise self.located("'name' becomes a directory: letters, digits, '-', '_' and '.' only", "name")
+            raise self.located(
+                "'name' becomes a directory: letters, digits, '-', '_' and '.' only", "name"
+            )
         self.guard("name", check_name, "'name'", data["name"])
         for key in ("plugins", "settings", "starts", "problems", "methods", "figures", "columns"):
             if not isinstance(data.get(key, ()), tuple):
@@ -176,7 +210,10 @@ class _Reader:
         for key, most in MOST_ALLOWED.items():
             value, least = data.get(key, 1), int(key != "seed")
             if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-                raise self.located(f"'{key}' must be a whole number from {least} to {most}; got {short(value)}", key)
+                raise self.located(
+                    f"'{key}' must be a whole number from {least} to {most}; got {short(value)}",
+                    key,
+                )
         if not isinstance(data.get("diagnose", False), bool):
             raise self.located("'diagnose' must be true or false", "diagnose")
         for key, (low, high) in BOUNDS.items():
@@ -184,20 +221,25 @@ class _Reader:
         for setting in data.get("settings", ()):
             if isinstance(setting, str) and setting not in SETTINGS:
                 raise self.located(
-                    f"unknown setting {setting!r}; choose from {', '.join(SETTINGS)} or a number", "settings"
+                    f"unknown setting {setting!r}; choose from {', '.join(SETTINGS)} or a number",
+                    "settings",
                 )
             if not isinstance(setting, str):
                 self.guard("settings", check_number, "a setting", setting, 0.0)
         for start in data.get("starts", ()):
             if start not in STARTS:
-                raise self.located(f"unknown start {start!r}; choose from {', '.join(STARTS)}", "starts")
+                raise self.located(
+                    f"unknown start {start!r}; choose from {', '.join(STARTS)}", "starts"
+                )
         for key in ("settings", "starts"):
             twice = [text for text, n in Counter(map(str, data.get(key, ()))).items() if n > 1]
             if twice:
                 raise self.located(f"'{key}' holds {twice[0]} twice", key)
 
     def count(self, data: Mapping[str, Any]) -> None:
-        """Refuse an experiment of too many runs by their number, before anything is expanded, built or run."""
+        """Refuse an experiment of too many runs by their number, before anything is expanded, built
+        or run.
+        """
         number = data.get("repeats", 1)
         for key in ("settings", "starts"):
             number *= len(data.get(key, ("default",)))
@@ -206,15 +248,17 @@ class _Reader:
             number *= max(1, sum(math.prod(map(_size_of, entry.values())) for entry in entries))
         if number > MOST_RUNS:
             raise self.located(
-                f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or take fewer repeats "
-                "or values",
+                f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or"
+                " take fewer repeats or values",
                 "repeats",
             )
 
     def catalogue(self, paths: tuple[str, ...], methods: Sequence[Any]) -> Catalogue:
         """What the plug-ins declare, and installed packages for the methods named."""
         given = [entry.get("method") for entry in methods if isinstance(entry, dict)]
-        names = [name for names in given for name in (names if isinstance(names, list) else [names])]
+        names = [
+            name for names in given for name in (names if isinstance(names, list) else [names])
+        ]
         try:
             found = read_catalogue(paths, [name for name in names if isinstance(name, str)])
         except InputError as error:
@@ -222,11 +266,14 @@ class _Reader:
         for name in found.problems:
             if name in FAMILIES:
                 raise self.located(
-                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it", "plugins"
+                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it",
+                    "plugins",
                 )
         return found
 
-    def problems(self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]) -> Iterator[ProblemSpec]:
+    def problems(
+        self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]
+    ) -> Iterator[ProblemSpec]:
         kinds = [kind for kind in KINDS if isinstance(entry, dict) and kind in entry]
         if len(kinds) != 1:
             raise self.located(f"a problem needs one of {', '.join(KINDS)}", "problems", index)
@@ -240,7 +287,9 @@ class _Reader:
             else:
                 yield from found
 
-    def methods(self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]) -> Iterator[MethodSpec]:
+    def methods(
+        self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]
+    ) -> Iterator[MethodSpec]:
         if not isinstance(entry, dict) or "method" not in entry:
             raise self.located("a method needs the key 'method'", "methods", index)
         for name, settings in self.expand("methods", index, entry, "method", skipped):
@@ -270,14 +319,25 @@ class _Reader:
             yield name, dict(zip(rest, values))
 
     def refuse(
-        self, error: Exception, table: str, index: int, entry: Mapping[str, Any], kind: str, skipped: list[str]
+        self,
+        error: Exception,
+        table: str,
+        index: int,
+        entry: Mapping[str, Any],
+        kind: str,
+        skipped: list[str],
     ) -> None:
         if not entry.get("optional"):
             words = {
-                key: [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))] for key, value in entry.items()
+                key: [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))]
+                for key, value in entry.items()
             }
             found = {
-                key: [match.start() for name in names if (match := re.search(rf"\b{re.escape(name)}\b", str(error)))]
+                key: [
+                    match.start()
+                    for name in names
+                    if (match := re.search(rf"\b{re.escape(name)}\b", str(error)))
+                ]
                 for key, names in words.items()
                 if key != kind
             }
@@ -295,7 +355,9 @@ class _Reader:
             raise self.located(str(error), key) from error
 
     def located(self, message: str, *place: str | int) -> InputError:
-        """The error with the line of an entry: a top-level key, or a table with its number and a key of it."""
+        """The error with the line of an entry: a top-level key, or a table with its number and a
+        key of it.
+        """
         above = ("quick",) if place[0] in self.quick else ()
         return self.root.fail(f"{message.rstrip('.')}.", *above, *place)
 
@@ -315,8 +377,12 @@ def _values_of(name: str, value: Any) -> list[Any]:
     if not isinstance(value, dict):
         values = value if isinstance(value, list) else [value]
         for one in values:
-            if not isinstance(one, str | int | float) or (isinstance(one, int) and abs(one) >= LARGEST_INTEGER):
-                raise InputError(f"a value of '{name}' must be a text, a number, true or false; got {short(one)}")
+            if not isinstance(one, str | int | float) or (
+                isinstance(one, int) and abs(one) >= LARGEST_INTEGER
+            ):
+                raise InputError(
+                    f"a value of '{name}' must be a text, a number, true or false; got {short(one)}"
+                )
         return values
     if not {"from", "to", "steps"} <= set(value) or set(value) - {"from", "to", "steps", "scale"}:
         raise InputError(f"the range '{name}' needs from, to, steps, and may have scale = \"log\"")

@@ -1,4 +1,7 @@
-"""How the figures of a report look: colours, markers, lines, labels, axes. Colours are those of Okabe and Ito."""
+"""How the figures of a report look: colours, markers, lines, labels, axes.
+
+Colours are those of Okabe and Ito.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
-MARKERS = "osD^vP*X<>hpd8H1"  # one for each of 16 methods; colours come back after eight, with other lines
-FLOOR = 1e-2  # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
+# one for each of 16 methods; colours come back after eight, with other lines
+MARKERS = "osD^vP*X<>hpd8H1"
+# residuals below this fraction of the tolerance asked for are drawn there: they answer no question
+FLOOR = 1e-2
 LEAST_RESIDUAL = 1e-17  # drawn in place of 0
 WIDE, TALL = 5.4, 11.0  # pixels of a character of a label, and between labels one above the other
 POINTS = 0.72  # of a pixel at the usual resolution of a figure
@@ -48,11 +53,14 @@ def styles() -> list[dict[str, Any]]:
 
     Returns
     -------
-    list
-        Sixteen that differ in marker, and in colour or line; they come back after that.
+    Sixteen that differ in marker, and in colour or line; they come back after that.
     """
     made = [
-        {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i], "ls": "-" if i < len(COLOURS) else "--"}
+        {
+            "color": COLOURS[i % len(COLOURS)],
+            "marker": MARKERS[i],
+            "ls": "-" if i < len(COLOURS) else "--",
+        }
         for i in range(len(MARKERS))
     ]
     return made * MOST_ROUNDS
@@ -61,20 +69,18 @@ def styles() -> list[dict[str, Any]]:
 def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
     """Shorten the label of a line.
 
-    It is the label that was given for a name; else the name itself, where it is long with the values of its settings
-    only. normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+    It is the label that was given for a name; else the name itself, where it is long with the
+    values of its settings only. normal_qp(backend='clarabel', exact=True) becomes 'normal_qp
+    clarabel exact'.
 
     Parameters
     ----------
-    name
-        The name of a method with its settings.
-    labels
-        Labels that the experiment gives.
+    name : The name of a method with its settings.
+    labels : Labels that the experiment gives.
 
     Returns
     -------
-    str
-        The label.
+    The label.
     """
     if name in labels:
         return str(labels[name])
@@ -85,33 +91,42 @@ def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> 
     for setting in settings.rstrip(")").split(", "):
         key, _, value = setting.partition("=")
         if value != "False":
-            words.append(key if value == "True" else value.strip("'") if value.startswith("'") else setting)
+            words.append(
+                key if value == "True" else value.strip("'") if value.startswith("'") else setting
+            )
     return " ".join(words)
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write the names of lines in their colours beside their last points, one above the other where they meet.
+    """Write the names of lines in their colours beside their last points, one above the other where
+    they meet.
 
     A name stands to the left of a point in the right half of the figure, to the right of any other.
 
     Parameters
     ----------
-    ax
-        The axes.
-    ends
-        (x, y, name, colour) of each line.
+    ax : The axes.
+    ends : (x, y, name, colour) of each line.
     """
     ax.autoscale_view()
     middle = float(ax.transAxes.transform((0.5, 0.5))[0])
-    taken: list[tuple[float, float, float]] = []  # left and right end and height of labels in pixels
+    # left and right end and height of labels in pixels
+    taken: list[tuple[float, float, float]] = []
     for x, y, name, colour in sorted(ends, key=lambda end: end[1]):
         across, up = (float(place) for place in ax.transData.transform((x, y)))
         left = across - WIDE * len(name) if across > middle else across
         right, shift = left + WIDE * len(name), 3.0
-        while any(left < end and start < right and abs(up + shift - height) < TALL for start, end, height in taken):
+        while any(
+            left < end and start < right and abs(up + shift - height) < TALL
+            for start, end, height in taken
+        ):
             shift += TALL
         taken.append((left, right, up + shift))
-        side = {"ha": "right", "xytext": (-5, shift * POINTS)} if across > middle else {"xytext": (5, shift * POINTS)}
+        side = (
+            {"ha": "right", "xytext": (-5, shift * POINTS)}
+            if across > middle
+            else {"xytext": (5, shift * POINTS)}
+        )
         ax.annotate(name, (x, y), textcoords="offset points", color=colour, fontsize=7, **side)
 
 
@@ -120,14 +135,10 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
 
     Parameters
     ----------
-    ax
-        The axes.
-    grid
-        The numbers, row by row.
-    norm
-        What takes a number to its place between the darkest and the lightest colour.
-    size
-        Of the letters [pt].
+    ax : The axes.
+    grid : The numbers, row by row.
+    norm : What takes a number to its place between the darkest and the lightest colour.
+    size : Of the letters [pt].
     """
     values = grid.to_numpy(float)
     if values.size > CELLS:
@@ -139,20 +150,19 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
             ax.text(column, row, text, ha="center", va="center", fontsize=size, color=colour)
 
 
-def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (WIDTH, 4.0)) -> tuple[Any, Any]:
+def make_figure(
+    columns: int = 1, rows: int = 1, size: Sequence[float] = (WIDTH, 4.0)
+) -> tuple[Any, Any]:
     """Make a figure with axes.
 
     Parameters
     ----------
-    columns, rows
-        Number of axes.
-    size
-        Width and height of one of them [inch].
+    columns, rows : Number of axes.
+    size : Width and height of one of them [inch].
 
     Returns
     -------
-    tuple
-        The figure, and its axes: one, or an array of them.
+    The figure, and its axes: one, or an array of them.
     """
     from matplotlib.figure import Figure
 
@@ -161,12 +171,12 @@ def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (WIDTH,
 
 
 def set_ticks(axis: Any) -> None:
-    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other.
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels
+    run into each other.
 
     Parameters
     ----------
-    axis
-        The axis.
+    axis : The axis.
     """
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
@@ -182,21 +192,20 @@ def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
 
     Parameters
     ----------
-    figure, ax
-        The figure and its axes.
-    title
-        Of the legend.
+    figure, ax : The figure and its axes.
+    title : Of the legend.
 
     Returns
     -------
-    Figure
-        The figure.
+    The figure.
     """
     ax.grid(alpha=0.3)
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         columns = 2 if max(len(label) for label in labels) > SHORT else 3
-        figure.set_figheight(figure.get_figheight() + ROW * (-(-len(labels) // columns) + (title is not None)))
+        figure.set_figheight(
+            figure.get_figheight() + ROW * (-(-len(labels) // columns) + (title is not None))
+        )
         figure.legend(
             handles,
             labels,
@@ -215,13 +224,14 @@ def short_tick(value: float) -> str:
 
     Parameters
     ----------
-    value
-        The number.
+    value : The number.
 
     Returns
     -------
-    str
-        The text.
+    The text.
     """
-    plain, power = f"{value:g}", f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
+    plain, power = (
+        f"{value:g}",
+        f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-"),
+    )
     return power if len(power) < len(plain) and float(power) == value else plain

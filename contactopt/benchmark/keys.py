@@ -1,4 +1,6 @@
-"""Every key of an experiment file with an example, as the help of `contactopt bench` and the documentation show them."""
+"""Every key of an experiment file with an example, as the help of `contactopt bench` and the
+documentation show them.
+"""
 
 from __future__ import annotations
 
@@ -39,13 +41,25 @@ FIGURE = {
     "across": ("for tables: the column whose values stand side by side", '"setting"'),
 }  # fmt: skip
 KINDS = {
-    "speed_accuracy": "time against certified residual, one line for each method: what does accuracy cost?",
-    "performance_profile": "share of the problems solved within a factor of the best time: which method fails, which is fast?",
-    "time_against_size": "time against size, with the exponent of growth: which method is fit for large problems?",
+    "speed_accuracy": (
+        "time against certified residual, one line for each method: what does accuracy cost?"
+    ),
+    "performance_profile": (
+        "share of the problems solved within a factor of the best time: which method fails, which"
+        " is fast?"
+    ),
+    "time_against_size": (
+        "time against size, with the exponent of growth: which method is fit for large problems?"
+    ),
     "stability_map": "success, iterations or error over two parameters: where does a method fail?",
-    "convergence": "residual after each iteration of single runs: how does a method reach its answer?",
+    "convergence": (
+        "residual after each iteration of single runs: how does a method reach its answer?"
+    ),
     "success_table": "percent of the runs that kept the tolerance: how did the others end?",
-    "time_table": "mean times, in which a failure counts as the time limit: what does a warm start save (across = start)?",
+    "time_table": (
+        "mean times, in which a failure counts as the time limit: what does a warm start save"
+        " (across = start)?"
+    ),
 }
 
 
@@ -54,12 +68,16 @@ def help_text() -> str:
 
     Returns
     -------
-    str
-        The text, one line or two for each key.
+    The text, one line or two for each key.
     """
     lines = ["keys of an experiment file, with an example each:"]
-    lines += [f"  {key:16} {what}\n{'':19}{key} = {example}" for key, (what, example) in EXPERIMENT.items()]
+    lines += [
+        f"  {key:16} {what}\n{'':19}{key} = {example}"
+        for key, (what, example) in EXPERIMENT.items()
+    ]
     lines += ["", "keys of a table [[figures]]; those from `by` on belong to some kinds only:"]
-    lines += [f"  {key:16} {what}\n{'':19}{key} = {example}" for key, (what, example) in FIGURE.items()]
+    lines += [
+        f"  {key:16} {what}\n{'':19}{key} = {example}" for key, (what, example) in FIGURE.items()
+    ]
     lines += ["", "kinds of figures and tables, and the question that each answers:"]
     return "\n".join(lines + [f"  {kind:20} {what}" for kind, what in KINDS.items()])

@@ -1,4 +1,7 @@
-"""One run judged: its row, the answer's certificate. Runs in the campaign's process, where no plug-in is loaded."""
+"""One run judged: its row, the answer's certificate.
+
+Runs in the campaign's process, where no plug-in is loaded.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +44,9 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a worker says of a run. `status` is the method's own word; `reactions` None where there is no answer.
+    """What a worker says of a run.
+
+    `status` is the method's own word; `reactions` None where there is no answer.
 
     measured  the columns call_seconds, cpu_seconds, peak_mb and base_mb, as far as they are known
     """
@@ -62,13 +67,11 @@ def blank(task: Task) -> dict[str, Any]:
 
     Parameters
     ----------
-    task
-        The run and its limits.
+    task : The run and its limits.
 
     Returns
     -------
-    dict
-        A value for every column, with status 'error'.
+    A value for every column, with status 'error'.
     """
     run = task.run
     return {
@@ -82,7 +85,9 @@ def blank(task: Task) -> dict[str, Any]:
         "contacts": 0,
         "dim": 0,
         "plates": 0,
-        **dict.fromkeys(("rank", "condition", "guaranteed_mu", "alternating_mu", "tresca_mu"), np.nan),
+        **dict.fromkeys(
+            ("rank", "condition", "guaranteed_mu", "alternating_mu", "tresca_mu"), np.nan
+        ),
         "method": run.method.label,
         "name": run.method.name,
         "settings": json.dumps(run.method.settings),
@@ -125,36 +130,45 @@ def _machine() -> str:
     model = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo") as file:
-            model = next((line.split(":")[1].strip() for line in file if line.startswith("model name")), model)
+            model = next(
+                (line.split(":")[1].strip() for line in file if line.startswith("model name")),
+                model,
+            )
     except OSError:
         pass
     return f"{model}, {os.cpu_count()} cores, {platform.system()}"
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
-    """Judge an answer by its certificate. The method's own word counts only where it admits failure.
+    """Judge an answer by its certificate.
+
+    The method's own word counts only where it admits failure.
 
     Parameters
     ----------
-    task
-        The run and its limits.
-    problem
-        The interface problem.
-    answer
-        What the method returned.
+    task : The run and its limits.
+    problem : The interface problem.
+    answer : What the method returned.
 
     Returns
     -------
-    dict
-        The columns of the row that follow from the answer.
+    The columns of the row that follow from the answer.
     """
     out: dict[str, Any] = {"message": answer.message, **answer.measured}
     out["time"] = datetime.now(UTC).isoformat(timespec="seconds")
     if answer.reactions is None:
-        return out | {"status": answer.status, "solve_seconds": answer.measured.get("call_seconds", np.nan)}
+        return out | {
+            "status": answer.status,
+            "solve_seconds": answer.measured.get("call_seconds", np.nan),
+        }
     r, lam, seconds = answer.reactions, answer.multipliers, answer.seconds
     claimed = answer.status == Status.SOLVED.label
-    out |= {"claimed": claimed, "iterations": answer.iterations, "solve_seconds": seconds, "label": answer.label}
+    out |= {
+        "claimed": claimed,
+        "iterations": answer.iterations,
+        "solve_seconds": seconds,
+        "label": answer.label,
+    }
     out["history"] = json.dumps(answer.history or [])
     try:
         residual = natural_map_residual(problem, r, lam)
@@ -177,16 +191,12 @@ def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarra
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    r
-        (k, dim) contact forces, normal first [force].
-    lam
-        (p,) multipliers; None: those that fit best.
+    problem : The interface problem.
+    r : (k, dim) contact forces, normal first [force].
+    lam : (p,) multipliers; None: those that fit best.
 
     Returns
     -------
-    float
-        The natural-map residual [-].
+    The natural-map residual [-].
     """
     return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

@@ -1,7 +1,8 @@
-"""Methods and problems of the user: decorated in a file that the experiment names, or entry points of a package.
+"""Methods and problems of the user: decorated in a file that the experiment names, or entry points
+of a package.
 
-A plug-in runs in worker processes only. The campaign knows it by what it declares, which a process of its own reads
-(contactopt.benchmark.catalogue).
+A plug-in runs in worker processes only. The campaign knows it by what it declares, which a process
+of its own reads (contactopt.benchmark.catalogue).
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ LAWS = ("coulomb", "associated")
 
 @dataclass(frozen=True)
 class Plugin:
-    """make: a function problem -> answer, or a class whose objects have `iterate` (contactopt.methods.method.Method)."""
+    """make: a function problem -> answer, or a class whose objects have `iterate`
+    (contactopt.methods.method.Method).
+    """
 
     name: str
     make: Callable[..., Any]
@@ -38,7 +41,9 @@ class Plugin:
 
 @dataclass(frozen=True)
 class Registry:
-    """What plug-in files have declared to one process. The process owns it and hands it to whoever runs plug-ins.
+    """What plug-in files have declared to one process.
+
+    The process owns it and hands it to whoever runs plug-ins.
 
     methods   by name
     problems  functions that return problems, by name
@@ -68,38 +73,37 @@ class Registry:
         return self.methods.get(name)
 
 
-# The registry that receives what the plug-in file declares that is being run; None at any other time.
+# The registry that receives what the plug-in file declares that is being run; None at any other
+# time.
 _receiving: ContextVar[Registry | None] = ContextVar("receiving", default=None)
 
 
 def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -> Any:
     """Declare a function or class as a method of the benchmark.
 
-    The declaration counts where a campaign runs the file. Everywhere else the function or class is returned as it is.
+    The declaration counts where a campaign runs the file. Everywhere else the function or class is
+    returned as it is.
 
-    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s], `max_iterations` and
-    `start` (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a
-    default. It returns reactions (k, dim), or (reactions, multipliers), or a Solution. Returning claims success;
-    raising does not, and InputError means that the problem is not one for this method.
+    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s],
+    `max_iterations` and `start` (a Solution or None) are passed if it has such arguments, `tol` not
+    at the setting "default" if it has a default. It returns reactions (k, dim), or (reactions,
+    multipliers), or a Solution. Returning claims success; raising does not, and InputError means
+    that the problem is not one for this method.
 
     Parameters
     ----------
-    make
-        The function or class, where the decorator is written without arguments.
-    name
-        The name of the method; by default that of the function.
-    law
-        "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles compare within, one law.
+    make : The function or class, where the decorator is written without arguments.
+    name : The name of the method; by default that of the function.
+    law : "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles
+        compare within, one law.
 
     Returns
     -------
-    callable
-        The function or class itself, or a decorator that returns it.
+    The function or class itself, or a decorator that returns it.
 
     Raises
     ------
-    InputError
-        For an unknown law, and for the name of a method of contactopt.
+    InputError : For an unknown law, and for the name of a method of contactopt.
     """
     if law not in LAWS:
         raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
@@ -107,7 +111,9 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
     def register(make: Any) -> Any:
         plugin = Plugin(_name("method", make, name), make, law)
         if plugin.name in METHODS:
-            raise InputError(f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it.")
+            raise InputError(
+                f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it."
+            )
         registry = _receiving.get()
         if registry is not None:
             registry.methods[plugin.name] = plugin
@@ -117,25 +123,22 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
 
 
 def problem(make: Any = None, *, name: str | None = None) -> Any:
-    """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME` in an experiment
+    """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME`
+    in an experiment
     file.
 
     Parameters
     ----------
-    make
-        The function, where the decorator is written without arguments.
-    name
-        The name of the family; by default that of the function.
+    make : The function, where the decorator is written without arguments.
+    name : The name of the family; by default that of the function.
 
     Returns
     -------
-    callable
-        The function itself, or a decorator that returns it.
+    The function itself, or a decorator that returns it.
 
     Raises
     ------
-    InputError
-        For a name that cannot be used.
+    InputError : For a name that cannot be used.
     """
 
     def register(make: Any) -> Any:
@@ -150,7 +153,9 @@ def problem(make: Any = None, *, name: str | None = None) -> Any:
 def _name(kind: str, make: Any, name: object) -> str:
     """The name under which `make` is registered; InputError if one of the two is of the wrong kind."""
     if not callable(make):
-        raise InputError(f"a plug-in {kind} must be a function or a class; got {type(make).__name__}.")
+        raise InputError(
+            f"a plug-in {kind} must be a function or a class; got {type(make).__name__}."
+        )
     found = getattr(make, "__name__", None) if name is None else name
     if not isinstance(found, str) or not found.strip() or not found.isprintable():
         raise InputError(f"a plug-in {kind} needs a name of printable characters; got {found!r}.")

@@ -1,4 +1,6 @@
-"""Runs made by worker processes: problems built, methods run, answers certified; on one machine, or on a Dask cluster."""
+"""Runs made by worker processes: problems built, methods run, answers certified; on one machine, or
+on a Dask cluster.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,11 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
 BUILD_LIMIT = 1800.0  # s to build a problem
-WARM_UP = 30.0  # s at least for the first call of a method of this package, which imports what it needs
+# s at least for the first call of a method of this package, which imports what it needs
+WARM_UP = 30.0
 PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
-MARGIN, GRACE = 1.1, 0.5  # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
+# the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
+MARGIN, GRACE = 1.1, 0.5
 DIAGNOSED = ("rank", "condition", "guaranteed_mu", "alternating_mu", "tresca_mu")
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
@@ -41,10 +45,11 @@ class NotBuilt(Exception):
 
 
 class Worker:
-    """Two processes: one builds problems and never runs a method, one runs methods and never builds a problem.
+    """Two processes: one builds problems and never runs a method, one runs methods and never builds
+    a problem.
 
-    Between them the problem is held here, where no plug-in runs, and every answer is judged by it. `run` blocks; use from
-    one thread.
+    Between them the problem is held here, where no plug-in runs, and every answer is judged by it.
+    `run` blocks; use from one thread.
     """
 
     def __init__(self) -> None:
@@ -87,7 +92,10 @@ class Worker:
             row |= judge(task, built.problem, self._answer(task, built))
         except Ended as end:
             if end.phase == "neighbour":
-                end.status, end.message = "not_built", f"{end.status} while its warm start was sought: {end.message}"
+                end.status, end.message = (
+                    "not_built",
+                    f"{end.status} while its warm start was sought: {end.message}",
+                )
             return row | {
                 "status": end.status,
                 "message": end.message,
@@ -120,8 +128,16 @@ class Worker:
             self.broken[spec.label] = how
             raise NotBuilt(how)
         problem = found["problem"]
-        facts = {"fingerprint": problem.fingerprint, "contacts": problem.contacts, "dim": problem.dim}
-        facts |= {"plates": len(problem.s), "build_seconds": found["build_seconds"], **found["diagnosis"]}
+        facts = {
+            "fingerprint": problem.fingerprint,
+            "contacts": problem.contacts,
+            "dim": problem.dim,
+        }
+        facts |= {
+            "plates": len(problem.s),
+            "build_seconds": found["build_seconds"],
+            **found["diagnosis"],
+        }
         self.held = Built(spec.label, problem, facts)
         return self.held
 
@@ -139,7 +155,8 @@ class Worker:
                 self._restart()
                 if end.phase == START:
                     raise InputError(
-                        f"a worker process cannot start ({end.status}, {end.message}); is there memory enough?"
+                        f"a worker process cannot start ({end.status}, {end.message}); is there"
+                        " memory enough?"
                     ) from end
                 if end.phase != "warm up":  # which says nothing of the run itself
                     raise
@@ -151,16 +168,23 @@ class Worker:
         return answer
 
     def _prepare(self, task: Task, built: Built) -> None:
-        """Give the process the problem, a warm start if one is asked for, and the imports of the method."""
+        """Give the process the problem, a warm start if one is asked for, and the imports of the
+        method.
+        """
         method, dim = task.run.method, built.problem.dim
         if self.sent != built.label or not self.solver.running:
             self.warm = self.warm if self.solver.running else set()
-            self.solver.ask(BUILD_LIMIT, "send", worker.hold, built.label, built.problem, task.plugins)
+            self.solver.ask(
+                BUILD_LIMIT, "send", worker.hold, built.label, built.problem, task.plugins
+            )
             self.sent = built.label
         if task.run.start == "warm":
             self.solver.ask(BUILD_LIMIT, "neighbour", worker.find_start, built.label)
         if (method.label, dim) not in self.warm and method.name not in _cold:
-            limit = max(MARGIN * task.time_limit + GRACE, WARM_UP if method.plugin is None else PLUGIN_WARM_UP)
+            limit = max(
+                MARGIN * task.time_limit + GRACE,
+                WARM_UP if method.plugin is None else PLUGIN_WARM_UP,
+            )
             self.solver.ask(limit, "warm up", worker.warm_up, task, dim)
             self.warm.add((method.label, dim))
 
@@ -171,7 +195,9 @@ class Worker:
 
 
 class Shares:
-    """Tasks handed out so that a worker stays with a problem, and two build the same one only if no other is left."""
+    """Tasks handed out so that a worker stays with a problem, and two build the same one only if no
+    other is left.
+    """
 
     def __init__(self, tasks: Sequence[Task]):
         self.lock = threading.Lock()
@@ -187,7 +213,9 @@ class Shares:
             if label not in self.tasks:
                 taken = set(self.holders.values())
                 label = next((name for name in self.tasks if name not in taken), None)
-                label = label or max(self.tasks, key=lambda name: len(self.tasks[name]), default=None)
+                label = label or max(
+                    self.tasks, key=lambda name: len(self.tasks[name]), default=None
+                )
             if label is None:
                 return None
             self.holders[worker] = label
@@ -198,19 +226,18 @@ class Shares:
 
 
 def run_locally(tasks: Sequence[Task], jobs: int) -> Iterator[dict[str, Any]]:
-    """Execute runs by worker processes of this machine. When the iteration is left, the workers are killed.
+    """Execute runs by worker processes of this machine.
+
+    When the iteration is left, the workers are killed.
 
     Parameters
     ----------
-    tasks
-        The runs.
-    jobs
-        Number of worker processes.
+    tasks : The runs.
+    jobs : Number of worker processes.
 
     Yields
     ------
-    dict
-        The row of each run as it is finished.
+    The row of each run as it is finished.
     """
     shares, rows, stop = Shares(tasks), queue.Queue[Any](), threading.Event()
     workers = [Worker() for _ in range(min(jobs, len(tasks)))]
@@ -254,37 +281,37 @@ def _run_here(task: Task) -> dict[str, Any]:
 def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[dict[str, Any]]:
     """Execute runs by a Dask cluster.
 
-    Each thread of each Dask worker keeps a worker process of its own. Plug-in and FCLib files must be found under the
-    same paths there. A run whose Dask worker is lost leaves no row: resume the campaign.
+    Each thread of each Dask worker keeps a worker process of its own. Plug-in and FCLib files must
+    be found under the same paths there. A run whose Dask worker is lost leaves no row: resume the
+    campaign.
 
     Parameters
     ----------
-    tasks
-        The runs.
-    address
-        Of the Dask scheduler.
+    tasks : The runs.
+    address : Of the Dask scheduler.
 
     Yields
     ------
-    dict
-        The row of each run as it is finished.
+    The row of each run as it is finished.
 
     Raises
     ------
-    InputError
-        If Dask is not installed, or no scheduler answers.
+    InputError : If Dask is not installed, or no scheduler answers.
     """
     try:
         from distributed import Client, as_completed
     except ImportError as error:
-        raise InputError("a cluster needs Dask; install it with: pip install 'contactopt[cluster]'") from error
+        raise InputError(
+            "a cluster needs Dask; install it with: pip install 'contactopt[cluster]'"
+        ) from error
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as error:
         raise InputError(f"no Dask scheduler answers at '{address}': {error}") from error
     with client:
         waiting = iter(tasks)
-        ahead = 4 * max(1, sum(client.nthreads().values()))  # more would only fill the scheduler's memory
+        # more would only fill the scheduler's memory
+        ahead = 4 * max(1, sum(client.nthreads().values()))
         running = as_completed([], raise_errors=False)
         for task in islice(waiting, ahead):
             running.add(client.submit(_run_here, task, pure=False))

@@ -1,4 +1,6 @@
-"""Problems of an experiment: scenes, FCLib files and generated families, each a name with parameters."""
+"""Problems of an experiment: scenes, FCLib files and generated families, each a name with
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,10 @@ NORMAL_TOL = 1e-12  # certificate of the frictionless solve behind `tangential`
 
 @dataclass(frozen=True)
 class ProblemSpec:
-    """kind: one of KINDS. path: of an FCLib file; not part of the label, which travels with the results."""
+    """kind: one of KINDS.
+
+    path: of an FCLib file; not part of the label, which travels with the results.
+    """
 
     kind: str
     name: str
@@ -46,9 +51,13 @@ class ProblemSpec:
         if self.kind == "scene":
             scene(self.name, **self.parameters)
         elif self.kind == "family":
-            families = {name: arguments_of(family) for name, family in FAMILIES.items()} | dict(declared)
+            families = {name: arguments_of(family) for name, family in FAMILIES.items()} | dict(
+                declared
+            )
             if self.name not in families:
-                raise InputError(f"unknown family {self.name!r}; choose from {', '.join(families)}.")
+                raise InputError(
+                    f"unknown family {self.name!r}; choose from {', '.join(families)}."
+                )
             try:
                 families[self.name].bind(**self.parameters)
             except TypeError as error:
@@ -67,7 +76,10 @@ class ProblemSpec:
             return read(self.path)
         problem = (FAMILIES | dict(declared))[self.name](**self.parameters)
         if not isinstance(problem, InterfaceProblem):
-            raise InputError(f"family '{self.name}' must return an InterfaceProblem; got {type(problem).__name__}.")
+            raise InputError(
+                f"family '{self.name}' must return an InterfaceProblem; got"
+                f" {type(problem).__name__}."
+            )
         return problem
 
 
@@ -76,13 +88,11 @@ def short_number(value: Any) -> str:
 
     Parameters
     ----------
-    value
-        Any value.
+    value : Any value.
 
     Returns
     -------
-    str
-        The text.
+    The text.
     """
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
@@ -92,21 +102,17 @@ def scene(name: str, **parameters: Any) -> Scene:
 
     Parameters
     ----------
-    name
-        A name in SCENES.
-    parameters
-        The scene's own arguments, and upper_E, upper_nu, lower_E, lower_nu, and stiffness_ratio, which is the lower
-        body's Young's modulus over the upper one's.
+    name : A name in SCENES.
+    parameters : The scene's own arguments, and upper_E, upper_nu, lower_E, lower_nu, and
+        stiffness_ratio, which is the lower body's Young's modulus over the upper one's.
 
     Returns
     -------
-    Scene
-        The scene.
+    The scene.
 
     Raises
     ------
-    InputError
-        For arguments that the scene does not have, or that contradict each other.
+    InputError : For arguments that the scene does not have, or that contradict each other.
     """
     given = {key: parameters.pop(key) for key in MATERIALS if key in parameters}
     made = make_scene(name, **parameters)
@@ -114,7 +120,10 @@ def scene(name: str, **parameters: Any) -> Scene:
         return made
     bodies = {"upper": made.upper, "lower": made.lower}
     if not all(isinstance(part, Part) for part in bodies.values()):
-        raise InputError(f"scene '{name}' has a rigid body; give its deformable material as arguments of the scene.")
+        raise InputError(
+            f"scene '{name}' has a rigid body; give its deformable material as arguments of the"
+            " scene."
+        )
     if "stiffness_ratio" in given and "lower_E" in given:
         raise InputError("give stiffness_ratio or lower_E, not both.")
     new: dict[str, Any] = {}
@@ -131,43 +140,38 @@ def reduced(name: str, **parameters: Any) -> InterfaceProblem:
 
     Parameters
     ----------
-    name, parameters
-        As for `scene`.
+    name, parameters : As for `scene`.
 
     Returns
     -------
-    InterfaceProblem
-        The problem.
+    The problem.
     """
     from contactopt.coupling.reduction import reduce
 
     return reduce(scene(name, **parameters), Q="explicit")
 
 
-def rigid_bodies(bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: int = 0) -> InterfaceProblem:
-    """Draw random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H' v, so that a solution
+def rigid_bodies(
+    bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: int = 0
+) -> InterfaceProblem:
+    """Draw random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H'
+    v, so that a solution
     exists.
 
     Parameters
     ----------
-    bodies
-        Number of bodies, at least two.
-    contacts
-        Number of contacts.
-    mu
-        Friction coefficient.
-    seed
-        Of the random numbers.
+    bodies : Number of bodies, at least two.
+    contacts : Number of contacts.
+    mu : Friction coefficient.
+    seed : Of the random numbers.
 
     Returns
     -------
-    InterfaceProblem
-        The problem.
+    The problem.
 
     Raises
     ------
-    InputError
-        With fewer than two bodies or one contact.
+    InputError : With fewer than two bodies or one contact.
     """
     if bodies < 2 or contacts < 1:
         raise InputError("rigid_bodies needs at least two bodies and one contact.")
@@ -178,41 +182,43 @@ def rigid_bodies(bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: in
         pair = rng.choice(bodies, 2, replace=False)
         for body, sign in zip(pair, (1.0, -1.0)):
             arm = rng.normal(size=3)
-            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 6] = sign * np.hstack([frame, np.cross(arm, frame)])
+            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 6] = sign * np.hstack(
+                [frame, np.cross(arm, frame)]
+            )
     inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
     return InterfaceProblem(
-        (H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), Coulomb(np.full(contacts, mu))
+        (H * inverse_mass) @ H.T,
+        (H @ rng.normal(size=6 * bodies)).reshape(-1, 3),
+        Coulomb(np.full(contacts, mu)),
     )
 
 
 def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> InterfaceProblem:
-    """Press a parabola on an elastic half-plane: the dense logarithmic kernel of piecewise constant tractions.
+    """Press a parabola on an elastic half-plane: the dense logarithmic kernel of piecewise constant
+    tractions.
 
-    Half the candidate zone and the plane's modulus pi E* / 2 are the units. The load, by a plate, makes about half of
-    the candidate nodes touch.
+    Half the candidate zone and the plane's modulus pi E* / 2 are the units. The load, by a plate,
+    makes about half of the candidate nodes touch.
 
     Source: Johnson (1985), Contact Mechanics, eqs (2.30).
 
     Parameters
     ----------
-    contacts
-        Number of candidate nodes.
-    mu
-        Friction coefficient.
-    coupling
-        Dundurs' constant, in (-.5, .5), by which tangential tractions move the surface normally. At 0 friction has
-        nothing to do and only the normal problem is left.
+    contacts : Number of candidate nodes.
+    mu : Friction coefficient.
+    coupling : Dundurs' constant, in (-.5, .5), by which tangential tractions move the surface
+        normally. At 0 friction has nothing to do and only the normal problem is left.
 
     Returns
     -------
-    InterfaceProblem
-        The problem.
+    The problem.
     """
     h = 2.0 / contacts
     x = -1.0 + h * (np.arange(contacts) + 0.5)
     distance = x[:, None] - x
     ends = [distance + h / 2, distance - h / 2]
-    a, b = (end * np.log(np.abs(end) / 8.0) for end in ends)  # at rest 8 away: positive definite on this zone
+    # at rest 8 away: positive definite on this zone
+    a, b = (end * np.log(np.abs(end) / 8.0) for end in ends)
     kernel = (b - a + h) / h
     skew = -coupling * np.pi / 2 * np.sign(distance)
     Q = np.zeros((contacts, 2, contacts, 2))
@@ -233,31 +239,27 @@ def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> In
 
 
 def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:
-    """Make the friction of a scene under given normal forces (Tresca's problem) a contact problem without coupling.
+    """Make the friction of a scene under given normal forces (Tresca's problem) a contact problem
+    without coupling.
 
-    Normal forces p are those without friction. The scene's Q_tt, and per contact u_n = (r_n - p) c with its own
-    normal compliance c, so that r_n = p solves the normal part exactly; plates are held. The tangential displacement at
-    no force is that of the scene under p, and a drag along the first axis that would need the force shear * mu * p if
-    nothing slipped.
+    Normal forces p are those without friction. The scene's Q_tt, and per contact u_n = (r_n - p) c
+    with its own normal compliance c, so that r_n = p solves the normal part exactly; plates are
+    held. The tangential displacement at no force is that of the scene under p, and a drag along the
+    first axis that would need the force shear * mu * p if nothing slipped.
 
     Parameters
     ----------
-    of, parameters
-        The name of the scene and its arguments, as for `scene`.
-    mu
-        Friction coefficient.
-    shear
-        The drag, over the one at which every contact slips.
+    of, parameters : The name of the scene and its arguments, as for `scene`.
+    mu : Friction coefficient.
+    shear : The drag, over the one at which every contact slips.
 
     Returns
     -------
-    InterfaceProblem
-        The problem.
+    The problem.
 
     Raises
     ------
-    InputError
-        If the normal problem is not solved.
+    InputError : If the normal problem is not solved.
     """
     from contactopt.methods.driver import solve
 
@@ -265,7 +267,9 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     k, dim = coupled.q.shape
     pressed = solve(coupled, tol=NORMAL_TOL)
     if not pressed.solved:
-        raise InputError(f"the normal problem behind 'tangential' was not solved: {pressed.message}")
+        raise InputError(
+            f"the normal problem behind 'tangential' was not solved: {pressed.message}"
+        )
     p = np.maximum(pressed.reactions[:, 0], 0.0)
     tangents = np.arange(k * dim).reshape(k, dim)[:, 1:].ravel()
     Q = np.zeros_like(coupled.Q)
@@ -277,7 +281,9 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     drag[:, 1] = shear * mu * p
     q[:, 1:] -= (Q @ drag.ravel()).reshape(k, dim)[:, 1:]
     q[:, 0] = -compliance * p
-    return InterfaceProblem(Q, q, Coulomb(np.full(k, mu)), areas=coupled.areas, coordinates=coupled.coordinates)
+    return InterfaceProblem(
+        Q, q, Coulomb(np.full(k, mu)), areas=coupled.areas, coordinates=coupled.coordinates
+    )
 
 
 def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
@@ -285,15 +291,12 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
 
     Parameters
     ----------
-    of, parameters
-        The name of the scene and its arguments, as for `scene`.
-    copies
-        How often each contact is listed.
+    of, parameters : The name of the scene and its arguments, as for `scene`.
+    copies : How often each contact is listed.
 
     Returns
     -------
-    InterfaceProblem
-        The problem.
+    The problem.
     """
     p = reduced(of, **parameters)
     index = np.repeat(np.arange(p.q.size).reshape(p.q.shape), copies, axis=0).ravel()
@@ -308,20 +311,19 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
     )
 
 
-def in_units(of: str, force: float = 1.0, length: float = 1.0, **parameters: Any) -> InterfaceProblem:
+def in_units(
+    of: str, force: float = 1.0, length: float = 1.0, **parameters: Any
+) -> InterfaceProblem:
     """Write a scene's numbers in other units.
 
     Parameters
     ----------
-    of, parameters
-        The name of the scene and its arguments, as for `scene`.
-    force, length
-        What one newton and one millimetre are in the other units.
+    of, parameters : The name of the scene and its arguments, as for `scene`.
+    force, length : What one newton and one millimetre are in the other units.
 
     Returns
     -------
-    InterfaceProblem
-        The problem.
+    The problem.
     """
     p = reduced(of, **parameters)
     return replace(
@@ -348,24 +350,19 @@ def named(kind: str, name: str, parameters: Mapping[str, Any], folder: Path) -> 
 
     Parameters
     ----------
-    kind
-        'scene', 'fclib' or 'family'.
-    name
-        The name of the scene or family, or a pattern of files.
-    parameters
-        The arguments of the problem.
-    folder
-        The folder to which a pattern is relative.
+    kind : 'scene', 'fclib' or 'family'.
+    name : The name of the scene or family, or a pattern of files.
+    parameters : The arguments of the problem.
+    folder : The folder to which a pattern is relative.
 
     Returns
     -------
-    list
-        The problems, files in the order of their names.
+    The problems, files in the order of their names.
 
     Raises
     ------
-    InputError
-        For an unknown scene, and if a pattern uses a variable that is not set or matches nothing.
+    InputError : For an unknown scene, and if a pattern uses a variable that is not set or matches
+        nothing.
     """
     if kind == "scene" and name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")

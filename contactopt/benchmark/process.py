@@ -1,7 +1,9 @@
-"""A process in which code of the user may run, seen from outside: start it, ask it, kill it, tell how it ended.
+"""A process in which code of the user may run, seen from outside: start it, ask it, kill it, tell
+how it ended.
 
-The process is the one worker of an executor of loky, which starts it, carries calls and answers, and notices its death. What
-is added here: limits of time, the end of everything that the process started, and what it printed last.
+The process is the one worker of an executor of loky, which starts it, carries calls and answers,
+and notices its death. What is added here: limits of time, the end of everything that the process
+started, and what it printed last.
 """
 
 from __future__ import annotations
@@ -20,16 +22,32 @@ from contactopt.errors import InputError
 if TYPE_CHECKING:
     import psutil
 
-LIBRARIES = ("OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "BLIS_NUM", "NUMEXPR_NUM", "VECLIB_MAXIMUM", "RAYON_NUM")
+LIBRARIES = (
+    "OMP_NUM",
+    "OPENBLAS_NUM",
+    "MKL_NUM",
+    "BLIS_NUM",
+    "NUMEXPR_NUM",
+    "VECLIB_MAXIMUM",
+    "RAYON_NUM",
+)
 ONE_THREAD = {f"{name}_THREADS": "1" for name in LIBRARIES}
-MARK = "CONTACTOPT_CAMPAIGN"  # environment variable of all that a campaign starts: number and start time of its process
+# environment variable of all that a campaign starts: number and start time of its process
+MARK = "CONTACTOPT_CAMPAIGN"
 START = "start"  # the phase until the process answers at all
 START_LIMIT = 120.0  # s for it
-STARTS = 3  # of a process that is killed in it: once may be chance, each time is its limit of memory
+# of a process that is killed in it: once may be chance, each time is its limit of memory
+STARTS = 3
 BEAT = 0.1  # s between two looks at what a busy process printed
 MOST_WORDS = 10e6  # bytes of print that are kept on disk; more is thrown away
 KEPT_WORDS = 4000  # bytes of what a process printed last, which may tell why it ended
-MEMORY_WORDS = (b"MemoryError", b"bad_alloc", b"out of memory", b"Out of memory", b"Cannot allocate memory")
+MEMORY_WORDS = (
+    b"MemoryError",
+    b"bad_alloc",
+    b"out of memory",
+    b"Out of memory",
+    b"Cannot allocate memory",
+)
 
 
 class Ended(Exception):
@@ -41,7 +59,10 @@ class Ended(Exception):
 
 
 class Process:
-    """One process at a time, started when it is first asked and again after it died. Use from one thread."""
+    """One process at a time, started when it is first asked and again after it died.
+
+    Use from one thread.
+    """
 
     def __init__(self) -> None:
         self.executor: Any = None
@@ -63,36 +84,36 @@ class Process:
 
         try:
             self.noise = tempfile.NamedTemporaryFile("a+b", delete=False)  # noqa: SIM115
-            quiet = {"PYTHONFAULTHANDLER": ""}  # a solver's last words tell more than the stack of a crashed process
+            # a solver's last words tell more than the stack of a crashed process
+            quiet = {"PYTHONFAULTHANDLER": ""}
             environment = ONE_THREAD | quiet | {MARK: mark()}
             told = (self.noise.name, os.getpid())
-            self.executor = ProcessPoolExecutor(1, env=environment, initializer=prepare, initargs=told)
+            self.executor = ProcessPoolExecutor(
+                1, env=environment, initializer=prepare, initargs=told
+            )
             self.ready = self.executor.submit(os.getpid)
         except OSError as error:
-            raise InputError(f"a worker process cannot start: {error.strerror or error}.") from error
+            raise InputError(
+                f"a worker process cannot start: {error.strerror or error}."
+            ) from error
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function returns that the process calls.
 
         Parameters
         ----------
-        limit
-            Seconds for the call, after which the process is killed.
-        phase
-            What the call is, for `Ended`.
-        function, arguments
-            What is called; both are pickled.
+        limit : Seconds for the call, after which the process is killed.
+        phase : What the call is, for `Ended`.
+        function, arguments : What is called; both are pickled.
 
         Returns
         -------
-        object
-            What the function returned.
+        What the function returned.
 
         Raises
         ------
-        Ended
-            If the process did not survive the call. A process that is killed before it answers at all is started anew,
-            STARTS times.
+        Ended : If the process did not survive the call. A process that is killed before it answers
+            at all is started anew, STARTS times.
         """
         for trial in range(STARTS):
             self.start()
@@ -114,7 +135,9 @@ class Process:
             try:
                 return future.result(max(0.0, min(BEAT, deadline - time.monotonic())))
             except BrokenProcessPool as error:
-                raise Ended(phase, *self._death(str(error.__cause__ or error) + str(error))) from None
+                raise Ended(
+                    phase, *self._death(str(error.__cause__ or error) + str(error))
+                ) from None
             except TimeoutError:
                 if os.fstat(self.noise.fileno()).st_size > MOST_WORDS:
                     self.noise.truncate(0)
@@ -163,7 +186,10 @@ def mark() -> str:
 
 
 def end_tree(number: int) -> None:
-    """Kill a process and what it started. What frees shared memory after them is left to end by itself."""
+    """Kill a process and what it started.
+
+    What frees shared memory after them is left to end by itself.
+    """
     import psutil
 
     with suppress(psutil.Error):
@@ -172,7 +198,9 @@ def end_tree(number: int) -> None:
 
 
 def end_orphans() -> None:
-    """Kill what solvers of this campaign, or of one that is dead, left behind in sessions of their own."""
+    """Kill what solvers of this campaign, or of one that is dead, left behind in sessions of their
+    own.
+    """
     import psutil
 
     for process in psutil.process_iter():
@@ -180,8 +208,13 @@ def end_orphans() -> None:
             if (found := process.environ().get(MARK)) is None:
                 continue
             number, began = found.split()
-            alive = psutil.pid_exists(int(number)) and psutil.Process(int(number)).create_time() == float(began)
-            strange = os.getpid() not in (process.pid, *(parent.pid for parent in process.parents()))
+            alive = psutil.pid_exists(int(number)) and psutil.Process(
+                int(number)
+            ).create_time() == float(began)
+            strange = os.getpid() not in (
+                process.pid,
+                *(parent.pid for parent in process.parents()),
+            )
             if not alive or (int(number) == os.getpid() and strange):
                 _kill([process])
 
@@ -199,17 +232,16 @@ def _kill(processes: Iterable[psutil.Process]) -> None:
 
 
 def one_line(error: object) -> str:
-    """Write a text, or an exception with its name unless it is an InputError, in one line of at most 200 characters.
+    """Write a text, or an exception with its name unless it is an InputError, in one line of at
+    most 200 characters.
 
     Parameters
     ----------
-    error
-        The text or exception.
+    error : The text or exception.
 
     Returns
     -------
-    str
-        The line.
+    The line.
     """
     text = str(error) if isinstance(error, str | InputError) else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]

@@ -1,7 +1,8 @@
-"""Figures of a report: f(table, ...) -> matplotlib Figure, from results alone; nothing is solved here.
+"""Figures of a report: f(table, ...) -> matplotlib Figure, from results alone; nothing is solved
+here.
 
-`table` is what contactopt.benchmark.load returns. A figure that compares times takes the runs of one law only. Every figure
-takes `labels`, short names for long ones.
+`table` is what contactopt.benchmark.load returns. A figure that compares times takes the runs of
+one law only. Every figure takes `labels`, short names for long ones.
 """
 
 from __future__ import annotations
@@ -40,27 +41,23 @@ def speed_accuracy(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Draw time against certified residual: per method a line through its settings, medians over problems and repeats.
+    """Draw time against certified residual: per method a line through its settings, medians over
+    problems and repeats.
 
-    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both faster and more
-    accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR. Labels stand where the lines
-    end, too.
+    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both
+    faster and more accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at
+    FLOOR. Labels stand where the lines end, too.
 
     Parameters
     ----------
-    table
-        The rows.
-    time
-        The column with the times [s].
-    by
-        The column whose values have a line each.
-    labels
-        Short labels by the names of methods.
+    table : The rows.
+    time : The column with the times [s].
+    by : The column whose values have a line each.
+    labels : Short labels by the names of methods.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     figure, ax = make_figure()
     points, ends = [], []
@@ -83,7 +80,15 @@ def speed_accuracy(
         points += list(zip(x, y))
     label_ends(ax, ends)
     front = _pareto(np.array(points))
-    ax.step(front[:, 0], front[:, 1], where="post", color="#bbbbbb", lw=5, zorder=0, label="Pareto front")
+    ax.step(
+        front[:, 0],
+        front[:, 1],
+        where="post",
+        color="#bbbbbb",
+        lw=5,
+        zorder=0,
+        label="Pareto front",
+    )
     ax.set(xlabel=NAMES.get(time, time) + ", median", ylabel="natural-map residual [-], median")
     set_ticks(ax.xaxis)
     return add_legend(figure, ax)
@@ -104,27 +109,24 @@ def performance_profile(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Draw a profile: the share of the instances solved within a factor of the best method's time on each.
+    """Draw a profile: the share of the instances solved within a factor of the best method's time
+    on each.
 
-    An instance is a problem at a setting and start. Times are medians over repeats, and a method that fails once has
-    failed.
+    An instance is a problem at a setting and start. Times are medians over repeats, and a method
+    that fails once has failed.
 
-    Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math. Program. 91,
-    201-213.
+    Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math.
+    Program. 91, 201-213.
 
     Parameters
     ----------
-    table
-        The rows.
-    metric
-        The column with the times [s].
-    by, labels
-        As for `speed_accuracy`.
+    table : The rows.
+    metric : The column with the times [s].
+    by, labels : As for `speed_accuracy`.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     figure, ax = make_figure()
     times = table[metric].where(table["success"], np.inf)
@@ -136,7 +138,9 @@ def performance_profile(
     wide = medians.unstack(by)
     solvable = wide[np.isfinite(wide.min(axis=1))]
     ratio = solvable.div(solvable.min(axis=1), axis=0)
-    largest = 1.3 * max(2.0, float(np.nanmax(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0)))
+    largest = 1.3 * max(
+        2.0, float(np.nanmax(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0))
+    )
     for (full, _), style in zip(groups(table, by), styles()):
         name = short_label(full, labels)
         sorted_ratios = np.sort(ratio[full].dropna().to_numpy())
@@ -146,7 +150,15 @@ def performance_profile(
             np.concatenate([[1.0], sorted_ratios, [largest]]),
             np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]]),
         )
-        ax.step(x, y, where="post", color=style["color"], ls=style["ls"], lw=1.6, label=f"{name} ({len(share)})")
+        ax.step(
+            x,
+            y,
+            where="post",
+            color=style["color"],
+            ls=style["ls"],
+            lw=1.6,
+            label=f"{name} ({len(share)})",
+        )
     what = NAMES.get(metric, metric).partition(" [")[0]
     ax.set(
         xscale="log",
@@ -165,23 +177,19 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Draw the median time of successful runs against size, with the exponent p of time ~ size^p from the larger sizes.
+    """Draw the median time of successful runs against size, with the exponent p of time ~ size^p
+    from the larger sizes.
 
     Parameters
     ----------
-    table
-        The rows.
-    size
-        The column with the sizes.
-    metric
-        The column with the times [s].
-    by, labels
-        As for `speed_accuracy`.
+    table : The rows.
+    size : The column with the sizes.
+    metric : The column with the times [s].
+    by, labels : As for `speed_accuracy`.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     figure, ax = make_figure()
     ends = []
@@ -193,7 +201,16 @@ def time_against_size(
         exponent = fitted_exponent(x, y)
         ends.append((x[-1], y[-1], name, style["color"]))
         label = name + ("" if np.isnan(exponent) else f": {exponent:.1f}")
-        ax.loglog(x, y, marker=style["marker"], color=style["color"], ls=style["ls"], ms=5, lw=1.2, label=label)
+        ax.loglog(
+            x,
+            y,
+            marker=style["marker"],
+            color=style["color"],
+            ls=style["ls"],
+            ms=5,
+            lw=1.2,
+            label=label,
+        )
     label_ends(ax, ends)
     ax.set(xlabel=NAMES.get(size, size), ylabel=NAMES.get(metric, metric) + ", median")
     set_ticks(ax.xaxis)
@@ -201,17 +218,16 @@ def time_against_size(
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
-    """Fit the exponent p of y ~ x^p by least squares over the larger half of the sizes, three at least.
+    """Fit the exponent p of y ~ x^p by least squares over the larger half of the sizes, three at
+    least.
 
     Parameters
     ----------
-    x, y
-        (n,) sizes and times.
+    x, y : (n,) sizes and times.
 
     Returns
     -------
-    float
-        The exponent; nan with fewer than three sizes.
+    The exponent; nan with fewer than three sizes.
     """
     if len(x) < 3:
         return np.nan
@@ -226,35 +242,34 @@ def stability_map(
     value: str = "success",
     by: str = "method",
 ) -> Any:
-    """Draw one panel per method: success, iterations, error or time over two parameters; hatched grey where no run
+    """Draw one panel per method: success, iterations, error or time over two parameters; hatched
+    grey where no run
     succeeded.
 
-    The cells hold their numbers, unless a map has more than CELLS of them. Runs that ended by the method's own
-    criterion above the tolerance ("settled") show their value too. Where one axis is the friction coefficient and the
-    experiment diagnosed its problems, lines on top: below the dashed one the alternating iteration contracts for every
-    load, at the full one it does not for some load.
+    The cells hold their numbers, unless a map has more than CELLS of them. Runs that ended by the
+    method's own criterion above the tolerance ("settled") show their value too. Where one axis is
+    the friction coefficient and the experiment diagnosed its problems, lines on top: below the
+    dashed one the alternating iteration contracts for every load, at the full one it does not for
+    some load.
 
     Parameters
     ----------
-    table
-        The rows.
-    x, y
-        The columns of the two parameters.
-    value
-        The column that is shown.
-    by
-        The column whose values have a panel each.
+    table : The rows.
+    x, y : The columns of the two parameters.
+    value : The column that is shown.
+    by : The column whose values have a panel each.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     from matplotlib.colors import LogNorm, Normalize
 
     parts = groups(table, by)
     columns = min(2, len(parts))
-    figure, axes = make_figure(columns, -(-len(parts) // columns), (WIDTH / columns, 2.5 if columns > 1 else 3.8))
+    figure, axes = make_figure(
+        columns, -(-len(parts) // columns), (WIDTH / columns, 2.5 if columns > 1 else 3.8)
+    )
     grids = [(name, rows, _grid(rows, x, y, value)) for name, rows in parts]
     shown = np.concatenate([grid.to_numpy(float).ravel() for _, _, grid in grids])
     shown = shown[np.isfinite(shown) & (shown > 0)]
@@ -264,10 +279,14 @@ def stability_map(
         ax.set_facecolor("#cccccc")
         ax.patch.set(hatch="xx", edgecolor="#999999")
         write_numbers(ax, grid, norm, 7 if columns > 1 else 8)
-        mesh = ax.imshow(grid.to_numpy(float), norm=norm, cmap="viridis", origin="lower", aspect="auto")
+        mesh = ax.imshow(
+            grid.to_numpy(float), norm=norm, cmap="viridis", origin="lower", aspect="auto"
+        )
         ax.set_title(name, fontsize=9)
         ax.set_xlabel(NAMES.get(x, x), fontsize=8 if len(parts) > 1 else None)
-        ax.set_ylabel(NAMES.get(y, y) if number % columns == 0 else "", fontsize=8 if len(parts) > 1 else None)
+        ax.set_ylabel(
+            NAMES.get(y, y) if number % columns == 0 else "", fontsize=8 if len(parts) > 1 else None
+        )
         for axis, index in ((ax.xaxis, grid.columns), (ax.yaxis, grid.index)):
             room = 26 if axis is ax.xaxis and len(parts) > 1 else 60  # characters
             names = [short_tick(v) for v in index]
@@ -278,7 +297,13 @@ def stability_map(
         ax.set_axis_off()
     handles = {line.get_label(): line for ax in np.ravel(axes) for line in ax.get_lines()}
     if handles:
-        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=1, frameon=False, fontsize=8)
+        figure.legend(
+            handles=list(handles.values()),
+            loc="outside lower center",
+            ncols=1,
+            frameon=False,
+            fontsize=8,
+        )
     label = "share of runs solved" if value == "success" else NAMES.get(value, value) + ", median"
     figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.8, aspect=30)
     return figure
@@ -290,11 +315,15 @@ def _grid(rows: pd.DataFrame, x: str, y: str, value: str) -> pd.DataFrame:
     else:
         values = rows[value].where(rows["success"] | (rows["status"] == "settled"))
     how = "mean" if value == "success" else "median"
-    return rows.assign(_value=values).pivot_table(index=y, columns=x, values="_value", aggfunc=how, dropna=False)
+    return rows.assign(_value=values).pivot_table(
+        index=y, columns=x, values="_value", aggfunc=how, dropna=False
+    )
 
 
 def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame) -> None:
-    """Lines at the thresholds of friction, in the places of the cells (logarithmic between their values)."""
+    """Lines at the thresholds of friction, in the places of the cells (logarithmic between their
+    values).
+    """
     if "problem.mu" not in (x, y):
         return
     other, frictions = (y, grid.columns) if x == "problem.mu" else (x, grid.index)
@@ -307,10 +336,18 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
     for column, style, label in lines:
         known = rows.groupby(other)[column].median().dropna()
         known = known[np.isfinite(known) & (known > 0)]
-        along = np.interp(np.log(known.to_numpy()), cells, np.arange(len(cells)), left=np.nan, right=np.nan)
+        along = np.interp(
+            np.log(known.to_numpy()), cells, np.arange(len(cells)), left=np.nan, right=np.nan
+        )
         line = along, np.array([places[v] for v in known.index])
         if np.isfinite(along).sum() > 1:
-            ax.plot(*(line if x == "problem.mu" else line[::-1]), style, color="#D55E00", lw=2, label=label)
+            ax.plot(
+                *(line if x == "problem.mu" else line[::-1]),
+                style,
+                color="#D55E00",
+                lw=2,
+                label=label,
+            )
 
 
 def convergence(
@@ -319,26 +356,22 @@ def convergence(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Draw the natural-map residual after each outer iteration, or against time, of the first repeat of each method.
+    """Draw the natural-map residual after each outer iteration, or against time, of the first
+    repeat of each method.
 
     Parameters
     ----------
-    table
-        The rows, with their histories.
-    x
-        "iterations" or "seconds".
-    by, labels
-        As for `speed_accuracy`.
+    table : The rows, with their histories.
+    x : "iterations" or "seconds".
+    by, labels : As for `speed_accuracy`.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
 
     Raises
     ------
-    InputError
-        For another `x`.
+    InputError : For another `x`.
     """
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
@@ -351,11 +384,24 @@ def convergence(
         along = iterations if x == "iterations" else seconds
         residual = np.maximum(residual, max(LEAST_RESIDUAL, FLOOR * float(rows["tolerance"].min())))
         name = short_label(name, labels)
-        ax.loglog(along, residual, marker=style["marker"], ms=3, lw=1, color=style["color"], ls=style["ls"], label=name)
-    ax.set(xlabel="outer iteration" if x == "iterations" else "seconds", ylabel="natural-map residual [-]")
+        ax.loglog(
+            along,
+            residual,
+            marker=style["marker"],
+            ms=3,
+            lw=1,
+            color=style["color"],
+            ls=style["ls"],
+            label=name,
+        )
+    ax.set(
+        xlabel="outer iteration" if x == "iterations" else "seconds",
+        ylabel="natural-map residual [-]",
+    )
     return add_legend(figure, ax)
 
 
 FIGURES: dict[str, Callable[..., Any]] = {
-    f.__name__: f for f in (speed_accuracy, performance_profile, time_against_size, stability_map, convergence)
+    f.__name__: f
+    for f in (speed_accuracy, performance_profile, time_against_size, stability_map, convergence)
 }

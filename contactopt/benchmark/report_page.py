@@ -1,6 +1,7 @@
 """The report of one finished campaign: figures and tables for papers, and a page to explore.
 
-The page holds every run. Its charts and its table follow the same filters; a click on a run draws how its residual fell.
+The page holds every run. Its charts and its table follow the same filters; a click on a run draws
+how its residual fell.
 """
 
 from __future__ import annotations
@@ -32,14 +33,16 @@ SHOWN = (
 MOST_HISTORIES = 5000  # runs, above which the page leaves their convergence out
 QUESTIONS = """
 <p><strong>Which chart answers which question?</strong> <em>Speed against accuracy</em> shows what time a certified residual costs: lower
-left is better. The <em>performance profile</em> shows where methods fail: its right end is the share of the instances that a method
-solved, its left end the share on which it was the fastest. <em>Time against size</em> shows how the cost grows. To see what warm
-starts buy, choose the start warm and then cold and compare the times. <em>Convergence</em> shows one run: click on its row.</p>
+left is better. The <em>performance profile</em> shows where methods fail: its right end is the
+share of the instances that a method solved, its left end the share on which it was the fastest.
+<em>Time against size</em> shows how the cost grows. To see what warm starts buy, choose the start
+warm and then cold and compare the times. <em>Convergence</em> shows one run: click on its row.</p>
 """
 
 
 def report_campaign(folder: str | Path, experiment: str | Path | None = None) -> Path:
-    """Write the report of a finished campaign into its folder: report.md with figures, and report.html to explore.
+    """Write the report of a finished campaign into its folder: report.md with figures, and
+    report.html to explore.
 
     Parameters
     ----------
@@ -69,11 +72,16 @@ def report_campaign(folder: str | Path, experiment: str | Path | None = None) ->
         "columns": {name: COLUMNS[name][1] for name in SHOWN if name in table},
         "colours": COLOURS,
     }
-    return write_html(folder / PAGE, layout.title, _body(layout, rendered(text, folder)), data, ["report.js"])
+    return write_html(
+        folder / PAGE, layout.title, _body(layout, rendered(text, folder)), data, ["report.js"]
+    )
 
 
 def _layout(folder: Path, experiment: str | Path | None, name: str) -> Layout:
-    """What the experiment's file says of its report. Findings are left out where the file that computes them is not there."""
+    """What the experiment's file says of its report.
+
+    Findings are left out where the file that computes them is not there.
+    """
     path = folder / "experiment.toml" if experiment is None else Path(experiment)
     if experiment is None and not path.exists():
         return Layout(path, name, name, "", (), "", ())
@@ -82,7 +90,9 @@ def _layout(folder: Path, experiment: str | Path | None, name: str) -> Layout:
 
 
 def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """One mapping per run with the columns that the page shows, and the residuals and seconds of its iterations."""
+    """One mapping per run with the columns that the page shows, and the residuals and seconds of
+    its iterations.
+    """
     names = [name for name in SHOWN if name in table]
     histories = "history" in table and len(table) <= MOST_HISTORIES
     made = []
@@ -108,11 +118,13 @@ def _plain(value: Any) -> Any:
 
 def _body(layout: Layout, static: str) -> str:
     choices = "".join(
-        f'<label class="inline">{name} <select id="filter-{name}"><option value="">all</option></select></label>'
+        f'<label class="inline">{name} <select id="filter-{name}"><option'
+        ' value="">all</option></select></label>'
         for name in ("setting", "start", "family", "method", "status")
     )
     scales = "".join(
-        f'<label class="inline"><input type="checkbox" id="log-{axis}" checked> {axis} axis logarithmic</label>'
+        f'<label class="inline"><input type="checkbox" id="log-{axis}" checked> {axis} axis'
+        " logarithmic</label>"
         for axis in "xy"
     )
     times = "".join(
@@ -143,13 +155,11 @@ def refusals(table: pd.DataFrame) -> list[str]:
 
     Parameters
     ----------
-    table
-        The table of a campaign.
+    table : The table of a campaign.
 
     Returns
     -------
-    list
-        The sentences, the most frequent reason first.
+    The sentences, the most frequent reason first.
     """
     left = table[table["status"].isin(["refused", "not_built"])]
     reasons = Counter(str(message) for message in left["message"])

@@ -1,16 +1,21 @@
-"""Reports: Markdown and one HTML page, from experiment files and the small tables beside the reports. Solves nothing.
+"""Reports: Markdown and one HTML page, from experiment files and the small tables beside the
+reports. Solves nothing.
 
-An experiment file lists its figures and tables in order, each with a caption, a choice of rows and arguments:
+An experiment file lists its figures and tables in order, each with a caption, a choice of rows and
+arguments:
 
-    findings = "mine.py"                        # with a function findings(table) -> three sentences, computed
+    findings = "mine.py"                        # with a function findings(table) -> three
+                                                sentences, computed
     [[figures]]
-    kind = "speed_accuracy"                     # a function of contactopt.benchmark.report_figures or .tables
+    kind = "speed_accuracy"                     # a function of contactopt.benchmark.report_figures
+                                                or .tables
     caption = "Time against accuracy."
     where = {"problem.elements" = 16}           # law = "coulomb" unless given
     optional = true                             # left out where no row fits, as in a quick version
     time = "cpu_seconds"                        # all other keys are arguments of that function
 
-A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its table REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
+A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its table
+REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations
@@ -40,7 +45,10 @@ if TYPE_CHECKING:
 
 # The report of an experiment that asks for no figures.
 USUAL = (
-    {"kind": "success_table", "caption": "Runs that kept the tolerance, by setting; how the others ended."},
+    {
+        "kind": "success_table",
+        "caption": "Runs that kept the tolerance, by setting; how the others ended.",
+    },
     {
         "kind": "performance_profile",
         "caption": "Which share of the instances each method solved, and how fast.",
@@ -57,14 +65,16 @@ USUAL = (
         "metric": "cpu_seconds",
     },
 )
-OWN_KEYS = ("kind", "caption", "where", "optional")  # of a figure; all others are arguments of its function
+# of a figure; all others are arguments of its function
+OWN_KEYS = ("kind", "caption", "where", "optional")
 LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
 PAGE = "benchmarks.html"
 DPI, SHADES = 100, 160
 QUESTIONS = (
-    "Which chart answers which question? Speed against accuracy shows what a certified residual costs. A performance profile shows where methods "
-    "fail, at its right end, and which is fast, at its left. A table of times by start shows what warm starts buy. A map shows for which numbers a "
-    "method fails, and time against size how its cost grows."
+    "Which chart answers which question? Speed against accuracy shows what a certified residual"
+    " costs. A performance profile shows where methods fail, at its right end, and which is fast,"
+    " at its left. A table of times by start shows what warm starts buy. A map shows for which"
+    " numbers a method fails, and time against size how its cost grows."
 )
 STYLE = """body{max-width:60rem;margin:2rem auto;padding:0 1rem;font:16px/1.5 system-ui,sans-serif;color:#222}
 table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}td,th{border:1px solid #ccc;padding:.2rem .5rem}
@@ -89,18 +99,16 @@ def read_layout(path: str | Path) -> Layout:
 
     Parameters
     ----------
-    path
-        The experiment file.
+    path : The experiment file.
 
     Returns
     -------
-    Layout
-        Title, text, figures and tables of the report.
+    Title, text, figures and tables of the report.
 
     Raises
     ------
-    InputError
-        If the file cannot be read or asks for a figure that does not exist. The message names it.
+    InputError : If the file cannot be read or asks for a figure that does not exist. The message
+        names it.
     """
     path = Path(path)
     data = read_table(path, "experiment").data
@@ -112,11 +120,16 @@ def read_layout(path: str | Path) -> Layout:
     for number, entry in enumerate(figures, 1):
         if not isinstance(entry.get("kind"), str) or entry["kind"] not in FIGURES | TABLES:
             kinds = ", ".join(FIGURES | TABLES)
-            raise InputError(f"'{path}', figure {number}: unknown kind {entry.get('kind')!r}; choose from {kinds}.")
+            raise InputError(
+                f"'{path}', figure {number}: unknown kind {entry.get('kind')!r}; choose from"
+                f" {kinds}."
+            )
         if not entry.get("caption") or not isinstance(entry["caption"], str):
             raise InputError(f"'{path}', figure {number}: it needs a caption.")
         if not isinstance(entry.get("where", {}), dict):
-            raise InputError(f"'{path}', figure {number}: 'where' must be a table of columns and values.")
+            raise InputError(
+                f"'{path}', figure {number}: 'where' must be a table of columns and values."
+            )
     texts = {key: data.get(key) or "" for key in ("title", "text", "findings")}
     for key, text in texts.items():
         if not isinstance(text, str):
@@ -126,7 +139,15 @@ def read_layout(path: str | Path) -> Layout:
         check_name("'name'", name)
     except InputError as error:
         raise InputError(f"'{path}': {error}") from error
-    return Layout(path, name, texts["title"] or name, texts["text"], tuple(figures), texts["findings"], tuple(columns))
+    return Layout(
+        path,
+        name,
+        texts["title"] or name,
+        texts["text"],
+        tuple(figures),
+        texts["findings"],
+        tuple(columns),
+    )
 
 
 def publish(experiment: str | Path, results: str | Path, reports: str | Path) -> Path:
@@ -134,26 +155,23 @@ def publish(experiment: str | Path, results: str | Path, reports: str | Path) ->
 
     Parameters
     ----------
-    experiment
-        The experiment file.
-    results
-        The folder of the campaign.
-    reports
-        The folder of the reports.
+    experiment : The experiment file.
+    results : The folder of the campaign.
+    reports : The folder of the reports.
 
     Returns
     -------
-    Path
-        The table.
+    The table.
 
     Raises
     ------
-    InputError
-        As `read_layout`, `load` and `save` raise it.
+    InputError : As `read_layout`, `load` and `save` raise it.
     """
     layout = read_layout(experiment)
     kept = {"history"} if any(entry["kind"] == "convergence" for entry in layout.figures) else set()
-    columns = [*layout.columns] or [name for name in COLUMNS if name not in LEFT_OUT or name in kept]
+    columns = [*layout.columns] or [
+        name for name in COLUMNS if name not in LEFT_OUT or name in kept
+    ]
     target = subfolder(Path(reports), layout.name) / "rows.csv"
     save(load(results), target, columns)
     return target
@@ -164,20 +182,16 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
 
     Parameters
     ----------
-    experiments
-        The experiment files.
-    reports
-        The folder of the reports.
+    experiments : The experiment files.
+    reports : The folder of the reports.
 
     Returns
     -------
-    Path
-        The page.
+    The page.
 
     Raises
     ------
-    InputError
-        If none has a table, or if a figure's arguments do not fit its table.
+    InputError : If none has a table, or if a figure's arguments do not fit its table.
     """
     require("markdown_it", "pandas")
     reports, errors = Path(reports), []
@@ -186,7 +200,9 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
         try:
             layout = read_layout(path)
             if layout.name in [other.name for other, _, _ in bodies]:
-                raise InputError(f"'{path}': another experiment is called {layout.name!r} too; rename one.")
+                raise InputError(
+                    f"'{path}': another experiment is called {layout.name!r} too; rename one."
+                )
             folder = subfolder(reports, layout.name)
             if (folder / "rows.csv").exists():
                 with told(folder):
@@ -201,7 +217,8 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
         raise InputError("; ".join(errors))
     if not bodies:
         raise InputError(
-            f"'{reports}' holds no table of these experiments; make one with: contactopt report --run quick"
+            f"'{reports}' holds no table of these experiments; make one with: contactopt report"
+            " --run quick"
         )
     return reports / PAGE
 
@@ -211,26 +228,23 @@ def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
 
     Parameters
     ----------
-    layout
-        How the report is laid out.
-    folder
-        Where it goes.
-    table
-        The rows of the experiment.
+    layout : How the report is laid out.
+    folder : Where it goes.
+    table : The rows of the experiment.
 
     Returns
     -------
-    str
-        The Markdown of the report.
+    The Markdown of the report.
 
     Raises
     ------
-    InputError
-        If a figure does not fit the table.
+    InputError : If a figure does not fit the table.
     """
     parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
-        parts.append("\n".join(f"{n}. {text}" for n, text in enumerate(_findings(layout, table), 1)))
+        parts.append(
+            "\n".join(f"{n}. {text}" for n, text in enumerate(_findings(layout, table), 1))
+        )
     remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
     for number, entry in enumerate(layout.figures or USUAL, 1):
         result = _drawn(layout, number, entry, table)
@@ -265,14 +279,24 @@ def _drawn(layout: Layout, number: int, entry: Mapping[str, Any], table: pd.Data
             if entry["kind"] in TABLES
             else FIGURES[entry["kind"]](_without_formulas(rows), **arguments)
         )
-    except (ValueError, TypeError, LookupError, AttributeError) as error:  # InputError is a ValueError
+    # InputError is a ValueError
+    except (ValueError, TypeError, LookupError, AttributeError) as error:
         raise InputError(f"'{layout.path}', figure {number} ({entry['kind']}): {error}") from error
 
 
 def _without_formulas(rows: pd.DataFrame) -> pd.DataFrame:
-    """The rows with every $ in a text marked as a plain character: names are not formulas for Matplotlib to set."""
-    texts = [name for name in rows if name != "history" and rows[name].map(lambda value: isinstance(value, str)).any()]
-    plain = {name: rows[name].map(lambda v: v.replace("$", r"\$") if isinstance(v, str) else v) for name in texts}
+    """The rows with every $ in a text marked as a plain character: names are not formulas for
+    Matplotlib to set.
+    """
+    texts = [
+        name
+        for name in rows
+        if name != "history" and rows[name].map(lambda value: isinstance(value, str)).any()
+    ]
+    plain = {
+        name: rows[name].map(lambda v: v.replace("$", r"\$") if isinstance(v, str) else v)
+        for name in texts
+    }
     return rows.assign(**plain)
 
 
@@ -291,22 +315,38 @@ def _findings(layout: Layout, table: pd.DataFrame) -> list[str]:
 
 def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     failures = int((~table["success"]).sum())
-    backends = sorted({name for text in table["backend"] for name in str(text).split(", ")} - {"native", "nan"})
+    backends = sorted(
+        {name for text in table["backend"] for name in str(text).split(", ")} - {"native", "nan"}
+    )
     link = Path(os.path.relpath(layout.path, folder)).as_posix()
     kept = (folder / "rows.csv").exists()  # a report of the project, not the folder of a campaign
     name = "rows.csv" if kept else "rows.parquet"
-    again = f"`contactopt report --run full {layout.path.stem}`; rebuilt from the table by `contactopt report`"
+    again = (
+        f"`contactopt report --run full {layout.path.stem}`; rebuilt from the table by `contactopt"
+        " report`"
+    )
     lines = [
-        f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a certificate recomputed from "
-        "the problem.",
-        f"The median of wall time over CPU time of the calls is {(table['call_seconds'] / table['cpu_seconds']).median():.1f}. More "
-        "than 1 means a busy machine. CPU times are compared, and time limits are wall times.",
+        (
+            f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is"
+            " a certificate recomputed from the problem."
+        ),
+        (
+            "The median of wall time over CPU time of the calls is"
+            f" {(table['call_seconds'] / table['cpu_seconds']).median():.1f}. More than 1 means a"
+            " busy machine. CPU times are compared, and time limits are wall times."
+        ),
         f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
-        f"Made by {again}."
-        if kept
-        else "Made by `contactopt bench`; rebuilt from the table by `contactopt report` with this folder.",
+        (
+            f"Made by {again}."
+            if kept
+            else (
+                "Made by `contactopt bench`; rebuilt from the table by `contactopt report` with"
+                " this folder."
+            )
+        ),
         _one_line(
-            f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
+            f"Environment: {'; '.join(sorted(set(table['machine'])))}."
+            f" {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
         ),
     ]
     return "\n".join(lines + ([f"Backends: {', '.join(backends)}."] if backends else []))
@@ -347,42 +387,43 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
 
     Parameters
     ----------
-    bodies
-        Layout, folder and Markdown of each report.
+    bodies : Layout, folder and Markdown of each report.
 
     Returns
     -------
-    str
-        The HTML.
+    The HTML.
     """
     links = "".join(
-        f'<li><a href="#{html.escape(layout.name)}">{html.escape(layout.title)}</a></li>' for layout, _, _ in bodies
+        f'<li><a href="#{html.escape(layout.name)}">{html.escape(layout.title)}</a></li>'
+        for layout, _, _ in bodies
     )
     sections = [
         f'<section id="{html.escape(layout.name)}">{rendered(text, folder)}</section>'
         for layout, folder, text in bodies
     ]
-    head = '<!doctype html><html lang="en"><meta charset="utf-8"><title>contactopt: benchmarks</title>'
+    head = (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>contactopt: benchmarks</title>'
+    )
     head += f"<style>{STYLE}</style>"
-    return f"{head}<h1>Benchmarks</h1><p>{QUESTIONS}</p><ul>{links}</ul>{''.join(sections)}</html>\n"
+    return (
+        f"{head}<h1>Benchmarks</h1><p>{QUESTIONS}</p><ul>{links}</ul>{''.join(sections)}</html>\n"
+    )
 
 
 def rendered(text: str, folder: Path) -> str:
     """Make HTML of Markdown, with the pictures of the report embedded.
 
-    Raw HTML is shown as text. Links to files beside the report become text, since the page may stand elsewhere.
+    Raw HTML is shown as text. Links to files beside the report become text, since the page may
+    stand elsewhere.
 
     Parameters
     ----------
-    text
-        The Markdown.
-    folder
-        Where its pictures are.
+    text : The Markdown.
+    folder : Where its pictures are.
 
     Returns
     -------
-    str
-        The HTML.
+    The HTML.
     """
     from markdown_it import MarkdownIt
 

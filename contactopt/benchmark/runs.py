@@ -19,8 +19,10 @@ from contactopt.methods.method import NATIVE
 DEFAULT_TOL = 1e-8  # by which the setting "default" is judged: that of contactopt.solve
 SETTINGS = {"default": DEFAULT_TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
 STARTS = ("cold", "warm")
-PASSED = ("tol", "time_limit", "max_iterations", "start")  # to a plug-in, if it has such an argument
-OTHER_LAWS = {"relaxation": "associated"}  # methods of contactopt that solve another problem than Coulomb's
+# to a plug-in, if it has such an argument
+PASSED = ("tol", "time_limit", "max_iterations", "start")
+# methods of contactopt that solve another problem than Coulomb's
+OTHER_LAWS = {"relaxation": "associated"}
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,10 @@ class MethodSpec:
 
     @property
     def label(self) -> str:
-        texts = {k: short_number(v) if isinstance(v, float) else repr(v) for k, v in self.settings.items()}
+        texts = {
+            k: short_number(v) if isinstance(v, float) else repr(v)
+            for k, v in self.settings.items()
+        }
         given = ", ".join(f"{key}={text}" for key, text in texts.items())
         return f"{self.name}({given})" if given else self.name
 
@@ -45,10 +50,13 @@ class MethodSpec:
         """InputError if the name or a setting is unknown, or a backend is not installed."""
         if self.name not in METHODS and self.plugin is None:
             raise InputError(
-                f"unknown method {self.name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
+                f"unknown method {self.name!r}; choose from {', '.join(METHODS)}, or name its"
+                " plug-in file."
             )
         if self.plugin is not None:
-            given = {name: None for name in PASSED if name in self.plugin.arguments.parameters} | dict(self.settings)
+            given = {
+                name: None for name in PASSED if name in self.plugin.arguments.parameters
+            } | dict(self.settings)
             try:
                 self.plugin.arguments.bind(*[None] * (not self.plugin.iterates), **given)
             except TypeError as error:
@@ -58,7 +66,9 @@ class MethodSpec:
         self.backends(2, 3)
 
     def backends(self, *dims: int) -> str:
-        """Names and versions of the backends in any of these dimensions, "native" without; InputError if none works."""
+        """Names and versions of the backends in any of these dimensions, "native" without;
+        InputError if none works.
+        """
         return _backends(self.name, json.dumps(dict(self.settings)), dims)
 
 
@@ -83,7 +93,9 @@ def _backends(name: str, settings: str, dims: tuple[int, ...]) -> str:
 
 @dataclass(frozen=True)
 class Run:
-    """One run; `key` tells it apart from all others, in any campaign, until a backend's version changes."""
+    """One run; `key` tells it apart from all others, in any campaign, until a backend's version
+    changes.
+    """
 
     problem: ProblemSpec
     method: MethodSpec

@@ -1,7 +1,9 @@
-"""Results on disk: one JSON line per finished run, appended in one write; consolidated to Parquet, CSV for small tables.
+"""Results on disk: one JSON line per finished run, appended in one write; consolidated to Parquet,
+CSV for small tables.
 
-A campaign's folder holds `rows.jsonl` (appended while it runs), `rows.parquet` (the same, consolidated at its end) and
-`experiment.toml`. Killed at any moment, at most the last line is torn; it is cut off when the file is opened again.
+A campaign's folder holds `rows.jsonl` (appended while it runs), `rows.parquet` (the same,
+consolidated at its end) and `experiment.toml`. Killed at any moment, at most the last line is torn;
+it is cut off when the file is opened again.
 """
 
 from __future__ import annotations
@@ -44,9 +46,15 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "condition": ("float", "of Q on its range"),
     "guaranteed_mu": (
         "float",
-        "the alternating iteration contracts for every load below this largest friction coefficient",
+        (
+            "the alternating iteration contracts for every load below this largest friction"
+            " coefficient"
+        ),
     ),
-    "alternating_mu": ("float", "it does not for some load at this one (all contacts slip one way); the least such"),
+    "alternating_mu": (
+        "float",
+        "it does not for some load at this one (all contacts slip one way); the least such",
+    ),
     "tresca_mu": ("float", "the same for the Tresca iteration"),
     "method": ("str", "name with the settings given"),
     "name": ("str", "the method's name"),
@@ -64,16 +72,28 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "claimed": ("bool", "the method called its answer a solution"),
     "success": ("bool", "law_residual <= tolerance within the time limit"),
     "iterations": ("float", "outer iterations; nan if unknown"),
-    "residual": ("float", "natural-map residual of Coulomb's problem, recomputed; inf without a finite answer"),
+    "residual": (
+        "float",
+        "natural-map residual of Coulomb's problem, recomputed; inf without a finite answer",
+    ),
     "law_residual": ("float", "the same for the method's own law"),
-    "error": ("float", "|r - r_ref| / |r_ref|, r_ref the answer of least residual <= 1e-8 to this problem"),
+    "error": (
+        "float",
+        "|r - r_ref| / |r_ref|, r_ref the answer of least residual <= 1e-8 to this problem",
+    ),
     "build_seconds": ("float", "building the problem, wall; once per process"),
-    "solve_seconds": ("float", "the method's own time, wall: certificates along the way not counted"),
+    "solve_seconds": (
+        "float",
+        "the method's own time, wall: certificates along the way not counted",
+    ),
     "call_seconds": ("float", "wall time of the whole call"),
     "cpu_seconds": ("float", "CPU time of the whole call, all threads"),
     "peak_mb": ("float", "largest resident memory of the process during the call [MB]"),
     "base_mb": ("float", "resident memory before it [MB]"),
-    "history": ("str", "JSON: residual after each outer iteration, and the seconds until then; thinned to 100"),
+    "history": (
+        "str",
+        "JSON: residual after each outer iteration, and the seconds until then; thinned to 100",
+    ),
     "versions": ("str", "of Python, contactopt, NumPy and SciPy"),
     "machine": ("str", "processor and number of cores"),
     "time": ("str", "UTC, end of the run"),
@@ -91,7 +111,12 @@ STATUSES = {s.label: s.sentence for s in Status} | {
 }
 REFERENCE = 1e-8  # largest residual of a reference solution
 LATER = ("error",)  # columns that load() works out
-KINDS: dict[str, type | tuple[type, ...]] = {"int": int, "str": str, "float": (int, float), "bool": bool}
+KINDS: dict[str, type | tuple[type, ...]] = {
+    "int": int,
+    "str": str,
+    "float": (int, float),
+    "bool": bool,
+}
 _log = logging.getLogger(__name__)
 
 
@@ -100,24 +125,26 @@ def require(*modules: str) -> None:
 
     Parameters
     ----------
-    modules
-        Names of modules.
+    modules : Names of modules.
 
     Raises
     ------
-    InputError
-        If one is missing, with what to install.
+    InputError : If one is missing, with what to install.
     """
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        raise InputError(f"benchmarks need {', '.join(missing)}; install with: pip install 'contactopt[benchmark]'")
+        raise InputError(
+            f"benchmarks need {', '.join(missing)}; install with: pip install"
+            " 'contactopt[benchmark]'"
+        )
 
 
 class Store:
     """The appending end, for one campaign at a time (file lock). Use as a context manager."""
 
     def __init__(self, folder: Path, resume: bool):
-        """InputError if the folder holds results and `resume` is not set, if another campaign writes there, or if
+        """InputError if the folder holds results and `resume` is not set, if another campaign
+        writes there, or if
         nothing can be written.
         """
         self.path = folder / "rows.jsonl"
@@ -134,7 +161,9 @@ class Store:
             ) from error
         if os.fstat(self.descriptor).st_size and not resume:
             os.close(self.descriptor)
-            raise InputError(f"'{folder}' holds results already; add --resume to go on, or choose another --out.")
+            raise InputError(
+                f"'{folder}' holds results already; add --resume to go on, or choose another --out."
+            )
         self._cut_torn_tail()
 
     def __enter__(self) -> Store:
@@ -167,8 +196,8 @@ class Store:
         except OSError as error:
             os.ftruncate(self.descriptor, end)
             raise InputError(
-                f"cannot write into '{self.path}': {error.strerror}; finished runs are kept, make room and go on with "
-                "--resume."
+                f"cannot write into '{self.path}': {error.strerror}; finished runs are kept, make"
+                " room and go on with --resume."
             ) from error
 
 
@@ -179,18 +208,15 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
 
     Parameters
     ----------
-    path
-        The file.
+    path : The file.
 
     Yields
     ------
-    dict
-        A row.
+    A row.
 
     Raises
     ------
-    InputError
-        If a row has a newer schema.
+    InputError : If a row has a newer schema.
     """
     bad = 0
     with open(path, "rb") as file:
@@ -199,9 +225,14 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
                 row = json.loads(line)
             except (ValueError, RecursionError):
                 row = None
-            if isinstance(row, dict) and isinstance(row.get("schema"), int) and row["schema"] > SCHEMA:
+            if (
+                isinstance(row, dict)
+                and isinstance(row.get("schema"), int)
+                and row["schema"] > SCHEMA
+            ):
                 raise InputError(
-                    f"'{path}' was written by a newer version (schema {row['schema']}); update contactopt."
+                    f"'{path}' was written by a newer version (schema {row['schema']}); update"
+                    " contactopt."
                 )
             if _is_row(row):
                 yield row
@@ -217,7 +248,9 @@ def _is_row(row: Any) -> bool:
         return False
     for name, (kind, _) in COLUMNS.items():
         value = row.get(name)
-        if name not in LATER and (not isinstance(value, KINDS[kind]) or isinstance(value, bool) != (kind == "bool")):
+        if name not in LATER and (
+            not isinstance(value, KINDS[kind]) or isinstance(value, bool) != (kind == "bool")
+        ):
             return False
         if isinstance(value, int) and abs(value) >= 2**63:
             return False
@@ -229,13 +262,11 @@ def pack(reactions: np.ndarray) -> str:
 
     Parameters
     ----------
-    reactions
-        (k, dim) contact forces.
+    reactions : (k, dim) contact forces.
 
     Returns
     -------
-    str
-        The text of their bytes.
+    The text of their bytes.
     """
     return base64.b64encode(np.ascontiguousarray(reactions, dtype=float).tobytes()).decode()
 
@@ -247,29 +278,31 @@ def _unpack(text: str) -> np.ndarray:
 def load(path: str | Path) -> pd.DataFrame:
     """Read the table of a campaign, one row for each run, with the columns COLUMNS.
 
-    Parameters of the problem and settings of the method are added as columns problem.NAME and method.NAME.
+    Parameters of the problem and settings of the method are added as columns problem.NAME and
+    method.NAME.
 
     Parameters
     ----------
-    path
-        The folder of the campaign, or a rows.jsonl, .parquet or .csv.
+    path : The folder of the campaign, or a rows.jsonl, .parquet or .csv.
 
     Returns
     -------
-    DataFrame
-        The table.
+    The table.
 
     Raises
     ------
-    InputError
-        If there is no table, if it cannot be read, or if it has a newer schema.
+    InputError : If there is no table, if it cannot be read, or if it has a newer schema.
     """
     require("pandas", "pyarrow")
     import pandas as pd
 
     path = Path(path)
     if path.is_dir():
-        found = [path / f"rows.{kind}" for kind in ("jsonl", "parquet", "csv") if (path / f"rows.{kind}").exists()]
+        found = [
+            path / f"rows.{kind}"
+            for kind in ("jsonl", "parquet", "csv")
+            if (path / f"rows.{kind}").exists()
+        ]
         if not found:
             raise InputError(f"'{path}' holds no results (rows.jsonl, rows.parquet or rows.csv).")
         path = found[0]
@@ -281,13 +314,18 @@ def load(path: str | Path) -> pd.DataFrame:
         else:
             texts = {name: "str" for name, (kind, _) in COLUMNS.items() if kind == "str"}
             table = pd.read_csv(
-                path, dtype=texts, keep_default_na=False, na_values={n: ["", "nan"] for n in COLUMNS if n not in texts}
+                path,
+                dtype=texts,
+                keep_default_na=False,
+                na_values={n: ["", "nan"] for n in COLUMNS if n not in texts},
             )
         if len(table) and int(table["schema"].max()) > SCHEMA:
             raise InputError(f"'{path}' was written by a newer version; update contactopt.")
         for source, prefix in (("parameters", "problem"), ("settings", "method")):
             if source in table:
-                given = pd.DataFrame([dict(json.loads(text or "{}")) for text in table[source]], index=table.index)
+                given = pd.DataFrame(
+                    [dict(json.loads(text or "{}")) for text in table[source]], index=table.index
+                )
                 table = table.join(given.add_prefix(f"{prefix}."))
     except InputError:
         raise
@@ -326,20 +364,16 @@ def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None
 
     Parameters
     ----------
-    table
-        The rows.
-    path
-        The file, whose ending says the format.
-    columns
-        Some of COLUMNS; all by default.
+    table : The rows.
+    path : The file, whose ending says the format.
+    columns : Some of COLUMNS; all by default.
 
     Raises
     ------
-    InputError
-        If it cannot be written, as on a full disk.
+    InputError : If it cannot be written, as on a full disk.
     """
     path = Path(path)
-    chosen = table[[c for c in (columns or COLUMNS) if c in table]]
+    chosen = table[[c for c in columns or COLUMNS if c in table]]
 
     def write(file: Path) -> None:
         if path.suffix == ".parquet":

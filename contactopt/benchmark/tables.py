@@ -1,4 +1,6 @@
-"""Tables of a report: f(table, ...) -> DataFrame; and the choice of rows that figures and tables are made of."""
+"""Tables of a report: f(table, ...) -> DataFrame; and the choice of rows that figures and tables
+are made of.
+"""
 
 from __future__ import annotations
 
@@ -21,22 +23,17 @@ def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFr
 
     Parameters
     ----------
-    table
-        The rows.
-    law
-        The law; '' for all.
-    where
-        For a column a value or a list of them; '' stands for no value.
+    table : The rows.
+    law : The law; '' for all.
+    where : For a column a value or a list of them; '' stands for no value.
 
     Returns
     -------
-    DataFrame
-        The rows that are left, at least one.
+    The rows that are left, at least one.
 
     Raises
     ------
-    InputError
-        On an unknown column, or if no row is left.
+    InputError : On an unknown column, or if no row is left.
     """
     rows = table[table["law"] == law] if law else table
     for column, value in where.items():
@@ -54,17 +51,13 @@ def success_table(table: pd.DataFrame, by: str = "method", across: str = "settin
 
     Parameters
     ----------
-    table
-        The rows.
-    by
-        The column whose values have a row each.
-    across
-        The column whose values have a column each.
+    table : The rows.
+    by : The column whose values have a row each.
+    across : The column whose values have a column each.
 
     Returns
     -------
-    DataFrame
-        Percentages and failures.
+    Percentages and failures.
     """
     import pandas as pd
 
@@ -74,7 +67,10 @@ def success_table(table: pd.DataFrame, by: str = "method", across: str = "settin
     for name, runs in groups(table, by):
         right = float((runs["claimed"] == runs["success"]).mean())
         failures = runs.loc[~runs["success"], "status"].value_counts()
-        shares = {f"{prefix}{value} [%]": 100 * float(r["success"].mean()) for value, r in groups(runs, across)}
+        shares = {
+            f"{prefix}{value} [%]": 100 * float(r["success"].mean())
+            for value, r in groups(runs, across)
+        }
         rows.append(
             {by: name, "runs": len(runs), **shares, "right claim [%]": 100 * right}
             | {"failures": ", ".join(f"{n} {status}" for status, n in failures.items())}
@@ -85,24 +81,21 @@ def success_table(table: pd.DataFrame, by: str = "method", across: str = "settin
 def time_table(
     table: pd.DataFrame, metric: str = "solve_seconds", by: str = "method", across: str = "setting"
 ) -> pd.DataFrame:
-    """Compute the shifted geometric mean of times, a failure counted at its time limit, with median and quartiles.
+    """Compute the shifted geometric mean of times, a failure counted at its time limit, with median
+    and quartiles.
 
-    With shift sh = 1 ms it is exp(mean(log(t + sh))) - sh. The last column is the median over instances of the spread
-    (largest - least) / median of repeats.
+    With shift sh = 1 ms it is exp(mean(log(t + sh))) - sh. The last column is the median over
+    instances of the spread (largest - least) / median of repeats.
 
     Parameters
     ----------
-    table
-        The rows.
-    metric
-        The column with the times [s].
-    by, across
-        The columns whose values have a row each.
+    table : The rows.
+    metric : The column with the times [s].
+    by, across : The columns whose values have a row each.
 
     Returns
     -------
-    DataFrame
-        Times [s], and the mean over the least one.
+    Times [s], and the mean over the least one.
     """
     import pandas as pd
 
@@ -113,10 +106,29 @@ def time_table(
             times = r[metric].where(r["success"], r["time_limit"]).to_numpy(float)
             mean = float(np.exp(np.mean(np.log(times + SHIFT))) - SHIFT)
             solved = r.loc[r["success"], metric]
-            low, mid, high = (float(q) for q in solved.quantile([0.25, 0.5, 0.75])) if len(solved) else (np.nan,) * 3
-            repeats = r[r["success"]].groupby(INSTANCE)[metric].agg(lambda t: (t.max() - t.min()) / t.median())
-            rows.append({across: value, by: name, "solved": f"{len(solved)} of {len(r)}", "shifted mean": mean})
-            rows[-1] |= {"median": mid, "quartiles": f"{low:.2g} to {high:.2g}", "spread of repeats": repeats.median()}
+            low, mid, high = (
+                (float(q) for q in solved.quantile([0.25, 0.5, 0.75]))
+                if len(solved)
+                else (np.nan,) * 3
+            )
+            repeats = (
+                r[r["success"]]
+                .groupby(INSTANCE)[metric]
+                .agg(lambda t: (t.max() - t.min()) / t.median())
+            )
+            rows.append(
+                {
+                    across: value,
+                    by: name,
+                    "solved": f"{len(solved)} of {len(r)}",
+                    "shifted mean": mean,
+                }
+            )
+            rows[-1] |= {
+                "median": mid,
+                "quartiles": f"{low:.2g} to {high:.2g}",
+                "spread of repeats": repeats.median(),
+            }
         best = min(row["shifted mean"] for row in rows)
         out += [row | {"over the least": row["shifted mean"] / best} for row in rows]
     return pd.DataFrame(out)
@@ -127,20 +139,16 @@ def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
 
     Parameters
     ----------
-    table
-        The rows.
-    by
-        The column whose values are the names.
+    table : The rows.
+    by : The column whose values are the names.
 
     Returns
     -------
-    list
-        The name and the rows of each group.
+    The name and the rows of each group.
 
     Raises
     ------
-    InputError
-        If there is no such column.
+    InputError : If there is no such column.
     """
     if by not in table:
         raise InputError(f"the table has no column {by!r}.")

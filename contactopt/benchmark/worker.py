@@ -1,8 +1,9 @@
-"""What the processes do in which code of the user runs: list what plug-ins declare, build problems, run methods.
+"""What the processes do in which code of the user runs: list what plug-ins declare, build problems,
+run methods.
 
-They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them from outside. Each keeps
-its plug-ins, its problem and what is imported from call to call. What runs methods gets its problems from outside and judges
-nothing.
+They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them
+from outside. Each keeps its plug-ins, its problem and what is imported from call to call. What runs
+methods gets its problems from outside and judges nothing.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAl
 
 @dataclass
 class Kept:
-    """What a process keeps: plug-ins, and the problem of that label with its warm start, or why it has none."""
+    """What a process keeps: plug-ins, and the problem of that label with its warm start, or why it
+    has none.
+    """
 
     plugins: Registry = field(default_factory=Registry)
     label: str = ""
@@ -52,10 +55,8 @@ def prepare(noise: str, parent: int) -> None:
 
     Parameters
     ----------
-    noise
-        The file for all that is printed.
-    parent
-        The number of the process of the campaign.
+    noise : The file for all that is printed.
+    parent : The number of the process of the campaign.
     """
     if sys.platform == "linux":
         import ctypes
@@ -71,7 +72,9 @@ def prepare(noise: str, parent: int) -> None:
 
 
 def inspect(paths: tuple[str, ...], names: list[str]) -> Catalogue | str:
-    """What plug-in files declare, and the entry points of these names; a sentence if a plug-in fails."""
+    """What plug-in files declare, and the entry points of these names; a sentence if a plug-in
+    fails.
+    """
     try:
         _kept.plugins.load(paths)
         return declared(_kept.plugins, names)
@@ -81,7 +84,9 @@ def inspect(paths: tuple[str, ...], names: list[str]) -> Catalogue | str:
         return f"a plug-in cannot be used: {type(error).__name__}: {error}"
 
 
-def build(spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
+def build(
+    spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float
+) -> dict[str, Any]:
     """A problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
     _limit_memory(memory_limit)
     try:
@@ -91,9 +96,14 @@ def build(spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_lim
         seconds = time.perf_counter() - begin
         if isinstance(problem.Q, InterfaceOperator):
             raise InputError(
-                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
+                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other"
+                " processes."
             )
-        return {"problem": problem, "build_seconds": seconds, "diagnosis": _diagnosis(problem) if diagnosed else {}}
+        return {
+            "problem": problem,
+            "build_seconds": seconds,
+            "diagnosis": _diagnosis(problem) if diagnosed else {},
+        }
     except (Exception, SystemExit) as error:
         return {"error": one_line(error)}
 
@@ -105,7 +115,9 @@ def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
 
 
 def warm_up(task: Task, dim: int) -> None:
-    """Run the method untimed on a problem of two contacts, so that imports and compilation are not timed later."""
+    """Run the method untimed on a problem of two contacts, so that imports and compilation are not
+    timed later.
+    """
     Q = np.eye(2 * dim) + 0.1
     q = np.zeros((2, dim))
     q[:, 0], q[:, 1] = -1.0, 0.5
@@ -121,7 +133,9 @@ def find_start(label: str) -> None:
     problem = _kept.problem
     if problem is None or _kept.label != label or _kept.start is not None:
         return
-    q, s = (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
+    q, s = (
+        (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
+    )
     try:
         found = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
         if not found.solved:
@@ -139,7 +153,9 @@ def execute(task: Task) -> Answer | None:
     if task.run.start == "warm" and _kept.start is None:
         return no_answer("not_built", _kept.missing or "no warm start")
     _limit_memory(task.memory_limit)
-    answer = measure(task, problem, _kept.start if task.run.start == "warm" else None, _kept.plugins)
+    answer = measure(
+        task, problem, _kept.start if task.run.start == "warm" else None, _kept.plugins
+    )
     _only(own)
     return answer
 
@@ -164,7 +180,9 @@ def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
 
 
 def _limit_memory(gigabytes: float) -> None:
-    """Bound the data of this process; beyond what it holds now also all that is mapped, as shared memory is."""
+    """Bound the data of this process; beyond what it holds now also all that is mapped, as shared
+    memory is.
+    """
     import resource
 
     import psutil

@@ -1,4 +1,5 @@
-"""Bodies as matrices: what the interface needs to know of them stands in contactopt.bodies.protocol.
+"""Bodies as matrices: what the interface needs to know of them stands in
+contactopt.bodies.protocol.
 
 A new kind of body is one module and one line of the table BODIES.
 """
@@ -13,9 +14,14 @@ from contactopt.bodies.ranks import RemotePart
 from contactopt.errors import InputError
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
-# class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody, what it is)
+# class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody,
+# what it is)
 BODIES: dict[type, tuple[str, str, str]] = {
-    Part: ("contactopt.bodies.elastic", "assemble_elastic", "finite elements with linear elasticity"),
+    Part: (
+        "contactopt.bodies.elastic",
+        "assemble_elastic",
+        "finite elements with linear elasticity",
+    ),
     RemotePart: ("contactopt.bodies.remote", "assemble_remote", "finite elements on another rank"),
     Rigid: ("contactopt.bodies.rigid", "assemble_rigid", "a rigid body"),
     HalfSpace: (
@@ -31,25 +37,26 @@ def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> Asse
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its parts.
-    elements, zone
-        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+    scene, part : The scene and one of its parts.
+    elements, zone : Number of elements across the contact half-width, and the half-width that the
+        mesh resolves [length].
 
     Returns
     -------
-    AssembledBody
-        The body as matrices, whose linear system is not solved yet.
+    The body as matrices, whose linear system is not solved yet.
 
     Raises
     ------
-    InputError
-        For a part of a class that no kind of body models, and for parts that cannot be modelled.
+    InputError : For a part of a class that no kind of body models, and for parts that cannot be
+        modelled.
     """
     for kind in type(part).__mro__:  # the class itself before what it derives from
         if kind in BODIES:
             module, function, _ = BODIES[kind]
-            made: AssembledBody = getattr(import_module(module), function)(scene, part, elements, zone)
+            made: AssembledBody = getattr(import_module(module), function)(
+                scene, part, elements, zone
+            )
             return made
-    known = ", ".join(kind.__name__ for kind in BODIES if kind is not RemotePart)  # which no user writes
+    # which no user writes
+    known = ", ".join(kind.__name__ for kind in BODIES if kind is not RemotePart)
     raise InputError(f"a body of a scene must be one of {known}; got {type(part).__name__}.")

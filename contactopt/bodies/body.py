@@ -1,7 +1,9 @@
-"""One elastic body as matrices: stiffness, loads, held and driven degrees of freedom, contact nodes.
+"""One elastic body as matrices: stiffness, loads, held and driven degrees of freedom, contact
+nodes.
 
-Finite elements of scikit-fem on the mesh that a Part gives, of the scene's degree. Every integral carries the weight of
-the scene's kind (thickness, 2 pi r, mirror images), so that forces and areas are those of the whole body.
+Finite elements of scikit-fem on the mesh that a Part gives, of the scene's degree. Every integral
+carries the weight of the scene's kind (thickness, 2 pi r, mirror images), so that forces and areas
+are those of the whole body.
 """
 
 from __future__ import annotations
@@ -38,11 +40,13 @@ class Assembly:
     prescribed (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
     plate_forces (p,) total forces on them
-    traces  name of each candidate contact boundary -> trace of the displacement there: nodes, areas, normals, weights, cells
+    traces  name of each candidate contact boundary -> trace of the displacement there: nodes,
+            areas, normals, weights, cells
     rigid_motions  rigid motions that no support and no plate holds
     driven  what each column of `motion` is, for messages
-    holders name of each support and plate -> the unknowns that it holds or drives, each unknown with one of them
-    mirrored (dim, n / dim) nodes in planes across an axis beyond which the body goes on as its mirror image
+    holders name of each support and plate -> the unknowns that it holds or drives, each unknown
+    with one of them mirrored (dim, n / dim) nodes in planes across an axis beyond which the body
+    goes on as its mirror image
     """
 
     name: str
@@ -103,7 +107,9 @@ class Assembly:
         return isotropic_stiffness(self.basis, lame_by_poisson(self.material), self.weight)
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
-        """dA U (n,), the derivative of the elastic forces by the material's constant 'E' or 'nu' at fixed displacements U."""
+        """dA U (n,), the derivative of the elastic forces by the material's constant 'E' or 'nu' at
+        fixed displacements U.
+        """
         return np.asarray(self.A @ U / self.material.E if constant == "E" else self.by_poisson @ U)
 
     @property
@@ -123,7 +129,9 @@ class Assembly:
 
     @property
     def contact_dofs(self) -> np.ndarray:
-        """Displacement unknowns of all nodes of the contact boundaries, (m, dim); m = k but for quadratic simplices."""
+        """Displacement unknowns of all nodes of the contact boundaries, (m, dim); m = k but for
+        quadratic simplices.
+        """
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
 
 
@@ -132,39 +140,48 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its parts.
-    elements, zone
-        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+    scene, part : The scene and one of its parts.
+    elements, zone : Number of elements across the contact half-width, and the half-width that the
+        mesh resolves [length].
 
     Returns
     -------
-    Assembly
-        Stiffness [force / length], loads [force], held and driven unknowns, contact nodes and free motions.
+    Stiffness [force / length], loads [force], held and driven unknowns, contact nodes and free
+    motions.
 
     Raises
     ------
-    InputError
-        For a mesh that cannot be used, such as one in several pieces, and for supports and loads that do not fit.
+    InputError : For a mesh that cannot be used, such as one in several pieces, and for supports and
+        loads that do not fit.
     """
     mesh = part.build_mesh(elements, zone)
     check_mesh(scene, part, mesh)
     axisymmetric = scene.kind == "axisymmetric"
-    factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
+    factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[
+        scene.kind
+    ] * scene.copies
     weight = (factor, axisymmetric)
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, axisymmetric)
     A = stiffness(basis, part.material, weight)
     pieces = connected_components(A, directed=False)[0]
     if pieces > 1:
         raise InputError(
-            f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to no element, "
-            "merge duplicated nodes, or model each piece as a body of its own."
+            f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to"
+            " no element, merge duplicated nodes, or model each piece as a body of its own."
         )
     prescribed, held, motion, plate_forces, driven, holders = _constraints(scene, part, basis)
-    rigid_motions = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
+    rigid_motions = free_motions(
+        scene.kind, scene.components, basis, node_unknowns(basis), held, weight
+    )
     check_free(part.name, A, rigid_motions)
     contacts = {
-        name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight, scene.laws_of(part, name) == {"tied"})
+        name: contact_trace(
+            basis,
+            scene.degree,
+            mesh.boundaries[name],
+            weight,
+            scene.laws_of(part, name) == {"tied"},
+        )
         for name in scene.surfaces_of(part)
     }
     return Assembly(
@@ -188,19 +205,17 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 
 
 def guides_of(body: Assembly, part: Part) -> Guides:
-    """Find the extent of a body and the planes on which supports hold it along the normal of the plane alone, at zero.
+    """Find the extent of a body and the planes on which supports hold it along the normal of the
+    plane alone, at zero.
 
     Parameters
     ----------
-    body
-        The assembled body.
-    part
-        Its part of the scene.
+    body : The assembled body.
+    part : Its part of the scene.
 
     Returns
     -------
-    Guides
-        The extent and the planes that lie across a coordinate axis and have the whole body on one side.
+    The extent and the planes that lie across a coordinate axis and have the whole body on one side.
     """
     x = body.locations
     extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
@@ -225,27 +240,30 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
 
     Parameters
     ----------
-    body
-        The assembled body.
-    scene, part
-        The other scene, and its part that stands for the same body.
+    body : The assembled body.
+    scene, part : The other scene, and its part that stands for the same body.
 
     Returns
     -------
-    Assembly
-        The same body with other load values.
+    The same body with other load values.
 
     Raises
     ------
-    InputError
-        If other unknowns are held or driven there.
+    InputError : If other unknowns are held or driven there.
     """
     prescribed, held, motion, plate_forces, *_ = _constraints(scene, part, body.basis)
-    if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
-        raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
+    if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(
+        motion, body.motion
+    ):
+        raise InputError(
+            f"body '{part.name}': supports or plates hold other unknowns than before; reduce it"
+            " anew."
+        )
     mirrored = mirrored_nodes(scene, part, body.basis, held)
     load = _load(part, body.basis, body.weight)
-    return replace(body, load=load, prescribed=prescribed, plate_forces=plate_forces, mirrored=mirrored)
+    return replace(
+        body, load=load, prescribed=prescribed, plate_forces=plate_forces, mirrored=mirrored
+    )
 
 
 def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
@@ -253,29 +271,34 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
 
     Parameters
     ----------
-    scene
-        The scene of the part.
-    part
-        An elastic body of the scene.
-    mesh
-        Its mesh.
+    scene : The scene of the part.
+    part : An elastic body of the scene.
+    mesh : Its mesh.
 
     Raises
     ------
-    InputError
-        If the mesh has another dimension, elements that are not known, numbers that are not finite, points on the wrong
-        side of an axis of revolution, or lacks a boundary that the part names.
+    InputError : If the mesh has another dimension, elements that are not known, numbers that are
+        not finite, points on the wrong side of an axis of revolution, or lacks a boundary that the
+        part names.
     """
-    if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in SHAPES:
+    if (
+        not isinstance(mesh, skfem.Mesh)
+        or mesh.p.shape[0] != scene.dim
+        or mesh.refdom.__name__ not in SHAPES
+    ):
         raise InputError(
-            f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "
-            f"triangles, quadrilaterals, tetrahedra or hexahedra; got {type(mesh).__name__}."
+            f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension"
+            f" {scene.dim} made of triangles, quadrilaterals, tetrahedra or hexahedra; got"
+            f" {type(mesh).__name__}."
         )
     if not np.all(np.isfinite(mesh.p)):
-        raise InputError(f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers.")
+        raise InputError(
+            f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers."
+        )
     if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
         raise InputError(
-            f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is {mesh.p[0].min():g}."
+            f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is"
+            f" {mesh.p[0].min():g}."
         )
     known = mesh.boundaries or {}
     names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
@@ -310,7 +333,9 @@ def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.
 def _constraints(
     scene: Scene, part: Part, basis: skfem.CellBasis
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[str, ...], dict[str, np.ndarray]]:
-    """Prescribed displacements, mask of unknowns that are not free, plate motions, forces and names, and who holds what."""
+    """Prescribed displacements, mask of unknowns that are not free, plate motions, forces and
+    names, and who holds what.
+    """
     prescribed, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
     table = node_unknowns(basis)
 
@@ -325,13 +350,18 @@ def _constraints(
         holders[name] = np.union1d(holders.get(name, known[:0]), np.setdiff1d(where, known))
 
     for support in part.supports:
-        values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
+        values = (
+            dict.fromkeys(scene.components, 0.0)
+            if support.displacement is None
+            else support.displacement
+        )
         for component, value in values.items():
             where = unknowns(support.boundary, component)
             if np.any(held[where] & (prescribed[where] != value)):
                 raise InputError(
-                    f"body '{part.name}': the support on {support.boundary!r} prescribes {component} = {value:g} at a "
-                    "node where another support prescribes a different value."
+                    f"body '{part.name}': the support on {support.boundary!r} prescribes"
+                    f" {component} = {value:g} at a node where another support prescribes a"
+                    " different value."
                 )
             prescribed[where], held[where] = value, True
             holds(f"support '{support.boundary}'", where)
@@ -343,8 +373,8 @@ def _constraints(
             if component in plate.force:
                 if np.any(supported[where]):
                     raise InputError(
-                        f"body '{part.name}': the plate on {plate.boundary!r} moves in {component}, but a support or "
-                        "another plate holds one of its nodes in that component."
+                        f"body '{part.name}': the plate on {plate.boundary!r} moves in {component},"
+                        " but a support or another plate holds one of its nodes in that component."
                     )
                 column = np.zeros(basis.N)
                 column[where] = 1.0
@@ -355,8 +385,8 @@ def _constraints(
                 continue
             elif np.any(prescribed[where] != 0):
                 raise InputError(
-                    f"body '{part.name}': a support moves the plate on {plate.boundary!r}, which holds {component}; "
-                    "drop the plate or the support."
+                    f"body '{part.name}': a support moves the plate on {plate.boundary!r}, which"
+                    f" holds {component}; drop the plate or the support."
                 )
             held[where] = True
             holds(f"plate '{plate.boundary}'", where)

@@ -1,18 +1,20 @@
 """One elastic body condensed to its contact unknowns and free motions.
 
-A rigid plate on the body moves it: the plate's unit motion M, extended into the body by the stiffness A, is the
-displacement field Z = M - A_ff^-1 A_f: M. Contact forces F and loads f meet in the balance of the plates,
+A rigid plate on the body moves it: the plate's unit motion M, extended into the body by the
+stiffness A, is the displacement field Z = M - A_ff^-1 A_f: M. Contact forces F and loads f meet in
+the balance of the plates,
 
     Z' A Z lambda = p + Z' (f - A g) + Z' F,
 
 with the total forces p on the plates and the displacements g that supports prescribe.
 
-Motions that no support resists, the kernel of Z' A Z, become multipliers of the interface problem. The others add to the
-compliance: C = A_ff^-1 + E E', where each column of E, the elastic modes, is one of them divided by the square root of its
-stiffness.
+Motions that no support resists, the kernel of Z' A Z, become multipliers of the interface problem.
+The others add to the compliance: C = A_ff^-1 + E E', where each column of E, the elastic modes, is
+one of them divided by the square root of its stiffness.
 
-Rigid motions that neither supports nor plates hold are multipliers, too. A_ff^-1 is then the generalised inverse of
-contactopt.bodies.motions, the inverse G on the unknowns `kept` with a correction of low rank.
+Rigid motions that neither supports nor plates hold are multipliers, too. A_ff^-1 is then the
+generalised inverse of contactopt.bodies.motions, the inverse G on the unknowns `kept` with a
+correction of low rank.
 """
 
 from __future__ import annotations
@@ -52,10 +54,12 @@ class ElasticBody:
     at_rest     (n,) displacement without contact forces and multipliers [length]
     relief      (n, i) the fields Y of the i free rigid motions (contactopt.bodies.motions)
     extended    (n, j) displacement fields Z of all plate motions
-    modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic resistance, scaled so
-                that the elastic modes E = Z modes[1] add E E' to the compliance
+    modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic
+                resistance, scaled so that the elastic modes E = Z modes[1] add E E' to the
+                compliance
     resultants  (p + i,) resultants s of the loads in the free motions, those of plates first
-    ground      (n, n) stiffness of a ground that holds the body meanwhile, and pull (n,) its forces (contactopt.bodies.thin)
+    ground      (n, n) stiffness of a ground that holds the body meanwhile, and pull (n,) its forces
+                (contactopt.bodies.thin)
     """
 
     body: Assembly
@@ -101,17 +105,23 @@ class ElasticBody:
         if iteration is None:
             return None
         kept, everywhere = self.kept, sp.identity(len(self.body.load), format="csr")
-        return Equilibrium(*iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
+        return Equilibrium(
+            *iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere)
+        )
 
     @property
     def interface_compliance(self) -> np.ndarray:
-        """(m, m) block of A_ff^-1 on `interface` [length / force]; InputError if the body was not prepared for it."""
+        """(m, m) block of A_ff^-1 on `interface` [length / force]; InputError if the body was not
+        prepared for it.
+        """
         return self.solver.trailing_inverse()
 
     @cached_property
     def motions(self) -> np.ndarray:
         """(n, p + i) displacement fields of the free motions, those of plates first."""
-        return np.concatenate([self.extended @ self.modes[0], self.body.rigid_motions.fields], axis=1)
+        return np.concatenate(
+            [self.extended @ self.modes[0], self.body.rigid_motions.fields], axis=1
+        )
 
     @property
     def motion_names(self) -> tuple[str, ...]:
@@ -151,16 +161,21 @@ class ElasticBody:
         return None
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        # T G T' from the block of G on the contact unknowns, and T C T' with what is of low rank; both made symmetric.
+        # T G T' from the block of G on the contact unknowns, and T C T' with what is of low rank;
+        # both made symmetric.
         local, (left, right) = T[:, self.interface], self._low_rank(T)
         C, added = local @ (local @ self.interface_compliance).T, left @ right.T
         return np.asarray((C + C.T) / 2 + (added + added.T) / 2)
 
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(self._low_rank(T)[1]).sum(axis=1)
+        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(
+            self._low_rank(T)[1]
+        ).sum(axis=1)
         return np.asarray(size > 0)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
+    def displacement(
+        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+    ) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
         if free is not None and self.equilibrium is not None:
             left, right = self.equilibrium.low_rank
@@ -171,26 +186,43 @@ class ElasticBody:
         return np.asarray(self._under(force) + self.motions @ multipliers)
 
     def _under(self, force: np.ndarray) -> np.ndarray:
-        """Displacement (n,) under the loads, supports, plates and nodal forces (n,), with multipliers of zero."""
+        """Displacement (n,) under the loads, supports, plates and nodal forces (n,), with
+        multipliers of zero.
+        """
         body = self.body
         missing = body.load + force + self.pull - self._stiffness @ body.prescribed
         resisted = body.plate_forces + self.extended.T @ missing
-        return np.asarray(body.prescribed + self.elastic_modes @ (self.modes[1].T @ resisted) + self.relieved(missing))
+        return np.asarray(
+            body.prescribed
+            + self.elastic_modes @ (self.modes[1].T @ resisted)
+            + self.relieved(missing)
+        )
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
-        """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at rest."""
+        """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at
+        rest.
+        """
         U, Z = np.zeros(force.shape), self.body.rigid_motions.fields
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
 
-    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def material_change(
+        self, constant: str, U: np.ndarray, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         missing = -self.body.stiffness_change(constant, U)  # acts like a load
-        return self.elastic_modes @ (self.elastic_modes.T @ missing) + self.relieved(missing), self.motions.T @ missing
+        return (
+            self.elastic_modes @ (self.elastic_modes.T @ missing) + self.relieved(missing),
+            self.motions.T @ missing,
+        )
 
-    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+    def material_work(
+        self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray
+    ) -> float:
         return -float(W @ self.body.stiffness_change(constant, U))
 
-    def load_work(self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+    def load_work(
+        self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
+    ) -> float:
         old, new = self.body, reload_body(self.body, scene, part)
         prescribed, plates = new.prescribed - old.prescribed, self.modes[0].shape[1]
         driven = self.modes[1] @ (self.elastic_modes.T @ dual) + self.modes[0] @ weights[:plates]
@@ -207,7 +239,9 @@ class ElasticBody:
         return float(U @ (self.body.A @ U)) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """Loads on free unknowns, reactions of supports, and on the unknowns of each plate its total force, shared out."""
+        """Loads on free unknowns, reactions of supports, and on the unknowns of each plate its
+        total force, shared out.
+        """
         body, F = self.body, self.body.A @ U
         F[body.free] = body.load[body.free]
         total = body.plate_forces + body.motion.T @ body.load
@@ -237,7 +271,11 @@ class ElasticBody:
 
     def on_elements(self, values: np.ndarray) -> np.ndarray:
         dofs = self.body.basis.element_dofs
-        return np.asarray((values / np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1))[dofs].sum(axis=0))
+        return np.asarray(
+            (values / np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1))[dofs].sum(
+                axis=0
+            )
+        )
 
     def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
         return stress_map(self.body, region, by_poisson)
@@ -289,7 +327,8 @@ class AssembledElastic:
         name = name or self.part.contact
         if name not in self.body.traces:
             raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has {', '.join(sorted(self.body.traces))}."
+                f"body '{self.name}' has no contact surface {name!r}; it has"
+                f" {', '.join(sorted(self.body.traces))}."
             )
         return self._surfaces[name]
 
@@ -321,7 +360,17 @@ class AssembledElastic:
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            Mesh(kind, body.degree, faces, outward, body.weight, body.locations, unknowns, held, curve),
+            Mesh(
+                kind,
+                body.degree,
+                faces,
+                outward,
+                body.weight,
+                body.locations,
+                unknowns,
+                held,
+                curve,
+            ),
         )
 
     def guides(self) -> Guides:
@@ -334,12 +383,15 @@ class AssembledElastic:
         return condense(self.body, solver, entries)
 
 
-def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray) -> sp.csr_matrix:
+def _trace(
+    weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
+) -> sp.csr_matrix:
     """One component of the displacement of the contacts (k,) in terms of all unknowns (n,).
 
-    In general the neighbours of a contact node take part, by its row of the weights. Where the component is prescribed at
-    the contact node itself, as on a plane of symmetry, its displacement is that of the node alone: the weights of a
-    neighbour and of its mirror image, which the model leaves out, cancel each other there.
+    In general the neighbours of a contact node take part, by its row of the weights. Where the
+    component is prescribed at the contact node itself, as on a plane of symmetry, its displacement
+    is that of the node alone: the weights of a neighbour and of its mirror image, which the model
+    leaves out, cancel each other there.
     """
     k = len(nodes)
     alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
@@ -350,25 +402,24 @@ def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held
     return trace
 
 
-def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None) -> AssembledElastic:
+def assemble_elastic(
+    scene: Scene, part: Part, elements: int, zone: float | None
+) -> AssembledElastic:
     """Assemble an elastic part of a scene.
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its parts.
-    elements, zone
-        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+    scene, part : The scene and one of its parts.
+    elements, zone : Number of elements across the contact half-width, and the half-width that the
+        mesh resolves [length].
 
     Returns
     -------
-    AssembledElastic
-        The body as matrices, whose linear system is not solved yet.
+    The body as matrices, whose linear system is not solved yet.
 
     Raises
     ------
-    InputError
-        For a part that cannot be modelled.
+    InputError : For a part that cannot be modelled.
     """
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
@@ -380,22 +431,18 @@ def condense(
 
     Parameters
     ----------
-    body
-        The assembled body.
-    solver
-        'auto' or a name in contactopt.bodies.solvers.SOLVERS.
-    entries
-        Whether to eliminate the contact unknowns last, so that the factors hold their Schur complement: this makes the
-        entries of the compliance cheap, and serves an explicit Q.
-    ground
-        (n, n) stiffness that is added (contactopt.bodies.thin), if any.
+    body : The assembled body.
+    solver : 'auto' or a name in contactopt.bodies.solvers.SOLVERS.
+    entries : Whether to eliminate the contact unknowns last, so that the factors hold their Schur
+        complement: this makes the entries of the compliance cheap, and serves an explicit Q.
+    ground : (n, n) stiffness that is added (contactopt.bodies.thin), if any.
 
     Returns
     -------
-    ElasticBody
-        The body, which moves under contact forces.
+    The body, which moves under contact forces.
     """
-    # The free unknowns without the fixing ones, with node and component of each, and those of the contact surfaces.
+    # The free unknowns without the fixing ones, with node and component of each, and those of the
+    # contact surfaces.
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
@@ -411,9 +458,13 @@ def condense(
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
     # Y, with which the generalised inverse of a floating body is G - Z Y' - Y Z'.
     relief = _relief(body, made, kept)
-    # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
+    # A plate that alone holds a body along itself moves it as a rigid whole, for which there is
+    # nothing to solve.
     extended = _rigid_extension(body)
-    lacking, forces = (np.abs((whole @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
+    lacking, forces = (
+        np.abs((whole @ motion)[kept]).max(axis=0, initial=0.0)
+        for motion in (extended, body.motion)
+    )
     strained = lacking > RIGID * forces
     # The extension of the other plate motions M into the body: Z = M - A_ff^-1 A_f: M.
     if strained.any():
@@ -421,14 +472,29 @@ def condense(
     # Rigid motions are multipliers of their own, so that plate motions have no part along them.
     if len(body.rigid_motions.names):
         extended -= body.rigid_motions.fields @ (body.rigid_motions.forces.T @ extended)
-    # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes E = Z v /
+    # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes E
+    # = Z v /
     # stiffness^1/2.
     K = extended.T @ (whole @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
-    moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (whole @ body.motion), axis=0), initial=0.0)
-    free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
+    moves = stiffness <= KERNEL * np.max(
+        np.sum(body.motion * (whole @ body.motion), axis=0), initial=0.0
+    )
+    # keep one multiplier per plate component
+    free = np.eye(len(K)) if moves.all() else vectors[:, moves]
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
-    parts = body, made, kept, interface, body.prescribed, relief, extended, modes, body.plate_forces, ground
+    parts = (
+        body,
+        made,
+        kept,
+        interface,
+        body.prescribed,
+        relief,
+        extended,
+        modes,
+        body.plate_forces,
+        ground,
+    )
     return _at_rest(ElasticBody(*parts), body)
 
 
@@ -443,10 +509,11 @@ def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
 
 
 def _rigid_extension(body: Assembly) -> np.ndarray:
-    """The unit motions of the plates (n, p) with the unknowns of the same component moved along by as much.
+    """The unit motions of the plates (n, p) with the unknowns of the same component moved along by
+    as much.
 
-    These are translations of the body where no support holds another part of it in that component. The free unknowns of a
-    body that is held elsewhere stay at rest.
+    These are translations of the body where no support holds another part of it in that component.
+    The free unknowns of a body that is held elsewhere stay at rest.
     """
     extended, fixed = body.motion.copy(), np.ones(len(body.load), dtype=bool)
     fixed[body.free] = False
@@ -459,8 +526,13 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
 
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
-    # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p + Z' (f - A g).
-    resisted = body.plate_forces + old.extended.T @ (body.load + old.pull - old._stiffness @ body.prescribed)
-    resultants = np.concatenate([old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load])
+    # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p
+    # + Z' (f - A g).
+    resisted = body.plate_forces + old.extended.T @ (
+        body.load + old.pull - old._stiffness @ body.prescribed
+    )
+    resultants = np.concatenate(
+        [old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load]
+    )
     new = replace(old, body=body, resultants=resultants)
     return replace(new, at_rest=new._under(np.zeros(len(body.load))))

@@ -1,18 +1,21 @@
 """Displacement of degree 1 or 2 on simplices and bricks, and its trace on the contact surface.
 
-Quadratic shape functions N_j cannot weigh contact forces themselves: on the faces of tetrahedra, and next to an axis of
-symmetry, their integrals vanish at the vertices. So the contact surface is covered by linear cells with hat functions
-phi_i and nodal areas A_i = int phi_i > 0, and their nodes are the contacts: the halves and quarters of the faces of
-quadrilaterals and hexahedra, the whole faces of triangles and tetrahedra, whose forces at vertices and edges would
-alternate (experiments.questions.elements). A contact force r_i acts on the nodes j by r_i W_ij, the displacement at contact i is
-W_ij u_j,
+Quadratic shape functions N_j cannot weigh contact forces themselves: on the faces of tetrahedra,
+and next to an axis of symmetry, their integrals vanish at the vertices. So the contact surface is
+covered by linear cells with hat functions phi_i and nodal areas A_i = int phi_i > 0, and their
+nodes are the contacts: the halves and quarters of the faces of quadrilaterals and hexahedra, the
+whole faces of triangles and tetrahedra, whose forces at vertices and edges would alternate
+(experiments.questions.elements). A contact force r_i acts on the nodes j by r_i W_ij, the
+displacement at contact i is W_ij u_j,
 
-    W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i   (dual basis).
+    W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i
+                                   (dual basis).
 
-The psi_i add up to one: W has unit row sums, and A_i W_ij sums to int N_j, so that uniform pressure is exact. At degree
-1 W is the identity. Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange
-multiplier, SIAM J. Numer. Anal. 38, 989-1012; Popp, Wohlmuth, Gee, Wall (2012), Dual quadratic mortar finite element
-methods for 3D finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
+The psi_i add up to one: W has unit row sums, and A_i W_ij sums to int N_j, so that uniform pressure
+is exact. At degree 1 W is the identity. Sources: Wohlmuth (2000), A mortar finite element method
+using dual spaces for the Lagrange multiplier, SIAM J. Numer. Anal. 38, 989-1012; Popp, Wohlmuth,
+Gee, Wall (2012), Dual quadratic mortar finite element methods for 3D finite deformation contact,
+SIAM J. Sci. Comput. 34, B421-B446.
 """
 
 from __future__ import annotations
@@ -33,21 +36,35 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, is_curved
 
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
-_TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
+_TRIANGLE = (
+    RefTri,
+    skfem.ElementTriP1(),
+    np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]]),
+)
 _SQUARE = (
     RefQuad,
     skfem.ElementQuad1(),
-    np.array([[0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5], [0.0, 0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.5]]),
+    np.array(
+        [
+            [0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5],
+            [0.0, 0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.5],
+        ]
+    ),
 )
-# faces: reference cell, hat functions, places of the quadratic nodes with the vertices first; the cells at degree 2
+# faces: reference cell, hat functions, places of the quadratic nodes with the vertices first; the
+# cells at degree 2
 FACES = {
     "RefTri": (*_LINE, np.array([[0, 1]])),
     "RefQuad": (*_LINE, np.array([[0, 2], [2, 1]])),
     "RefTet": (*_TRIANGLE, np.array([[0, 1, 2]])),
     "RefHex": (*_SQUARE, np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])),
 }
-# cells whose nodes are all those of a quadratic face: a tied surface must leave no node of it behind
-TIED = {"RefTri": FACES["RefQuad"][3], "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]])}
+# cells whose nodes are all those of a quadratic face: a tied surface must leave no node of it
+# behind
+TIED = {
+    "RefTri": FACES["RefQuad"][3],
+    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
+}
 NOISE = 1e-14  # what rounding leaves of a zero
 
 
@@ -69,19 +86,17 @@ class Trace(NamedTuple):
 
 
 def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
-    """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an axisymmetric scene.
+    """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an
+    axisymmetric scene.
 
     Parameters
     ----------
-    weight
-        The constant, and whether the scene is axisymmetric.
-    x
-        (dim, ...) places [length].
+    weight : The constant, and whether the scene is axisymmetric.
+    x : (dim, ...) places [length].
 
     Returns
     -------
-    ndarray or float
-        The measure (...) in an axisymmetric scene, else one number.
+    The measure (...) in an axisymmetric scene, else one number.
     """
     factor, axisymmetric = weight
     return factor * x[0] if axisymmetric else factor
@@ -90,21 +105,18 @@ def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
     """Make the vector-valued displacement basis of a mesh.
 
-    Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor 1/r.
+    Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor
+    1/r.
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh.
-    degree
-        Degree of the displacement, 1 or 2.
-    axisymmetric
-        Whether the integrals carry the weight r.
+    mesh : A scikit-fem mesh.
+    degree : Degree of the displacement, 1 or 2.
+    axisymmetric : Whether the integrals carry the weight r.
 
     Returns
     -------
-    CellBasis
-        The basis of N unknowns.
+    The basis of N unknowns.
     """
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
@@ -130,17 +142,25 @@ class LeanBasis(skfem.CellBasis):
         self.basis = _Shapes(element, self.mapping, self.X, self.Nbfun)
 
     def _volumes(self) -> np.ndarray:
-        """Volume per reference volume, elements by quadrature points; InputError for an element that is flat or folds over."""
+        """Volume per reference volume, elements by quadrature points; InputError for an element
+        that is flat or folds over.
+        """
         bad = np.zeros(self.nelems, dtype=bool)
         with np.errstate(all="ignore"):
             try:
                 ratio = np.broadcast_to(self.mapping.detDF(self.X), (self.nelems, len(self.W)))
                 bad = ~((ratio.min(axis=1) > 0) | (ratio.max(axis=1) < 0))
             except Exception as error:  # scikit-fem has no name for it
-                raise InputError(f"the mesh has an element without volume, or one that folds over: {error}.") from error
+                raise InputError(
+                    f"the mesh has an element without volume, or one that folds over: {error}."
+                ) from error
         if np.any(bad):
-            place = ", ".join(f"{x:g}" for x in self.mesh.p[:, self.mesh.t[:, np.argmax(bad)]].mean(axis=1))
-            raise InputError(f"the mesh has an element without volume, or one that folds over, at ({place}).")
+            place = ", ".join(
+                f"{x:g}" for x in self.mesh.p[:, self.mesh.t[:, np.argmax(bad)]].mean(axis=1)
+            )
+            raise InputError(
+                f"the mesh has an element without volume, or one that folds over, at ({place})."
+            )
         return np.asarray(np.abs(ratio))
 
 
@@ -167,40 +187,39 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
 
     Parameters
     ----------
-    basis
-        A displacement basis of N unknowns.
+    basis : A displacement basis of N unknowns.
 
     Returns
     -------
-    ndarray
-        (dim, N / dim) unknowns, one row for each component. The vertices of the mesh come first.
+    (dim, N / dim) unknowns, one row for each component. The vertices of the mesh come first.
     """
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
 
 def contact_trace(
-    basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool], tied: bool = False
+    basis: skfem.CellBasis,
+    degree: int,
+    boundary: np.ndarray,
+    weight: tuple[float, bool],
+    tied: bool = False,
 ) -> Trace:
-    """Make the trace of the displacement on a boundary, with contact nodes, nodal areas and normals.
+    """Make the trace of the displacement on a boundary, with contact nodes, nodal areas and
+    normals.
 
     Parameters
     ----------
-    basis
-        The displacement basis of the body.
-    degree
-        Its degree, 1 or 2.
-    boundary
-        (f,) numbers of the facets of the mesh.
-    weight
-        The measure of the integrals, as for `weight_at`.
-    tied
-        Whether every node of the boundary shall be a contact, as where it is tied to another body.
+    basis : The displacement basis of the body.
+    degree : Its degree, 1 or 2.
+    boundary : (f,) numbers of the facets of the mesh.
+    weight : The measure of the integrals, as for `weight_at`.
+    tied : Whether every node of the boundary shall be a contact, as where it is tied to another
+        body.
 
     Returns
     -------
-    Trace
-        The contact nodes with areas [length^2], unit normals, and the sparse matrix W of this module's head.
+    The contact nodes with areas [length^2], unit normals, and the sparse matrix W of this module's
+    head.
     """
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
@@ -209,7 +228,8 @@ def contact_trace(
         places = places[:, cells[0]]
     elif tied:
         cells = TIED.get(name, cells)
-    # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape functions at all of them.
+    # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape
+    # functions at all of them.
     phi, rule = _cell_rule(name, places, cells, degree)
     at = _face_basis(basis.mesh, shape, boundary, rule)
     N, node = _face_shapes(at, shape, boundary, places)
@@ -220,9 +240,11 @@ def contact_trace(
     area = np.einsum("vq,fcq->fcv", phi, measure)
     mass = np.einsum("vq,wq,fcq->fcvw", phi, phi, measure)
     mixed = np.einsum("vq,fjcq,fcq->fcvj", phi, N.reshape(len(boundary), -1, *split[1:]), measure)
-    # psi_v = sum_w c_vw phi_w with int psi_v phi_w = delta_vw int phi_v gives c = diag(area) mass^-1 on every cell.
+    # psi_v = sum_w c_vw phi_w with int psi_v phi_w = delta_vw int phi_v gives c = diag(area)
+    # mass^-1 on every cell.
     dual = area[..., None] * np.linalg.solve(mass, mixed)  # int psi_v N_j
-    # Normals are averaged with the hat functions, and areas summed, over the cells that meet in a contact.
+    # Normals are averaged with the hat functions, and areas summed, over the cells that meet in a
+    # contact.
     normal = np.einsum("vq,dfcq->dfcv", phi, (np.asarray(at.normals) * flat).reshape(-1, *split))
     nodes, rows = np.unique(node[:, cells], return_inverse=True)
     rows = rows.reshape(area.shape)
@@ -230,7 +252,9 @@ def contact_trace(
     normals = np.stack([np.bincount(rows.ravel(), n.ravel()) for n in normal])
     normals = normals / np.linalg.norm(normals, axis=0)
     # W_ij = int psi_i N_j / A_i, summed over the cells as the sparse matrix is made.
-    value, row, column = np.broadcast_arrays(dual / areas[rows][..., None], rows[..., None], node[:, None, None, :])
+    value, row, column = np.broadcast_arrays(
+        dual / areas[rows][..., None], rows[..., None], node[:, None, None, :]
+    )
     size = len(nodes), node_unknowns(basis).shape[1]
     W = sp.csr_matrix((value.ravel(), (row.ravel(), column.ravel())), size)
     W.data = _clean(W.data)
@@ -239,22 +263,20 @@ def contact_trace(
     return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
 
 
-def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def face_nodes(
+    basis: skfem.CellBasis, degree: int, boundary: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the nodes and the normals of the faces of a boundary.
 
     Parameters
     ----------
-    basis
-        The displacement basis of the body.
-    degree
-        Its degree, 1 or 2.
-    boundary
-        (f,) numbers of the facets of the mesh.
+    basis : The displacement basis of the body.
+    degree : Its degree, 1 or 2.
+    boundary : (f,) numbers of the facets of the mesh.
 
     Returns
     -------
-    tuple
-        Nodes (f, j) of each face, corners first in cyclic order, and mean outward normals (dim, f).
+    Nodes (f, j) of each face, corners first in cyclic order, and mean outward normals (dim, f).
     """
     name = basis.mesh.refdom.__name__
     shape, places = SHAPES[name][1][degree](), FACES[name][2]
@@ -267,7 +289,9 @@ def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tup
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one rule per cell."""
+    """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one
+    rule per cell.
+    """
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])
@@ -276,30 +300,41 @@ def _cell_rule(
 
 
 def _face_basis(
-    mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: tuple[np.ndarray, np.ndarray]
+    mesh: skfem.Mesh,
+    shape: skfem.Element,
+    boundary: np.ndarray,
+    rule: tuple[np.ndarray, np.ndarray],
 ) -> skfem.FacetBasis:
     """FacetBasis that finds the places on the elements to what rounding of the coordinates allows.
 
-    scikit-fem asks Newton's iteration for 1e-12 of an element, out of reach where elements are small beside their distance
-    from the origin.
+    scikit-fem asks Newton's iteration for 1e-12 of an element, out of reach where elements are
+    small beside their distance from the origin.
     """
     mapping = mesh._mapping()
     if not isinstance(mapping, skfem.MappingAffine):
         corners = mesh.p[:, mesh.facets[:, boundary]]
-        rounding = np.finfo(float).eps * np.abs(corners).max() / np.ptp(corners, axis=1).max(axis=0).min()
+        rounding = (
+            np.finfo(float).eps * np.abs(corners).max() / np.ptp(corners, axis=1).max(axis=0).min()
+        )
         mapping = copy(mapping)  # the mesh keeps its own
-        mapping.invF = partial(type(mapping).invF, mapping, newton_tol=max(1e-12, 16 * rule[0].shape[1] * rounding))
+        mapping.invF = partial(
+            type(mapping).invF, mapping, newton_tol=max(1e-12, 16 * rule[0].shape[1] * rounding)
+        )
     return skfem.FacetBasis(mesh, shape, mapping, facets=boundary, quadrature=rule)
 
 
 def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and these nodes (face, j)."""
+    """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and
+    these nodes (face, j).
+    """
     nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     # Of the element's shape functions, the one of a node is that which is 1 there.
     local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)
-    N = np.take_along_axis(np.stack([np.asarray(f[0]) for f in at.basis], axis=1), local[:, :, None], axis=1)
+    N = np.take_along_axis(
+        np.stack([np.asarray(f[0]) for f in at.basis], axis=1), local[:, :, None], axis=1
+    )
     unknowns = np.take_along_axis(nodal.element_dofs.T, local, axis=1)
     return N, np.argsort(node_unknowns(nodal)[0])[unknowns]
 

@@ -21,16 +21,19 @@ STRESSES = {
     "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
 }
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
-BLOCK = 2000  # elements whose shape functions are evaluated at a time, which bounds the memory that they take
+# elements whose shape functions are evaluated at a time, which bounds the memory that they take
+BLOCK = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
     """One body after the solve, at the n nodes of its mesh, of which the vertices come first.
 
-    mesh         of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the displacement is quadratic,
-                 with nodes in the middle of edges, quadrilaterals and hexahedra
-    displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
+    mesh         of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the
+                 displacement is quadratic, with nodes in the middle of edges, quadrilaterals and
+                 hexahedra
+    displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;
+                                     von_mises (n,)
     contact      name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
     """
 
@@ -43,15 +46,15 @@ class Fields:
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def write_vtu(self, path: Path) -> None:
-        """Write the body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes.
+        """Write the body as a VTU file with displacement, stress, von Mises stress and contact
+        quantities at the nodes.
 
-        Cells of second order are quadratic triangles and tetrahedra, biquadratic quadrilaterals and triquadratic hexahedra of VTK
-        (22, 24, 28 and 29).
+        Cells of second order are quadratic triangles and tetrahedra, biquadratic quadrilaterals and
+        triquadratic hexahedra of VTK (22, 24, 28 and 29).
 
         Parameters
         ----------
-        path
-            The file.
+        path : The file.
         """
         import meshio
 
@@ -65,8 +68,10 @@ class Fields:
 class Validity(NamedTuple):
     """What small displacements and the equations of a body are worth at a displacement.
 
-    imbalance  sum of the nodal forces that nothing balances, relative to that of all forces on the body
-    strain     largest principal strain, and rotation  largest rotation [rad], of the mean of an element
+    imbalance  sum of the nodal forces that nothing balances, relative to that of all forces on the
+               body
+    strain     largest principal strain, and rotation  largest rotation [rad], of the mean of an
+               element
     moved      largest displacement [length]
     """
 
@@ -77,35 +82,41 @@ class Validity(NamedTuple):
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
-    """Compute how far a body is from equilibrium, strained and turned, from its stiffness and its elements alone.
+    """Compute how far a body is from equilibrium, strained and turned, from its stiffness and its
+    elements alone.
 
     Parameters
     ----------
-    body
-        The assembled body of n unknowns.
-    U
-        (n,) displacement [length].
-    force
-        (n,) contact forces on its unknowns [force].
+    body : The assembled body of n unknowns.
+    U : (n,) displacement [length].
+    force : (n,) contact forces on its unknowns [force].
 
     Returns
     -------
-    Validity
-        The imbalance counts the free unknowns and, for each plate that moves, the sum over its unknowns.
+    The imbalance counts the free unknowns and, for each plate that moves, the sum over its
+    unknowns.
     """
     internal = body.A @ U
     missing = internal - body.load - force
     plates = body.motion.T @ missing - body.plate_forces
-    sizes = (np.abs(part).sum() for part in (force, body.load, body.plate_forces, np.delete(internal, body.free)))
+    sizes = (
+        np.abs(part).sum()
+        for part in (force, body.load, body.plate_forces, np.delete(internal, body.free))
+    )
     size = max(sizes)
     unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
     gradient = np.asarray(body.basis.interpolate(U).grad)
-    mean = np.einsum("abeq,eq->eab", gradient, body.basis.dx) / body.basis.dx.sum(axis=1)[:, None, None]
+    mean = (
+        np.einsum("abeq,eq->eab", gradient, body.basis.dx)
+        / body.basis.dx.sum(axis=1)[:, None, None]
+    )
     turned = mean.swapaxes(1, 2)
     strain = np.abs(np.linalg.eigvalsh((mean + turned) / 2)).max(initial=0.0)
     rotation = np.linalg.norm(mean - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
     moved = float(np.abs(U).max(initial=0.0))
-    return Validity(unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved)
+    return Validity(
+        unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved
+    )
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
@@ -113,15 +124,12 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
 
     Parameters
     ----------
-    body
-        The assembled body of n unknowns.
-    U
-        (n,) displacement [length].
+    body : The assembled body of n unknowns.
+    U : (n,) displacement [length].
 
     Returns
     -------
-    Fields
-        Displacement, stress and von Mises stress at the vertices of the mesh.
+    Displacement, stress and von Mises stress at the vertices of the mesh.
     """
     basis = body.basis
     stress = nodal_stress(body, U)
@@ -134,12 +142,15 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
 
 
 def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
-    """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their volumes.
+    """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their
+    volumes.
 
-    An element counts with its mean stress where the displacement is linear, with its stress at the node where it is
-    quadratic; at planes of symmetry its mirror image counts as well, so that no shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
+    An element counts with its mean stress where the displacement is linear, with its stress at the
+    node where it is quadratic; at planes of symmetry its mirror image counts as well, so that no
+    shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
 
-    everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh alone
+    everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh
+                alone
     """
     basis, mesh = body.basis, body.basis.mesh
     volume = basis.dx.sum(axis=1)
@@ -167,33 +178,38 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
 
 
 def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Estimate for every element how much it adds to the error of the energy, or of other functionals.
+    """Estimate for every element how much it adds to the error of the energy, or of other
+    functionals.
 
-    For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the stress of a displacement
-    and s* the continuous stress with its averages at the vertices, which is more accurate where the solution is smooth.
-    With W = U it is twice the energy of the estimated error in each element; with W the displacement of an adjoint
-    problem it is what the element adds to the error of that problem's functional.
+    For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the
+    stress of a displacement and s* the continuous stress with its averages at the vertices, which
+    is more accurate where the solution is smooth. With W = U it is twice the energy of the
+    estimated error in each element; with W the displacement of an adjoint problem it is what the
+    element adds to the error of that problem's functional.
 
-    Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical engineering analysis.
+    Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical
+    engineering analysis.
 
     Parameters
     ----------
-    body
-        The assembled body of n unknowns.
-    U, W
-        (n,) displacements [length].
+    body : The assembled body of n unknowns.
+    U, W : (n,) displacements [length].
 
     Returns
     -------
-    ndarray
-        (elements,) integrals [force length].
+    (elements,) integrals [force length].
     """
     basis, mesh = body.basis, straight(body.basis.mesh)
-    vertices = skfem.Basis(mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W))
+    vertices = skfem.Basis(
+        mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W)
+    )
 
     def missing(field: np.ndarray) -> np.ndarray:
         nodal = nodal_stress(body, field, everywhere=False)
-        smooth = sum(nodal[:, :, own][..., None] * np.asarray(shape[0]) for own, shape in zip(mesh.t, vertices.basis))
+        smooth = sum(
+            nodal[:, :, own][..., None] * np.asarray(shape[0])
+            for own, shape in zip(mesh.t, vertices.basis)
+        )
         return np.asarray(smooth - stress_in(body, basis, field))
 
     E, nu = body.material.E, body.material.nu

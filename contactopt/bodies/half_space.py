@@ -1,13 +1,17 @@
-"""An elastic half-space or half-plane that is loaded on a regular grid of points: no mesh, products by fast Fourier transforms.
+"""An elastic half-space or half-plane that is loaded on a regular grid of points: no mesh, products
+by fast Fourier transforms.
 
-Each point stands for a cell of the surface that carries a uniform traction; its displacement is that of the middle of the cell
-(contactopt.bodies.influence). The unknowns are the displacements of the k points, component by component of each, followed by
-the forces that made them and by the motion of the body as a whole, which are what energies are computed from:
+Each point stands for a cell of the surface that carries a uniform traction; its displacement is
+that of the middle of the cell (contactopt.bodies.influence). The unknowns are the displacements of
+the k points, component by component of each, followed by the forces that made them and by the
+motion of the body as a whole, which are what energies are computed from:
 
-    U = (u_1 ... u_k, F_1 ... F_k, motion),   elastic energy = F' C F / 2,   external force = -sum F on the motion.
+    U = (u_1 ... u_k, F_1 ... F_k, motion),   elastic energy = F' C F / 2,   external force = -sum F
+                                              on the motion.
 
-The body as a whole may be displaced by a given amount, be held, or move freely under a total force; displacements from
-deformation vanish far away (in the plane: at the reference depth; on a periodic surface: in the mean).
+The body as a whole may be displaced by a given amount, be held, or move freely under a total force;
+displacements from deformation vanish far away (in the plane: at the reference depth; on a periodic
+surface: in the mean).
 """
 
 from __future__ import annotations
@@ -33,7 +37,8 @@ from contactopt.scenes.scene import HalfSpace, Scene
 
 @dataclass(frozen=True, eq=False)
 class HalfSpaceBody:
-    """A half-space of a scene; it needs no preparation, so it is both stages of contactopt.bodies.protocol.
+    """A half-space of a scene; it needs no preparation, so it is both stages of
+    contactopt.bodies.protocol.
 
     part        as the scene gives it;  components  of displacements, the normal of the surface last
     ticks       places of the points along each axis of the grid [length]
@@ -75,7 +80,9 @@ class HalfSpaceBody:
 
     @cached_property
     def kernel(self) -> Kernel:
-        """The compliance as a convolution, in components n, t1[, t2] with n along the last component and t1 along the first."""
+        """The compliance as a convolution, in components n, t1[, t2] with n along the last
+        component and t1 along the first.
+        """
         make = _periodic if self.part.periodic else _infinite
         grid_kernel = make(self)
         return grid_kernel.scaled(1 / self.thickness) if len(self.grid) == 1 else grid_kernel
@@ -95,7 +102,9 @@ class HalfSpaceBody:
         k, dim = int(np.prod(self.grid)), len(self.components)
         columns = [self.components.index(name) for name in self.part.force or {}]
         shifts = np.eye(dim)[:, columns]
-        return np.concatenate([np.tile(shifts, (k, 1)), np.zeros((self.unknowns, len(columns))), shifts])
+        return np.concatenate(
+            [np.tile(shifts, (k, 1)), np.zeros((self.unknowns, len(columns))), shifts]
+        )
 
     @property
     def motion_names(self) -> tuple[str, ...]:
@@ -107,7 +116,9 @@ class HalfSpaceBody:
 
     def surface(self, name: str | None = None) -> Surface:
         if name not in (None, "contact"):
-            raise InputError(f"body '{self.name}' has one contact surface, 'contact'; there is no {name!r}.")
+            raise InputError(
+                f"body '{self.name}' has one contact surface, 'contact'; there is no {name!r}."
+            )
         k, dim, n = int(np.prod(self.grid)), len(self.components), len(self.at_rest)
         flat = np.stack([row.ravel() for row in np.meshgrid(*self.ticks, indexing="ij")])
         points = np.concatenate([flat, np.zeros((1, k))])
@@ -116,7 +127,8 @@ class HalfSpaceBody:
         normals[-1] = self.outward
         count = np.arange(k + 1)
         traces = tuple(
-            sp.csr_matrix((np.ones(k), (np.arange(k) * dim + c).astype(np.int32), count), (k, n)) for c in range(dim)
+            sp.csr_matrix((np.ones(k), (np.arange(k) * dim + c).astype(np.int32), count), (k, n))
+            for c in range(dim)
         )
         middle = flat - (flat.max(axis=1) + flat.min(axis=1))[:, None] / 2
         return Surface(
@@ -131,8 +143,8 @@ class HalfSpaceBody:
         made = np.asarray(height(flat) if callable(height) else height, dtype=float)
         if made.shape not in (self.grid, flat.shape[1:]) or not np.all(np.isfinite(made)):
             raise InputError(
-                f"the height of half-space '{self.name}' must give one finite number per point, shape {self.grid}; "
-                f"got shape {made.shape}."
+                f"the height of half-space '{self.name}' must give one finite number per point,"
+                f" shape {self.grid}; got shape {made.shape}."
             )
         return made.ravel()
 
@@ -157,7 +169,9 @@ class HalfSpaceBody:
         return self
 
     def convolution(self, T: sp.csr_matrix) -> Kernel | None:
-        """T C T' as a convolution, for maps to displacements of all points in their order in components +-n, +-t1[, +-t2]."""
+        """T C T' as a convolution, for maps to displacements of all points in their order in
+        components +-n, +-t1[, +-t2].
+        """
         k, dim = int(np.prod(self.grid)), len(self.components)
         own = np.roll(np.arange(dim), 1)  # n is the last component
         if T.shape[0] != k * dim or T.nnz != k * dim or np.any(np.diff(T.indptr) != 1):
@@ -167,14 +181,19 @@ class HalfSpaceBody:
         signs = T.data.reshape(k, dim)
         if np.any(signs != signs[0]) or not np.allclose(np.abs(signs[0]), 1.0, rtol=1e-12):
             return None
-        symbols = {(a, b): signs[0, a] * signs[0, b] * symbol for (a, b), symbol in self.kernel.symbols.items()}
+        symbols = {
+            (a, b): signs[0, a] * signs[0, b] * symbol
+            for (a, b), symbol in self.kernel.symbols.items()
+        }
         return replace(self.kernel, symbols=symbols)
 
     def product(self, T: sp.csr_matrix) -> Product:
         back, act = T.T.tocsr(), self._compliance_product
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-            return np.asarray(T @ np.stack([act(force, accuracy) for force in (back @ X).T], axis=1))
+            return np.asarray(
+                T @ np.stack([act(force, accuracy) for force in (back @ X).T], axis=1)
+            )
 
         return product
 
@@ -197,11 +216,19 @@ class HalfSpaceBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.asarray(np.diff(T.indptr) > 0)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
-        return np.asarray(self.at_rest + self.motions @ multipliers + self._compliance_product(force))
+    def displacement(
+        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+    ) -> np.ndarray:
+        return np.asarray(
+            self.at_rest + self.motions @ multipliers + self._compliance_product(force)
+        )
 
-    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The compliance is a polynomial of second degree in nu over E: central differences by nu are exact."""
+    def material_change(
+        self, constant: str, U: np.ndarray, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The compliance is a polynomial of second degree in nu over E: central differences by nu
+        are exact.
+        """
         E, nu = self.part.material.E, self.part.material.nu
         change = np.zeros(len(U))
         if constant == "E":
@@ -210,15 +237,23 @@ class HalfSpaceBody:
         h = min(0.1, (0.5 - nu) / 2, (1 + nu) / 2)
         for sign in (1.0, -1.0):
             other = replace(self, part=replace(self.part, material=Material(E, nu + sign * h)))
-            change[: self.unknowns] += sign * other._compliance_product(force)[: self.unknowns] / (2 * h)
+            change[: self.unknowns] += (
+                sign * other._compliance_product(force)[: self.unknowns] / (2 * h)
+            )
         return change, np.zeros(len(self.resultants))
 
-    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+    def material_work(
+        self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray
+    ) -> float:
         return float(dual @ self.material_change(constant, U, force)[0])
 
-    def load_work(self, scene: Scene, part: HalfSpace, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+    def load_work(
+        self, scene: Scene, part: HalfSpace, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
+    ) -> float:
         new = self.loaded(scene, part)
-        return float(dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants))
+        return float(
+            dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants)
+        )
 
     def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         by_force = self._compliance_product(force)
@@ -242,7 +277,9 @@ class HalfSpaceBody:
         return float(force @ self._compliance_product(force)[: self.unknowns]) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """What keeps the body in equilibrium with the contact forces; it acts on the body as a whole."""
+        """What keeps the body in equilibrium with the contact forces; it acts on the body as a
+        whole.
+        """
         m, dim = self.unknowns, len(self.components)
         return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
 
@@ -277,16 +314,22 @@ def _infinite(body: HalfSpaceBody) -> Kernel:
         depth = 10 * length if body.part.depth is None else body.part.depth
         if depth < length:
             raise InputError(
-                f"half-plane '{body.name}': its depth ({depth:g}) must be at least the length of its points ({length:g})."
+                f"half-plane '{body.name}': its depth ({depth:g}) must be at least the length of"
+                f" its points ({length:g})."
             )
-        coefficients = half_plane_influence(body.part.material, body.spacing[0], distances[0], depth)
+        coefficients = half_plane_influence(
+            body.part.material, body.spacing[0], distances[0], depth
+        )
     else:
         spacing = (body.spacing[0], body.spacing[1])
-        coefficients = half_space_influence(body.part.material, spacing, (distances[0], distances[1]))
+        coefficients = half_space_influence(
+            body.part.material, spacing, (distances[0], distances[1])
+        )
     last = len(body.grid)
     turned = {}
     for (a, b), part in coefficients.items():
-        if a < last and b == last:  # the displacement under a normal force; the pair wanted is the other way round
+        # the displacement under a normal force; the pair wanted is the other way round
+        if a < last and b == last:
             turned[0, a + 1] = -body.outward * part
         else:
             turned[(a + 1) % (last + 1), (b + 1) % (last + 1)] = part
@@ -294,11 +337,13 @@ def _infinite(body: HalfSpaceBody) -> Kernel:
 
 
 def _periodic(body: HalfSpaceBody) -> Kernel:
-    """The kernel of tractions that are trigonometric polynomials on the grid; their mean makes no displacement.
+    """The kernel of tractions that are trigonometric polynomials on the grid; their mean makes no
+    displacement.
 
-    Under tractions with the wave vector k the surface moves by (1 - nu)/(G |k|) along the normal and along k, by
-    1/(G |k|) across k, and by (1 - 2 nu)/(2 G |k|) along k under normal tractions, with a quarter of a period between.
-    Sources: Johnson (1985), section 13.2; Stanley, Kato (1997), An FFT-based method for rough surface contact.
+    Under tractions with the wave vector k the surface moves by (1 - nu)/(G |k|) along the normal
+    and along k, by 1/(G |k|) across k, and by (1 - 2 nu)/(2 G |k|) along k under normal tractions,
+    with a quarter of a period between. Sources: Johnson (1985), section 13.2; Stanley, Kato (1997),
+    An FFT-based method for rough surface contact.
     """
     G, nu = lame(body.part.material)[1], body.part.material.nu
     grid, spacing = body.grid, body.spacing
@@ -314,43 +359,47 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
         symbols[0, axis + 1] = body.outward * (1 - 2 * nu) / (2 * G * cell) * odd * over**2
         symbols[axis + 1, axis + 1] = (over - nu * part**2 * over**3) / (G * cell)
     if len(grid) == 2:
-        first, second = (np.where(np.isclose(np.abs(part), np.pi / h), 0.0, part) for part, h in zip(k, spacing))
+        first, second = (
+            np.where(np.isclose(np.abs(part), np.pi / h), 0.0, part) for part, h in zip(k, spacing)
+        )
         symbols[1, 2] = -nu * first * second * over**3 / (G * cell)
     return Kernel(grid, grid, symbols)
 
 
-def assemble_half_space(scene: Scene, part: HalfSpace, elements: int, zone: float | None) -> HalfSpaceBody:
+def assemble_half_space(
+    scene: Scene, part: HalfSpace, elements: int, zone: float | None
+) -> HalfSpaceBody:
     """Make a half-space of a scene on its grid. The upper body fills the upper half.
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its half-spaces.
-    elements, zone
-        Number of points across the contact half-width, and the half-width that the grid resolves [length], for grids
-        that depend on them.
+    scene, part : The scene and one of its half-spaces.
+    elements, zone : Number of points across the contact half-width, and the half-width that the
+        grid resolves [length], for grids that depend on them.
 
     Returns
     -------
-    HalfSpaceBody
-        The half-space on its grid.
+    The half-space on its grid.
 
     Raises
     ------
-    InputError
-        In an axisymmetric scene and in one with mirror images.
+    InputError : In an axisymmetric scene and in one with mirror images.
     """
     if scene.kind == "axisymmetric" or scene.copies > 1:
         raise InputError(
-            f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with copies = 1, because the "
-            "forces between its points know no symmetry."
+            f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with"
+            " copies = 1, because the forces between its points know no symmetry."
         )
-    sides = {side for pair in scene.pairs for side, name in zip(SIDES, pair.bodies) if name == part.name}
+    sides = {
+        side for pair in scene.pairs for side, name in zip(SIDES, pair.bodies) if name == part.name
+    }
     if len(sides) > 1:
         raise InputError(
-            f"half-space '{part.name}' is the upper body of one contact and the lower one of another; give all of its contacts "
-            "the same side, because it fills one half of space."
+            f"half-space '{part.name}' is the upper body of one contact and the lower one of"
+            " another; give all of its contacts the same side, because it fills one half of space."
         )
     outward = -1.0 if "upper" in sides else 1.0
     thickness = scene.thickness if scene.dim == 2 else 1.0
-    return HalfSpaceBody(part, scene.components, part.ticks(elements, zone, scene.dim - 1), outward, thickness)
+    return HalfSpaceBody(
+        part, scene.components, part.ticks(elements, zone, scene.dim - 1), outward, thickness
+    )

@@ -1,22 +1,25 @@
-"""Displacements of a half-plane or half-space under uniform tractions on cells of its surface, in closed form.
+"""Displacements of a half-plane or half-space under uniform tractions on cells of its surface, in
+closed form.
 
-The half-space fills z <= 0, so that its outward normal is +z. A force F at the origin moves the surface point (x, y) at the
-distance rho by (Boussinesq; Cerruti; G is the shear modulus, nu Poisson's ratio)
+The half-space fills z <= 0, so that its outward normal is +z. A force F at the origin moves the
+surface point (x, y) at the distance rho by (Boussinesq; Cerruti; G is the shear modulus, nu
+Poisson's ratio)
 
     2 pi G u_z = (1 - nu) F_z / rho - (1 - 2 nu)/2 (x F_x + y F_y) / rho^2
     2 pi G u_x = ((1 - nu) / rho + nu x^2 / rho^3) F_x + nu x y / rho^3 F_y + (1 - 2 nu)/2 x F_z / rho^2
 
-and u_y likewise. A line force on a half-plane makes displacements that grow without end (Flamant). They are measured from
-the point that lies `depth` beneath the line force, d below:
+and u_y likewise. A line force on a half-plane makes displacements that grow without end (Flamant).
+They are measured from the point that lies `depth` beneath the line force, d below:
 
     pi G u_z = (1 - nu) (ln(d / |x|) - 1 / (2 (1 - nu))) F_z - pi (1 - 2 nu)/4 sign(x) F_x
     pi G u_x = (1 - nu) (ln(d / |x|) + 1 / (2 (1 - nu))) F_x + pi (1 - 2 nu)/4 sign(x) F_z
 
-Integrals over a cell have antiderivatives. Far from the cell their differences would cancel most digits, and there Gauss's rule
-is exact to rounding. All coefficients are displacements at the middle of a cell per unit of total force on another cell.
+Integrals over a cell have antiderivatives. Far from the cell their differences would cancel most
+digits, and there Gauss's rule is exact to rounding. All coefficients are displacements at the
+middle of a cell per unit of total force on another cell.
 
-Sources: Love (1929), The stress produced in a semi-infinite solid by pressure on part of the boundary; Johnson (1985),
-Contact Mechanics, sections 2.2, 3.2 and 3.6.
+Sources: Love (1929), The stress produced in a semi-infinite solid by pressure on part of the
+boundary; Johnson (1985), Contact Mechanics, sections 2.2, 3.2 and 3.6.
 """
 
 from __future__ import annotations
@@ -27,7 +30,8 @@ import numpy as np
 
 from contactopt.material import Material, lame
 
-# Number of the longer sides of a cell from the loaded one from which on Gauss's rule with that many points a side is used,
+# Number of the longer sides of a cell from the loaded one from which on Gauss's rule with that many
+# points a side is used,
 # farthest last.
 GAUSS = ((12, 8), (64, 3))
 
@@ -41,18 +45,16 @@ def half_space_influence(
 
     Parameters
     ----------
-    material
-        Of the half-space.
-    spacing
-        Sides of a cell along x and y [length].
-    offsets
-        Whole numbers (i,) and (j,) of cells along x and y between the cell that is loaded and the one that moves.
+    material : Of the half-space.
+    spacing : Sides of a cell along x and y [length].
+    offsets : Whole numbers (i,) and (j,) of cells along x and y between the cell that is loaded and
+        the one that moves.
 
     Returns
     -------
-    (moved component, loaded component) -> coefficients (i, j) [length / force] for the components x, y, z = 0, 1, 2. Pairs
-    with the first number larger than the second are left out: u_a under F_b is minus u_b under F_a for the pairs of z
-    with x and y, and equal to it for x with y.
+    (moved component, loaded component) -> coefficients (i, j) [length / force] for the components
+    x, y, z = 0, 1, 2. Pairs with the first number larger than the second are left out: u_a under
+    F_b is minus u_b under F_a for the pairs of z with x and y, and equal to it for x with y.
 
     Sources: Love (1929); Johnson (1985), sections 3.2 and 3.6.
     """
@@ -77,19 +79,15 @@ def half_plane_influence(
 
     Parameters
     ----------
-    material
-        Of the half-plane, in plane strain.
-    spacing
-        Width of a strip [length].
-    offsets
-        Whole numbers (i,) of strips between the one that is loaded and the one that moves.
-    depth
-        Of the point beneath each force from which its displacements are measured [length].
+    material : Of the half-plane, in plane strain.
+    spacing : Width of a strip [length].
+    offsets : Whole numbers (i,) of strips between the one that is loaded and the one that moves.
+    depth : Of the point beneath each force from which its displacements are measured [length].
 
     Returns
     -------
-    (moved component, loaded component) -> coefficients (i,) [length^2 / force] for the components x, y = 0, 1 with y the
-    outward normal; as in half_space_influence.
+    (moved component, loaded component) -> coefficients (i,) [length^2 / force] for the components
+    x, y = 0, 1 with y the outward normal; as in half_space_influence.
 
     Source: Johnson (1985), sections 2.2 and 2.3.
     """
@@ -135,23 +133,34 @@ WHOLE: dict[str, Antiderivative] = {
 }
 
 
-def _means(spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]) -> dict[str, np.ndarray]:
-    """Means of x^2/rho^3, y^2/rho^3, x y/rho^3, x/rho^2 and y/rho^2 over the cell at each offset (i, j)."""
+def _means(
+    spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Means of x^2/rho^3, y^2/rho^3, x y/rho^3, x/rho^2 and y/rho^2 over the cell at each offset
+    (i, j).
+    """
     farthest, longer = GAUSS[-1][1], max(spacing)
 
     def within(reach: int) -> list[np.ndarray]:
-        return [np.flatnonzero(h * np.abs(along) <= reach * longer) for h, along in zip(spacing, offsets)]
+        return [
+            np.flatnonzero(h * np.abs(along) <= reach * longer)
+            for h, along in zip(spacing, offsets)
+        ]
 
     out = _by_gauss(spacing, offsets, farthest)
     for reach, points in [*((GAUSS[n + 1][0], GAUSS[n][1]) for n in range(len(GAUSS) - 1))][::-1]:
         some = within(reach)
-        for name, value in _by_gauss(spacing, (offsets[0][some[0]], offsets[1][some[1]]), points).items():
+        for name, value in _by_gauss(
+            spacing, (offsets[0][some[0]], offsets[1][some[1]]), points
+        ).items():
             out[name][np.ix_(*some)] = value
     some = within(GAUSS[0][0])
     (hx, hy), corners = spacing, [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
     x, y = np.meshgrid(hx * offsets[0][some[0]], hy * offsets[1][some[1]], indexing="ij")
     for name, whole in WHOLE.items():
-        mean = sum(sign * whole(x + a * hx / 2, y + b * hy / 2) for a, b, sign in corners) / (hx * hy)
+        mean = sum(sign * whole(x + a * hx / 2, y + b * hy / 2) for a, b, sign in corners) / (
+            hx * hy
+        )
         out[name][np.ix_(*some)] = mean
     return out
 
@@ -164,7 +173,10 @@ def _by_gauss(
     out = {name: np.zeros((len(offsets[0]), len(offsets[1]))) for name in WHOLE}
     for a, p in zip(nodes, weights):
         for b, q in zip(nodes, weights):
-            x, y = spacing[0] * (offsets[0] + a / 2)[:, None], spacing[1] * (offsets[1] + b / 2)[None, :]
+            x, y = (
+                spacing[0] * (offsets[0] + a / 2)[:, None],
+                spacing[1] * (offsets[1] + b / 2)[None, :],
+            )
             square = np.maximum(x**2 + y**2, (1e-9 * spacing[0]) ** 2)
             first = p * q / 4 / square
             third = first / np.sqrt(square)

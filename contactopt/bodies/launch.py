@@ -1,4 +1,6 @@
-"""Ranks started by the command line itself, on the cores of this machine, and watched until they end."""
+"""Ranks started by the command line itself, on the cores of this machine, and watched until they
+end.
+"""
 
 from __future__ import annotations
 
@@ -26,43 +28,46 @@ PATIENCE = 60.0  # for which a stopped rank is waited for [s]
 
 
 def launch(ranks: int, arguments: Sequence[str]) -> int:
-    """Start the command line on several ranks of this machine, each bound to a core while there are enough of them.
+    """Start the command line on several ranks of this machine, each bound to a core while there are
+    enough of them.
 
     Every rank uses one BLAS thread unless the environment says otherwise.
 
     Parameters
     ----------
-    ranks
-        How many processes.
-    arguments
-        Of the command line, without the name of the program.
+    ranks : How many processes.
+    arguments : Of the command line, without the name of the program.
 
     Returns
     -------
-    int
-        The exit code of rank 0.
+    The exit code of rank 0.
 
     Raises
     ------
-    InputError
-        If the packages of the extra `mpi` are missing, if there are too many ranks for the cores of this machine, and in a
-        process that was itself started as a rank.
+    InputError : If the packages of the extra `mpi` are missing, if there are too many ranks for the
+        cores of this machine, and in a process that was itself started as a rank.
     """
     if OUTCOME in os.environ:  # without this sentence each rank would start ranks of its own
         raise InputError(
-            "mpiexec started ranks that do not see each other; it must belong to the MPI that mpi4py was built with."
+            "mpiexec started ranks that do not see each other; it must belong to the MPI that"
+            " mpi4py was built with."
         )
     start = mpiexec(ranks)
     with tempfile.TemporaryDirectory() as folder:
         outcome = Path(folder) / "exit code"
-        environment = {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
+        environment = (
+            {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
+        )
         command = [*start, sys.executable, "-m", "contactopt", *arguments]
         code = _watched(command, environment)
         return int(outcome.read_text()) if outcome.exists() else ended_early(code)
 
 
 def _watched(command: list[str], environment: dict[str, str]) -> int:
-    """The exit code of mpiexec. A rank that somebody stopped is waited for with a word, and ended after PATIENCE."""
+    """The exit code of mpiexec.
+
+    A rank that somebody stopped is waited for with a word, and ended after PATIENCE.
+    """
     import psutil
 
     stopped: dict[int, float] = {}  # number of a process -> when it was first seen stopped
@@ -74,7 +79,9 @@ def _watched(command: list[str], environment: dict[str, str]) -> int:
                 with suppress(psutil.NoSuchProcess):
                     ranks = psutil.Process(process.pid).children(recursive=True)
                     found = [own for own in ranks if own.status() == psutil.STATUS_STOPPED]
-                    stopped = {own.pid: stopped.get(own.pid) or _told_stopped(own.pid) for own in found}
+                    stopped = {
+                        own.pid: stopped.get(own.pid) or _told_stopped(own.pid) for own in found
+                    }
                     for own in found:
                         if time.monotonic() - stopped[own.pid] > PATIENCE:
                             own.kill()
@@ -86,8 +93,8 @@ def _watched(command: list[str], environment: dict[str, str]) -> int:
 def _told_stopped(number: int) -> float:
     """Say that a rank was stopped; the time at which that was said."""
     print(
-        f"contactopt: a rank (process {number}) was stopped and all others wait for it; go on with 'kill -CONT {number}', "
-        f"or it is ended in {PATIENCE:g} s.",
+        f"contactopt: a rank (process {number}) was stopped and all others wait for it; go on with"
+        f" 'kill -CONT {number}', or it is ended in {PATIENCE:g} s.",
         file=sys.stderr,
     )
     return time.monotonic()
@@ -98,19 +105,27 @@ def mpiexec(ranks: int) -> list[str]:
 
     Raises
     ------
-    InputError
-        Where MPI is missing, and for more ranks than PER_CORE on each core.
+    InputError : Where MPI is missing, and for more ranks than PER_CORE on each core.
     """
     check_count("the number of ranks", ranks)
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     if ranks > PER_CORE * cores:
         raise InputError(
-            f"{ranks} ranks are too many for {count(cores, 'core')}; take {PER_CORE * cores} at most, better {cores}."
+            f"{ranks} ranks are too many for {count(cores, 'core')}; take {PER_CORE * cores} at"
+            f" most, better {cores}."
         )
-    program = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
+    program = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which(
+        "mpiexec"
+    )
     if program is None or find_spec("mpi4py") is None or find_spec("psutil") is None:
         raise InputError("ranks need mpi4py, psutil and mpiexec: pip install 'contactopt[mpi]'.")
-    placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else ["--oversubscribe", "--bind-to", "none"]
+    placed = (
+        ["--bind-to", "core", "--map-by", "core"]
+        if ranks <= cores
+        else ["--oversubscribe", "--bind-to", "none"]
+    )
     root = (
         ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
     )  # whoever is root runs this as root
@@ -122,29 +137,36 @@ def check_bodies(scene: Scene, ranks: int) -> None:
 
     Parameters
     ----------
-    scene
-        The scene.
-    ranks
-        How many processes shall share its bodies.
+    scene : The scene.
+    ranks : How many processes shall share its bodies.
 
     Raises
     ------
-    InputError
-        If there are more ranks than elastic bodies.
+    InputError : If there are more ranks than elastic bodies.
     """
     check_count("the number of ranks", ranks)
     bodies = sum(isinstance(part, Part) for part in scene.parts)
     if ranks > max(bodies, 1):
         have = f"only {count(bodies, 'elastic body', 'elastic bodies')}"
         raise InputError(
-            f"scene '{scene.name}' has {have}, and each rank needs one; take {max(bodies, 1)} of the {ranks} ranks."
+            f"scene '{scene.name}' has {have}, and each rank needs one; take {max(bodies, 1)} of"
+            f" the {ranks} ranks."
         )
 
 
 def ended_early(code: int) -> int:
-    """The exit code where rank 0 left none: a rank ended before the work was done, and mpiexec ended the others."""
-    why = f" by signal {code - 128}, which may mean that there was too little memory" if code > 128 else ""
-    print(f"contactopt: a rank was ended{why}; all others were stopped and nothing was written.", file=sys.stderr)
+    """The exit code where rank 0 left none: a rank ended before the work was done, and mpiexec
+    ended the others.
+    """
+    why = (
+        f" by signal {code - 128}, which may mean that there was too little memory"
+        if code > 128
+        else ""
+    )
+    print(
+        f"contactopt: a rank was ended{why}; all others were stopped and nothing was written.",
+        file=sys.stderr,
+    )
     return code or 1
 
 
@@ -153,13 +175,11 @@ def leave(code: int) -> int:
 
     Parameters
     ----------
-    code
-        The true exit code of this rank.
+    code : The true exit code of this rank.
 
     Returns
     -------
-    int
-        0 where `launch` waits for the true code in a file, else the code itself.
+    0 where `launch` waits for the true code in a file, else the code itself.
     """
     if OUTCOME not in os.environ:
         return code

@@ -18,27 +18,29 @@ from contactopt.scenes.scene import Part, Scene, Traction
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 
 
-def mirrored_nodes(scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray) -> np.ndarray:
+def mirrored_nodes(
+    scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray
+) -> np.ndarray:
     """Find the nodes in planes across an axis beyond which the body goes on as its mirror image.
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its parts.
-    basis
-        Of the displacement, with n unknowns.
-    held
-        (n,) whether a displacement is prescribed or driven by a plate.
+    scene, part : The scene and one of its parts.
+    basis : Of the displacement, with n unknowns.
+    held : (n,) whether a displacement is prescribed or driven by a plate.
 
     Returns
     -------
-    ndarray
-        (dim, nodes) whether a node lies in a plane across that axis on which nothing else than the displacement along this
-        axis is held, and no traction acts; none where the scene has no copies.
+    (dim, nodes) whether a node lies in a plane across that axis on which nothing else than the
+    displacement along this axis is held, and no traction acts; none where the scene has no copies.
     """
     mesh, unknowns = basis.mesh, node_unknowns(basis)
     names = list(scene.surfaces_of(part))
-    names += [load.boundary for load in part.loads if isinstance(load, Traction) and np.count_nonzero(load.value)]
+    names += [
+        load.boundary
+        for load in part.loads
+        if isinstance(load, Traction) and np.count_nonzero(load.value)
+    ]
     loaded = [np.asarray(mesh.boundaries[name]) for name in names]
     facets = np.setdiff1d(mesh.boundary_facets(), np.concatenate([np.zeros(0, dtype=int), *loaded]))
     made, fixed = np.zeros(unknowns.shape, dtype=bool), held[unknowns]

@@ -1,18 +1,22 @@
-"""Rigid motions that no support and no plate holds, and the forces that meet a resultant without making the body move.
+"""Rigid motions that no support and no plate holds, and the forces that meet a resultant without
+making the body move.
 
-The stiffness A of a body that floats is singular: A Z = 0 for its free rigid motions Z (n, m). With m fixing unknowns left
-out, G = A^-1 (zero on the fixing unknowns) gives the displacement under forces in balance. Let S (n, m) be forces with
-Z' S = I. The compliance of the floating body is
+The stiffness A of a body that floats is singular: A Z = 0 for its free rigid motions Z (n, m). With
+m fixing unknowns left out, G = A^-1 (zero on the fixing unknowns) gives the displacement under
+forces in balance. Let S (n, m) be forces with Z' S = I. The compliance of the floating body is
 
     C = (I - Z S') G (I - S Z') = G - Z Y' - Y Z',      Y = G S - Z (S' G S) / 2,
 
-which is symmetric, positive semidefinite and does not depend on the fixing unknowns: a resultant Z' F is met by the forces
--S (Z' F), and displacements have no part S' U along the motions. Under balanced forces both do nothing. Here S is proportional to
-the inertia forces of the motions, S = M Z (Z' M Z)^-1 with the mass matrix M of unit density, so that C converges with the mesh (a point force
-would not) and the multiplier of a motion is the mean displacement of the body (inertia relief).
+which is symmetric, positive semidefinite and does not depend on the fixing unknowns: a resultant Z'
+F is met by the forces -S (Z' F), and displacements have no part S' U along the motions. Under
+balanced forces both do nothing. Here S is proportional to the inertia forces of the motions, S = M
+Z (Z' M Z)^-1 with the mass matrix M of unit density, so that C converges with the mesh (a point
+force would not) and the multiplier of a motion is the mean displacement of the body (inertia
+relief).
 
-Source: Farhat, Roux (1991), A method of finite element tearing and interconnecting and its parallel solution algorithm,
-Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodies whose motions are multipliers of the interface.
+Source: Farhat, Roux (1991), A method of finite element tearing and interconnecting and its parallel
+solution algorithm, Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodies whose motions are
+multipliers of the interface.
 """
 
 from __future__ import annotations
@@ -28,7 +32,9 @@ from skfem.helpers import dot
 from contactopt.bodies.elements import weight_at
 from contactopt.errors import InputError
 
-HELD = 1e-12  # mean square of a motion (largest displacement one) over the held unknowns below which nothing holds it
+# mean square of a motion (largest displacement one) over the held unknowns below which nothing
+# holds it
+HELD = 1e-12
 PURE = 1e-9  # by how much a motion may miss the free ones and still count as one of them
 EXACT = 1e-9  # largest |A Z| over |A| |Z|: a free motion strains nothing
 
@@ -37,8 +43,8 @@ EXACT = 1e-9  # largest |A Z| over |A| |Z|: a free motion strains nothing
 class Motions:
     """Free rigid motions of a body, m of them.
 
-    fields  (n, m) displacements Z, zero at unknowns that are held; the largest displacement of a node is about one, so that
-            multipliers are displacements [length]
+    fields  (n, m) displacements Z, zero at unknowns that are held; the largest displacement of a
+            node is about one, so that multipliers are displacements [length]
     names   what each of them is, for messages
     fixing  (m,) unknowns that hold the body where its stiffness has to be solvable
     forces  (n, m) nodal forces S of unit resultants, Z' S = I
@@ -50,11 +56,13 @@ class Motions:
     forces: np.ndarray
 
 
-def _rigid_motions(kind: str, components: tuple[str, ...], x: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+def _rigid_motions(
+    kind: str, components: tuple[str, ...], x: np.ndarray
+) -> tuple[np.ndarray, tuple[str, ...]]:
     """All rigid motions of points x (dim, k) as displacements (dim, k, m), and their names.
 
-    Translations have length one; rotations are about the middle of the points and move the furthest of them by one. In
-    an axisymmetric scene there is one motion, along the axis.
+    Translations have length one; rotations are about the middle of the points and move the furthest
+    of them by one. In an axisymmetric scene there is one motion, along the axis.
     """
     dim = len(components)
     if kind == "axisymmetric":
@@ -88,20 +96,16 @@ def free_motions(
 
     Parameters
     ----------
-    kind, components
-        Of the scene.
-    basis, weight
-        Displacement basis of n unknowns, and the measure of its integrals (contactopt.bodies.elements.weight_at).
-    unknowns
-        (dim, nodes) displacement unknowns of every node.
-    held
-        (n,) mask of the unknowns that supports or plates prescribe.
+    kind, components : Of the scene.
+    basis, weight : Displacement basis of n unknowns, and the measure of its integrals
+        (contactopt.bodies.elements.weight_at).
+    unknowns : (dim, nodes) displacement unknowns of every node.
+    held : (n,) mask of the unknowns that supports or plates prescribe.
 
     Returns
     -------
-    Motions
-        The motions Z (n, m) with their names, fixing unknowns (m,) and inertia forces S (n, m), as in this module's
-        head.
+    The motions Z (n, m) with their names, fixing unknowns (m,) and inertia forces S (n, m), as in
+    this module's head.
     """
     x = basis.doflocs[:, unknowns[0]]
     rigid, labels = _rigid_motions(kind, components, x)
@@ -121,7 +125,8 @@ def free_motions(
 
 
 def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, and the name of each.
+    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, and the name of
+    each.
 
     A translation or rotation that is free by itself is a column of its own.
     """
@@ -138,9 +143,15 @@ def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tupl
 
 
 def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
-    """The name of a combination of motions: that of its rotation, if it has one, otherwise of its largest translation."""
+    """The name of a combination of motions: that of its rotation, if it has one, otherwise of its
+    largest translation.
+    """
     turning = np.array([label.startswith("rotation") for label in labels])
-    size = np.abs(column) * np.where(turning, 1e3, 1.0) * (np.abs(column) > 1e-3 * np.abs(column).max())
+    size = (
+        np.abs(column)
+        * np.where(turning, 1e3, 1.0)
+        * (np.abs(column) > 1e-3 * np.abs(column).max())
+    )
     return labels[int(np.argmax(size))]
 
 
@@ -159,23 +170,21 @@ def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
 
     Parameters
     ----------
-    name
-        The body, for the message.
-    A
-        (n, n) its stiffness [force / length].
-    motions
-        Its free motions.
+    name : The body, for the message.
+    A : (n, n) its stiffness [force / length].
+    motions : Its free motions.
 
     Raises
     ------
-    InputError
-        Where it does, because of the rounding of extreme coordinates.
+    InputError : Where it does, because of the rounding of extreme coordinates.
     """
     if not len(motions.names):
         return
-    error = np.abs(A @ motions.fields).max(axis=0) / (np.abs(A.diagonal()).max() * np.abs(motions.fields).max(axis=0))
+    error = np.abs(A @ motions.fields).max(axis=0) / (
+        np.abs(A.diagonal()).max() * np.abs(motions.fields).max(axis=0)
+    )
     if error.max() > EXACT:
         raise InputError(
-            f"body '{name}': its stiffness resists the rigid motion '{motions.names[int(np.argmax(error))]}'; move the mesh "
-            "nearer to the origin."
+            f"body '{name}': its stiffness resists the rigid motion"
+            f" '{motions.names[int(np.argmax(error))]}'; move the mesh nearer to the origin."
         )

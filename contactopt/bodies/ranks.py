@@ -1,10 +1,13 @@
-"""Processes that MPI started: rank 0 runs the program, the others keep objects for it and act on them.
+"""Processes that MPI started: rank 0 runs the program, the others keep objects for it and act on
+them.
 
-Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. Or the result stays on its
-rank, and rank 0 holds a Kept that stands for it in later orders; then no message comes back. Every rank follows its orders
-one after the other. All messages are counted with their bytes.
+Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. Or
+the result stays on its rank, and rank 0 holds a Kept that stands for it in later orders; then no
+message comes back. Every rank follows its orders one after the other. All messages are counted with
+their bytes.
 
-Whoever waits for a message sleeps between two looks, so that ranks that share a core do not take it from each other.
+Whoever waits for a message sleeps between two looks, so that ranks that share a core do not take it
+from each other.
 """
 
 from __future__ import annotations
@@ -23,10 +26,13 @@ from typing import Any
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
 
-ORDERS, FIRST, TICKETS = 1, 2, 30000  # tag of orders, and tags of replies: one per order, used again in turn
+# tag of orders, and tags of replies: one per order, used again in turn
+ORDERS, FIRST, TICKETS = 1, 2, 30000
 SHORTEST, LONGEST = 1e-5, 1e-3  # sleep between two looks for a message [s]
-GROWTH = 1.15  # of that sleep from look to look, so that nobody waits longer than by about this share less one
-STARTED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")  # set by mpiexec of Open MPI, and of MPICH and its kin
+# of that sleep from look to look, so that nobody waits longer than by about this share less one
+GROWTH = 1.15
+# set by mpiexec of Open MPI, and of MPICH and its kin
+STARTED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 
 
 @dataclass(eq=False)
@@ -81,7 +87,9 @@ class Team:
         self._dismissed = False
 
     def __reduce__(self) -> tuple[type[None], tuple[()]]:
-        """Travel as None: functions that make meshes may hold parts of a team, which other ranks have no use for."""
+        """Travel as None: functions that make meshes may hold parts of a team, which other ranks
+        have no use for.
+        """
         return type(None), ()
 
     @property
@@ -94,15 +102,12 @@ class Team:
 
         Parameters
         ----------
-        rank
-            The number of the rank.
-        function, arguments
-            What it calls, and with which arguments. Both travel as bytes.
+        rank : The number of the rank.
+        function, arguments : What it calls, and with which arguments. Both travel as bytes.
 
         Returns
         -------
-        object
-            What the function returned. An exception that it raised is raised here.
+        What the function returned. An exception that it raised is raised here.
         """
         return self.start(rank, function, *arguments)()
 
@@ -111,13 +116,11 @@ class Team:
 
         Parameters
         ----------
-        rank, function, arguments
-            As for `ask`.
+        rank, function, arguments : As for `ask`.
 
         Returns
         -------
-        callable
-            A function without arguments that waits for the end and returns what the function returned.
+        A function without arguments that waits for the end and returns what the function returned.
         """
         tag = FIRST + self._next_number() % TICKETS
         self._order(rank, (tag, function, arguments))
@@ -135,7 +138,10 @@ class Team:
         return end
 
     def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
-        """What stands for the result, which stays there. Nobody waits for it: whoever uses it learns of an exception."""
+        """What stands for the result, which stays there.
+
+        Nobody waits for it: whoever uses it learns of an exception.
+        """
         kept = Kept(rank, self._next_number())
         self._order(rank, (None, function, arguments), kept.number)
         weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
@@ -143,7 +149,10 @@ class Team:
 
     def cpu(self) -> list[float]:
         """CPU time of every rank so far [s]."""
-        return [time.process_time(), *(self.ask(rank, time.process_time) for rank in range(1, self.size))]
+        return [
+            time.process_time(),
+            *(self.ask(rank, time.process_time) for rank in range(1, self.size)),
+        ]
 
     def dismiss(self) -> None:
         """End the loops of all other ranks."""
@@ -160,10 +169,14 @@ class Team:
             return self._number
 
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
-        """Send without waiting; the bytes are kept until they have arrived. InputError once the ranks were dismissed."""
+        """Send without waiting; the bytes are kept until they have arrived.
+
+        InputError once the ranks were dismissed.
+        """
         if self._dismissed:
             raise InputError(
-                "the ranks that hold the bodies of this result were dismissed; ask before, or run it again."
+                "the ranks that hold the bodies of this result were dismissed; ask before, or run"
+                " it again."
             )
         freed, waiting = [], self._freed[rank]
         while waiting:
@@ -188,19 +201,18 @@ class RemotePart(Part):
 
 
 def spread(scene: Scene, team: Team) -> Scene:
-    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on. All other bodies stay on rank 0.
+    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on.
+
+    All other bodies stay on rank 0.
 
     Parameters
     ----------
-    scene
-        The scene, which stays as it is.
-    team
-        The ranks.
+    scene : The scene, which stays as it is.
+    team : The ranks.
 
     Returns
     -------
-    Scene
-        The scene with RemotePart in place of the bodies on other ranks.
+    The scene with RemotePart in place of the bodies on other ranks.
     """
     elastic = [part.name for part in scene.parts if isinstance(part, Part)]
 
@@ -221,8 +233,7 @@ def serve(comm: Any) -> None:
 
     Parameters
     ----------
-    comm
-        The communicator of mpi4py.
+    comm : The communicator of mpi4py.
     """
     kept: dict[int, Any] = {}
     lock = threading.Lock()
@@ -241,7 +252,9 @@ def serve(comm: Any) -> None:
 
 
 def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """What the function makes of its arguments, or the exception: its own, or that which an argument should have been."""
+    """What the function makes of its arguments, or the exception: its own, or that which an
+    argument should have been.
+    """
     found = [kept[item.number] if isinstance(item, _Reference) else item for item in arguments]
     for item in found:
         if isinstance(item, Raised):
@@ -255,13 +268,19 @@ def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple
 def _portable(error: Exception) -> Exception:
     """The exception itself, or where it cannot travel one that says the same."""
     try:
-        return error if type(pickle.loads(pickle.dumps(error))) is type(error) else RuntimeError(str(error))
+        return (
+            error
+            if type(pickle.loads(pickle.dumps(error))) is type(error)
+            else RuntimeError(str(error))
+        )
     except Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
 
 
 def shipped(message: Any) -> bytes:
-    """Pack anything as bytes. Functions without a name, such as those that make the meshes of scenes, travel by their
+    """Pack anything as bytes.
+
+    Functions without a name, such as those that make the meshes of scenes, travel by their
     code.
     """
     import cloudpickle
@@ -313,13 +332,11 @@ def world() -> Any:
 
     Returns
     -------
-    Comm or None
-        The communicator of mpi4py; None if no others were started.
+    The communicator of mpi4py; None if no others were started.
 
     Raises
     ------
-    InputError
-        If the packages of the extra `mpi` are missing.
+    InputError : If the packages of the extra `mpi` are missing.
     """
     if not any(os.environ.get(name, "1") != "1" for name in STARTED):
         return None
@@ -328,5 +345,7 @@ def world() -> Any:
 
         comm = _mpi().COMM_WORLD
     except ImportError as error:
-        raise InputError("ranks need the packages mpi4py and cloudpickle: pip install 'contactopt[mpi]'.") from error
+        raise InputError(
+            "ranks need the packages mpi4py and cloudpickle: pip install 'contactopt[mpi]'."
+        ) from error
     return comm if comm.size > 1 else None

@@ -1,8 +1,10 @@
-"""A body on another rank: what rank 0 knows of it are the displacement unknowns of its contact surfaces.
+"""A body on another rank: what rank 0 knows of it are the displacement unknowns of its contact
+surfaces.
 
-The body itself, its mesh, its stiffness and its solver stay on their rank. Here its unknowns are only those m of the nodes of
-its contact surfaces, in the order in which the body itself numbers them. Contact forces go there, and displacements of
-these unknowns come back. A displacement of the whole body is kept on its rank and stands here as a Field.
+The body itself, its mesh, its stiffness and its solver stay on their rank. Here its unknowns are
+only those m of the nodes of its contact surfaces, in the order in which the body itself numbers
+them. Contact forces go there, and displacements of these unknowns come back. A displacement of the
+whole body is kept on its rank and stands here as a Field.
 """
 
 from __future__ import annotations
@@ -37,16 +39,20 @@ def _sent(scene: Scene, part: Part) -> bytes:
         if not isinstance(other, Part):
             return other
         values = values_of(other)
-        return Part(**(values if other.name == part.name else values | {"mesh": None, "curve": None}))
+        return Part(
+            **(values if other.name == part.name else values | {"mesh": None, "curve": None})
+        )
 
     return shipped((replace(scene.with_parts(change), reference=None), Part(**values_of(part))))
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A vector of the unknowns of a body, on its rank, with the operators of an array that the callers of bodies use.
+    """A vector of the unknowns of a body, on its rank, with the operators of an array that the
+    callers of bodies use.
 
-    body   the Resident whose n unknowns these are; None for vectors of an iteration, which no map of contacts meets
+    body   the Resident whose n unknowns these are; None for vectors of an iteration, which no map
+           of contacts meets
     known  its values on the contact unknowns (m,) where they are known here
     """
 
@@ -58,8 +64,11 @@ class Field:
     __array_ufunc__ = None  # NumPy's arrays leave the operators to this class
 
     def _make(self, function: Any, other: Any) -> Field:
-        if isinstance(other, np.ndarray) and self.body is not None:  # forces on the contact unknowns
-            other = Field(self.team, self.team.keep(self.kept.rank, resident.Resident.force, self.body, other))
+        # forces on the contact unknowns
+        if isinstance(other, np.ndarray) and self.body is not None:
+            other = Field(
+                self.team, self.team.keep(self.kept.rank, resident.Resident.force, self.body, other)
+            )
         own = other.kept if isinstance(other, Field) else other
         return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own), self.body)
 
@@ -90,7 +99,9 @@ class Field:
         """A map (rows, m) of the contact unknowns applied to the vector."""
         known = self.known
         if known is None:
-            known = self.team.ask(self.kept.rank, resident.Resident.on_contacts, self.body, self.kept)
+            known = self.team.ask(
+                self.kept.rank, resident.Resident.on_contacts, self.body, self.kept
+            )
         return np.asarray(T @ known)
 
     def any(self, axis: None = None, out: None = None) -> bool:
@@ -161,13 +172,19 @@ class RemoteEquilibrium:
         team, rows = self.body.team, np.flatnonzero(np.diff(T.indptr))
         kept = team.keep(self.body.kept.rank, resident.term, self.body.kept, T[rows])
         size, low_rank = team.ask(kept.rank, resident.size, kept)
-        spread = sp.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), (T.shape[0], len(rows)))
-        return RemoteTerm(team, kept, rows, T.shape[0], size, (spread @ low_rank[0], spread @ low_rank[1]))
+        spread = sp.csr_matrix(
+            (np.ones(len(rows)), (rows, np.arange(len(rows)))), (T.shape[0], len(rows))
+        )
+        return RemoteTerm(
+            team, kept, rows, T.shape[0], size, (spread @ low_rank[0], spread @ low_rank[1])
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class RemoteBody:
-    """A body on another rank, as contactopt.bodies.protocol.Body asks; its n unknowns are the m of its contact surfaces."""
+    """A body on another rank, as contactopt.bodies.protocol.Body asks; its n unknowns are the m of
+    its contact surfaces.
+    """
 
     team: Team
     kept: Kept
@@ -235,15 +252,23 @@ class RemoteBody:
 
     def _field(self, member: str, *arguments: Any) -> Field:
         """The same where it is a vector (n,), which stays there."""
-        return Field(self.team, self._keep(resident.Resident.act, member, *map(_sendable, arguments)), self.kept)
+        return Field(
+            self.team,
+            self._keep(resident.Resident.act, member, *map(_sendable, arguments)),
+            self.kept,
+        )
 
     def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
         known = None if free is None else free.kept
-        own = self._keep(resident.Resident.act, "displacement", _sendable(force), multipliers, known)
+        own = self._keep(
+            resident.Resident.act, "displacement", _sendable(force), multipliers, known
+        )
         return Field(self.team, own, self.kept)
 
     def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
-        made = self._keep(resident.Resident.act, "material_change", constant, _sendable(U), _sendable(force))
+        made = self._keep(
+            resident.Resident.act, "material_change", constant, _sendable(U), _sendable(force)
+        )
         return self._item(made, 0), self.team.ask(made.rank, operator.getitem, made, 1)
 
     def material_work(self, constant: str, U: Any, force: np.ndarray, dual: Any, W: Any) -> float:
@@ -258,7 +283,9 @@ class RemoteBody:
         return self._item(made, 0), self._item(made, 1)
 
     def _item(self, made: Kept, number: int) -> Field:
-        return Field(self.team, self.team.keep(made.rank, operator.getitem, made, number), self.kept)
+        return Field(
+            self.team, self.team.keep(made.rank, operator.getitem, made, number), self.kept
+        )
 
     def energy_change(self, constant: str, U: Any, force: np.ndarray) -> float:
         return float(self._act("energy_change", constant, U, force))
@@ -304,7 +331,9 @@ class RemoteBody:
 
 
 def _sendable(value: Any) -> Any:
-    """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it is."""
+    """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it
+    is.
+    """
     if isinstance(value, Field):
         return value.kept
     return resident.Forces(value) if isinstance(value, np.ndarray) else value
@@ -312,7 +341,9 @@ def _sendable(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class RemoteStressMap:
-    """A contactopt.bodies.stress_recovery.StressMap on the rank of its body, with its places and sources here."""
+    """A contactopt.bodies.stress_recovery.StressMap on the rank of its body, with its places and
+    sources here.
+    """
 
     owner: RemoteBody
     kept: Kept
@@ -387,23 +418,25 @@ class AssembledRemote:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
     def prepare(self, solver: str, entries: bool) -> RemoteBody:
-        return _known(self.team, self.team.keep(self.kept.rank, resident.prepared, self.kept, solver, entries))
+        return _known(
+            self.team, self.team.keep(self.kept.rank, resident.prepared, self.kept, solver, entries)
+        )
 
 
-def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float | None) -> AssembledRemote:
+def assemble_remote(
+    scene: Scene, part: RemotePart, elements: int, zone: float | None
+) -> AssembledRemote:
     """Assemble a body on its rank.
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its remote parts.
-    elements, zone
-        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+    scene, part : The scene and one of its remote parts.
+    elements, zone : Number of elements across the contact half-width, and the half-width that the
+        mesh resolves [length].
 
     Returns
     -------
-    AssembledRemote
-        What stands for the body on this rank.
+    What stands for the body on this rank.
     """
     team = part.team
     assert team is not None

@@ -1,6 +1,7 @@
 """An elastic body on its rank: what rank 0 orders of it (contactopt.bodies.remote).
 
-Its contact unknowns m are those of the nodes of its contact surfaces, in the order in which the body numbers them.
+Its contact unknowns m are those of the nodes of its contact surfaces, in the order in which the
+body numbers them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ class Resident:
 
     def wide(self, T: sp.csr_matrix) -> sp.csr_matrix:
         """A map (rows, m) of the contact unknowns as one (rows, n) of all unknowns."""
-        return sp.csr_matrix((T.data, self.skin[T.indices], T.indptr), (T.shape[0], len(self.body.at_rest)))
+        return sp.csr_matrix(
+            (T.data, self.skin[T.indices], T.indptr), (T.shape[0], len(self.body.at_rest))
+        )
 
     def force(self, F: np.ndarray) -> np.ndarray:
         """Forces (m,) on the contact unknowns as nodal forces (n,)."""
@@ -42,7 +45,9 @@ class Resident:
 
     def act(self, member: str, *arguments: Any) -> Any:
         """What a member of the body returns; forces on the contact unknowns are widened for it."""
-        given = [self.force(item.values) if isinstance(item, Forces) else item for item in arguments]
+        given = [
+            self.force(item.values) if isinstance(item, Forces) else item for item in arguments
+        ]
         return getattr(self.body, member)(*given)
 
 
@@ -78,7 +83,9 @@ def assembled(sent: bytes, elements: int, zone: float | None) -> AssembledElasti
 
 
 def surface(assembled: AssembledElastic, name: str | None) -> bytes:
-    """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the contact surfaces alone."""
+    """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the contact
+    surfaces alone.
+    """
     body, skin, whole = assembled.body, _skin(assembled), assembled.surface(name)
     place = np.full(len(body.load), -1)
     place[skin] = np.arange(len(skin))
@@ -111,7 +118,9 @@ def prepared(assembled: AssembledElastic, solver: str, entries: bool) -> Residen
 def facts(own: Resident) -> Facts:
     body, skin, equilibrated = own.body, own.skin, own.body.solver.iteration is not None
     named, solved = (body.name, body.unknowns), (body.iterative, body.complete, equilibrated)
-    return Facts(*named, body.at_rest[skin], body.motions[skin], body.motion_names, body.resultants, *solved)
+    return Facts(
+        *named, body.at_rest[skin], body.motions[skin], body.motion_names, body.resultants, *solved
+    )
 
 
 def term(own: Resident, T: sp.csr_matrix) -> LocalTerm:
@@ -155,14 +164,21 @@ def seen(own: Resident, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
     return own.body.seen(own.wide(T), U)
 
 
-def held_by(own: Resident, U: np.ndarray, F: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def held_by(
+    own: Resident, U: np.ndarray, F: np.ndarray
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """As ElasticBody.held_by, without the places on which no force acts."""
     found = own.body.held_by(U, own.force(F))
     acting = {name: forces.any(axis=0) for name, (_, forces) in found.items()}
-    return {name: (points[:, acting[name]], forces[:, acting[name]]) for name, (points, forces) in found.items()}
+    return {
+        name: (points[:, acting[name]], forces[:, acting[name]])
+        for name, (points, forces) in found.items()
+    }
 
 
-def load_work(own: Resident, sent: bytes, dual: np.ndarray | Forces, weights: np.ndarray, W: np.ndarray) -> float:
+def load_work(
+    own: Resident, sent: bytes, dual: np.ndarray | Forces, weights: np.ndarray, W: np.ndarray
+) -> float:
     scene, part = pickle.loads(sent)
     return float(own.act("load_work", scene, part, dual, weights, W))
 

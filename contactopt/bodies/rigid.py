@@ -1,8 +1,8 @@
 """A rigid body: its compliance is zero, and its displacement unknowns are its motions.
 
-It has one unknown for each component of a translation. Those with a total force are free motions, whose displacements are
-multipliers of the interface problem; the others are given, by default zero. The total contact force follows them in U, so that the
-forces that hold the body are known from U.
+It has one unknown for each component of a translation. Those with a total force are free motions,
+whose displacements are multipliers of the interface problem; the others are given, by default zero.
+The total contact force follows them in U, so that the forces that hold the body are known from U.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ FLAT = 1e-3  # normals of a surface that differ by less than this are one direct
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """A rigid body of a scene with the components of its displacement; it needs no preparation, so it is both stages."""
+    """A rigid body of a scene with the components of its displacement; it needs no preparation, so
+    it is both stages.
+    """
 
     part: Rigid
     components: tuple[str, ...]
@@ -66,7 +68,10 @@ class RigidBody:
         return dict(self.part.force or {})
 
     def surface(self, name: str | None = None) -> Surface:
-        raise InputError(f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a mesh.")
+        raise InputError(
+            f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a"
+            " mesh."
+        )
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
         (dim, k), suggested = other.points.shape, normals
@@ -75,16 +80,28 @@ class RigidBody:
             normals = np.tile(own[:, None] / np.linalg.norm(own), k)
         elif self.part.gap is not None and np.ptp(normals, axis=1).max(initial=0.0) > FLAT:
             log.warning(
-                "the gap of rigid body '%s' is taken along the normals of the curved surface of body '%s', because no normal is "
-                "given; give Rigid(normal=...) if the gap is measured along one direction.",
+                "the gap of rigid body '%s' is taken along the normals of the curved surface of"
+                " body '%s', because no normal is given; give Rigid(normal=...) if the gap is"
+                " measured along one direction.",
                 self.name,
                 other.body,
             )
         fixed = np.array([name not in self._force for name in self.components])
-        trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim)) for c in range(dim)]
+        trace = [
+            sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim))
+            for c in range(dim)
+        ]
         held = np.tile(fixed[:, None], k)
         surface = Surface(
-            self.name, other.points, normals, other.areas, other.weights, other.places, tuple(trace), held, other.cells
+            self.name,
+            other.points,
+            normals,
+            other.areas,
+            other.weights,
+            other.places,
+            tuple(trace),
+            held,
+            other.cells,
         )
         gap = self._gap(other)
         self._check_side(other, np.sum(normals * suggested, axis=0), gap)
@@ -101,27 +118,32 @@ class RigidBody:
             and np.sum((facing * other.areas)[nearest]) < -FLAT * other.areas[nearest].sum()
         ):
             raise InputError(
-                f"rigid body '{self.name}': its normal points away from body '{other.body}' where they are "
-                "nearest; a contact normal points from the lower body to the upper one, so turn its sign."
+                f"rigid body '{self.name}': its normal points away from body '{other.body}' where"
+                " they are nearest; a contact normal points from the lower body to the upper one,"
+                " so turn its sign."
             )
 
     def _gap(self, other: Surface) -> np.ndarray:
-        """The initial gap at the contacts from that at the nodes, with the weights of the displacements."""
+        """The initial gap at the contacts from that at the nodes, with the weights of the
+        displacements.
+        """
         if other.mesh is None:  # its points lie in a plane, its places on the surface
             height = np.sum(other.normals * (other.places - other.points), axis=0)
             if self.part.gap is None:
                 return -height
             if height.any():
                 raise InputError(
-                    f"rigid body '{self.name}' has a gap and half-space '{other.body}' a height; give one of them, "
-                    "which then stands for both surfaces."
+                    f"rigid body '{self.name}' has a gap and half-space '{other.body}' a height;"
+                    " give one of them, which then stands for both surfaces."
                 )
         elif self.part.gap is None:
             return np.zeros(other.points.shape[1])
         given = self.part.gap(other.places) if callable(self.part.gap) else self.part.gap
         gap = real_array(f"the gap of rigid body '{self.name}'", given).ravel()
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
-            raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
+            raise InputError(
+                f"the gap of rigid body '{self.name}' must give one finite number per contact node."
+            )
         return np.asarray(other.weights @ gap)
 
     def guides(self) -> Guides:
@@ -145,18 +167,30 @@ class RigidBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.zeros(T.shape[0], dtype=bool)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
-        return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
+    def displacement(
+        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+    ) -> np.ndarray:
+        return np.asarray(
+            self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components))
+        )
 
-    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def material_change(
+        self, constant: str, U: np.ndarray, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(len(U)), np.zeros(len(self.resultants))
 
-    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+    def material_work(
+        self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray
+    ) -> float:
         return 0.0
 
-    def load_work(self, scene: Scene, part: Rigid, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+    def load_work(
+        self, scene: Scene, part: Rigid, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
+    ) -> float:
         new = self.loaded(scene, part)
-        return float(dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants))
+        return float(
+            dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants)
+        )
 
     def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(len(U)), np.zeros(len(U))
@@ -210,14 +244,11 @@ def assemble_rigid(scene: Scene, part: Rigid, elements: int, zone: float | None)
 
     Parameters
     ----------
-    scene, part
-        The scene and one of its rigid parts.
-    elements, zone
-        Not used: a rigid body has no mesh.
+    scene, part : The scene and one of its rigid parts.
+    elements, zone : Not used: a rigid body has no mesh.
 
     Returns
     -------
-    RigidBody
-        The body, whose unknowns are its motions.
+    The body, whose unknowns are its motions.
     """
     return RigidBody(part, scene.components)

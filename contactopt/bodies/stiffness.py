@@ -14,22 +14,20 @@ from contactopt.material import Material, lame
 PIECE = 2**20  # entries of element matrices that are held at the same time
 
 
-def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]) -> sp.csr_matrix:
+def stiffness(
+    basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]
+) -> sp.csr_matrix:
     """Assemble the elastic stiffness of a material.
 
     Parameters
     ----------
-    basis
-        The displacement basis of N unknowns.
-    material
-        Young's modulus and Poisson's ratio.
-    weight
-        The measure of the integrals, as for contactopt.bodies.elements.weight_at.
+    basis : The displacement basis of N unknowns.
+    material : Young's modulus and Poisson's ratio.
+    weight : The measure of the integrals, as for contactopt.bodies.elements.weight_at.
 
     Returns
     -------
-    csr_matrix
-        (N, N) stiffness [force / length].
+    (N, N) stiffness [force / length].
     """
     return isotropic_stiffness(basis, lame(material), weight)
 
@@ -37,10 +35,13 @@ def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, b
 def isotropic_stiffness(
     basis: skfem.CellBasis, constants: tuple[float, float], weight: tuple[float, bool]
 ) -> sp.csr_matrix:
-    """Elastic stiffness: the integral of sigma(u) : epsilon(v), with the hoop strain u_r / r if axisymmetric.
+    """Elastic stiffness: the integral of sigma(u) : epsilon(v), with the hoop strain u_r / r if
+    axisymmetric.
 
-    It is linear in Lame's parameters, so that their derivatives give the derivative of the stiffness. The pattern of the matrix is made first, from the nodes of the elements. The element matrices are then added to it
-    a piece of the mesh at a time, so that little more memory is taken than the matrix needs.
+    It is linear in Lame's parameters, so that their derivatives give the derivative of the
+    stiffness. The pattern of the matrix is made first, from the nodes of the elements. The element
+    matrices are then added to it a piece of the mesh at a time, so that little more memory is taken
+    than the matrix needs.
 
     Parameters
     ----------
@@ -59,27 +60,38 @@ def isotropic_stiffness(
     owner = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
     known = owner * graph.shape[0] + graph.indices  # ascending
     data = np.zeros(len(indices))
-    # Entry (a, b) of the block of two nodes stands at first + a step + b, and pairs of nodes are found by bisection.
+    # Entry (a, b) of the block of two nodes stands at first + a step + b, and pairs of nodes are
+    # found by bisection.
     a, b = np.arange(dim)[:, None, None], np.arange(dim)
     for piece in _pieces(len(nodes), dim * nodes.shape[1]):
         own = nodes[piece].astype(np.int64)
-        pair = np.searchsorted(known, own[:, :, None] * graph.shape[0] + own[:, None, :])[:, :, None, :, None]
+        pair = np.searchsorted(known, own[:, :, None] * graph.shape[0] + own[:, None, :])[
+            :, :, None, :, None
+        ]
         K = _element_matrices(basis, piece, constants, weight)  # (element, i, a, j, b)
         np.add.at(data, (first[pair] + a * step[pair] + b).ravel(), K.ravel())
     return sp.csr_matrix((data, indices, indptr), (basis.N, basis.N))
 
 
 def _element_matrices(
-    basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: tuple[float, bool]
+    basis: skfem.CellBasis,
+    elements: np.ndarray,
+    constants: tuple[float, float],
+    weight: tuple[float, bool],
 ) -> np.ndarray:
-    """Stiffness of some elements, (element, i, a, j, b) for component a of node i and component b of node j.
+    """Stiffness of some elements, (element, i, a, j, b) for component a of node i and component b
+    of node j.
 
     With g_ia the derivative of shape function i along a, the entry is the integral of
-    lambda g_ia g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all elements.
+    lambda g_ia g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all
+    elements.
     """
     lam, shear = constants
     mapping, places, shape = basis.mapping, basis.X, basis.elem.elem
-    fields = [shape.gbasis(mapping, places, i, tind=elements)[0] for i in range(basis.Nbfun // len(basis.mesh.p))]
+    fields = [
+        shape.gbasis(mapping, places, i, tind=elements)[0]
+        for i in range(basis.Nbfun // len(basis.mesh.p))
+    ]
     x = mapping.F(places, tind=elements)
     measure = np.abs(mapping.detDF(places, tind=elements)) * basis.W * weight_at(weight, x)
     g = np.stack([np.asarray(f.grad) for f in fields])  # (i, a, element, point)
@@ -110,17 +122,21 @@ def _pieces(count: int, unknowns: int) -> Iterator[np.ndarray]:
 def _node_graph(nodes: np.ndarray, count: int) -> sp.csr_matrix:
     """Pattern (count, count), sorted, of the nodes that share an element; nodes (element, i)."""
     ones = np.ones(nodes.size, dtype=np.int32)
-    member = sp.csr_matrix((ones, nodes.ravel(), np.arange(0, nodes.size + 1, nodes.shape[1])), (len(nodes), count))
+    member = sp.csr_matrix(
+        (ones, nodes.ravel(), np.arange(0, nodes.size + 1, nodes.shape[1])), (len(nodes), count)
+    )
     graph = (member.T @ member).tocsr()
     graph.sort_indices()
     return graph
 
 
-def _pattern(graph: sp.csr_matrix, dim: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _pattern(
+    graph: sp.csr_matrix, dim: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Pattern of the matrix from that of its nodes.
 
-    Returns indices and indptr of the CSR form, and for each pair of nodes the place of its first entry and the distance
-    from one of its rows to the next.
+    Returns indices and indptr of the CSR form, and for each pair of nodes the place of its first
+    entry and the distance from one of its rows to the next.
     """
     degree = np.diff(graph.indptr)
     indptr = np.concatenate([[0], np.cumsum(np.repeat(dim * degree, dim), dtype=np.int64)])
@@ -136,6 +152,10 @@ def _pattern(graph: sp.csr_matrix, dim: int) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
-    """Integrals of f_ia f_jb: f (element, i, a, point), measure (element, point) -> (element, i, a, j, b)."""
+    """Integrals of f_ia f_jb: f (element, i, a, point), measure (element, point) -> (element, i, a,
+    j, b).
+    """
     flat = f.reshape(len(f), -1, f.shape[3])
-    return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(*f.shape[:3], *f.shape[1:3])
+    return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(
+        *f.shape[:3], *f.shape[1:3]
+    )

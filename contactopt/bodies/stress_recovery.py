@@ -1,22 +1,25 @@
-"""Recovered stress at chosen places: a linear map of the displacement, more accurate than the stress inside the elements.
+"""Recovered stress at chosen places: a linear map of the displacement, more accurate than the
+stress inside the elements.
 
-Around a place x the stresses s_h of the elements near it are fitted by a polynomial P a of the degree of the displacement,
+Around a place x the stresses s_h of the elements near it are fitted by a polynomial P a of the
+degree of the displacement,
 
     a = argmin sum_q |s_h(x_q) - P(x_q - x) a|^2,      s*(x) = P(0) a = sum_q c_q s_h(x_q),
 
-with one coefficient vector a per component. The points x_q are those at which the stress of an element is most accurate: its
-centre where the displacement is linear, the Gauss points of order two where it is quadratic. The patch of a vertex is made of
-the elements around it; that of a vertex on the boundary also of the elements around its neighbours, since there the fit looks
-from one side. The patch of another point is made of the elements around the vertices of the element that holds it. A patch at a
-plane of symmetry holds the mirror images of its elements, too: the shear across the plane, which changes its sign there, is
-zero, and the other components are fitted from both sides.
+with one coefficient vector a per component. The points x_q are those at which the stress of an
+element is most accurate: its centre where the displacement is linear, the Gauss points of order two
+where it is quadratic. The patch of a vertex is made of the elements around it; that of a vertex on
+the boundary also of the elements around its neighbours, since there the fit looks from one side.
+The patch of another point is made of the elements around the vertices of the element that holds it.
+A patch at a plane of symmetry holds the mirror images of its elements, too: the shear across the
+plane, which changes its sign there, is zero, and the other components are fitted from both sides.
 
-The element stress is linear in the displacement, s_h = D U, and the coefficients c depend on the mesh alone: s* = R D U. So a
-function f of the recovered stress has the derivative D' R' df/ds* by U. The load of its adjoint problem is the transpose of
-the recovery.
+The element stress is linear in the displacement, s_h = D U, and the coefficients c depend on the
+mesh alone: s* = R D U. So a function f of the recovered stress has the derivative D' R' df/ds* by
+U. The load of its adjoint problem is the transpose of the recovery.
 
-Source: Zienkiewicz, Zhu (1992), The superconvergent patch recovery and a posteriori error estimates, Int. J. Numer. Methods
-Eng. 33.
+Source: Zienkiewicz, Zhu (1992), The superconvergent patch recovery and a posteriori error
+estimates, Int. J. Numer. Methods Eng. 33.
 """
 
 from __future__ import annotations
@@ -40,21 +43,25 @@ from contactopt.meshes.cells import straight
 from contactopt.meshes.local_refinement import simplices
 
 OUTSIDE = (
-    0.2  # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a coarse mesh
+    # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a
+    # coarse mesh
+    0.2
 )
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 
 
 @dataclass(frozen=True, eq=False)
 class StressMap:
-    """The recovered stress at m places of a body as a linear map of its displacement, as in the head of this module.
+    """The recovered stress at m places of a body as a linear map of its displacement, as in the
+    head of this module.
 
     places   (dim, m) [length]
     sources  (m,) vertices of the mesh, -1 for a place that is none
     fit      of the stresses of the elements around each place
     used     numbers of the elements whose stresses are fitted
     even     (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
-    body, basis, constants  of the element stress: the quadrature points, and the constants lambda and mu of the material
+    body, basis, constants  of the element stress: the quadrature points, and the constants lambda
+                            and mu of the material
     """
 
     places: np.ndarray
@@ -76,48 +83,48 @@ class StressMap:
 
         Parameters
         ----------
-        U : (n,)
-            The displacement of the body [length].
+        U : (n,) The displacement of the body [length].
 
         Returns
         -------
-        (m, 4 or 6) array
-            The stress at every place, components as in contactopt.bodies.fields.STRESSES.
+        (m, 4 or 6) array : The stress at every place, components as in
+            contactopt.bodies.fields.STRESSES.
         """
-        return np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1) * self.even
+        return (
+            np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
+            * self.even
+        )
 
     def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Estimate how uncertain a function of the recovered stress is.
 
-        The stresses of the elements around a place scatter about the fit, and what is fitted is as uncertain as that.
+        The stresses of the elements around a place scatter about the fit, and what is fitted is as
+        uncertain as that.
 
         Parameters
         ----------
-        U : (n,)
-            The displacement of the body [length].
-        slopes : (m, 4 or 6)
-            Derivatives of the function by the recovered stress.
+        U : (n,) The displacement of the body [length].
+        slopes : (m, 4 or 6) Derivatives of the function by the recovered stress.
 
         Returns
         -------
-        (m,) array
-            Its standard error at every place.
+        (m,) array : Its standard error at every place.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
-        return np.asarray(np.sqrt(sum((slope * self.fit.deviation(rows @ U)) ** 2 for rows, slope in columns)))
+        return np.asarray(
+            np.sqrt(sum((slope * self.fit.deviation(rows @ U)) ** 2 for rows, slope in columns))
+        )
 
     def elements(self, places: np.ndarray) -> np.ndarray:
         """List the elements around some of the places.
 
         Parameters
         ----------
-        places
-            Numbers of places.
+        places : Numbers of places.
 
         Returns
         -------
-        ndarray
-            Numbers of elements.
+        Numbers of elements.
         """
         chosen = np.isin(self.fit.row, places)
         return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
@@ -127,13 +134,11 @@ class StressMap:
 
         Parameters
         ----------
-        slopes : (m, 4 or 6)
-            Derivatives of a function by the recovered stress.
+        slopes : (m, 4 or 6) Derivatives of a function by the recovered stress.
 
         Returns
         -------
-        (n,) array
-            Its derivative by the displacement U.
+        (n,) array : Its derivative by the displacement U.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
@@ -143,13 +148,11 @@ class StressMap:
 
         Parameters
         ----------
-        number
-            Number of the place.
+        number : Number of the place.
 
         Returns
         -------
-        float
-            Their mean size [length].
+        Their mean size [length].
         """
         own = np.unique(self.weights[number].indices // len(self.basis.W))
         volume = np.asarray(self.basis.dx)[own].sum(axis=1)
@@ -182,7 +185,9 @@ class StressMap:
                 own.append(2 * shear * strain[i, j] + (lam * trace if i == j else 0.0))
         row = np.tile(np.arange(shape[0]), basis.Nbfun)
         column = np.repeat(dofs[:, :, None], len(basis.W), axis=2).ravel()
-        return tuple(sp.csr_matrix((np.stack(own).ravel(), (row, column)), shape) for own in entries)
+        return tuple(
+            sp.csr_matrix((np.stack(own).ravel(), (row, column)), shape) for own in entries
+        )
 
 
 def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> StressMap:
@@ -211,17 +216,23 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
     points = (np.searchsorted(used, patches.indices)[:, None] * count + np.arange(count)).ravel()
     row = np.repeat(row, count)
     at = np.asarray(basis.global_coordinates()).reshape(len(mesh.p), -1)
-    fit = _fit(*_both_sides(at[:, points] - places[:, row], row, points, in_plane), len(sources), terms)
+    fit = _fit(
+        *_both_sides(at[:, points] - places[:, row], row, points, in_plane), len(sources), terms
+    )
     constants = lame_by_poisson(body.material) if by_poisson else lame(body.material)
     mirrored = np.concatenate([in_plane, np.zeros((3 - len(in_plane), len(sources)), dtype=bool)])
-    even = np.stack([~(mirrored[i] ^ mirrored[j]) for i, j in PLACES[len(mesh.p)]], axis=1).astype(float)
+    even = np.stack([~(mirrored[i] ^ mirrored[j]) for i, j in PLACES[len(mesh.p)]], axis=1).astype(
+        float
+    )
     return StressMap(places, sources, fit, used, even, body, basis, constants)
 
 
 def _both_sides(
     offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of patches with their mirror images across the planes (dim, m) in which their places lie."""
+    """Points of patches with their mirror images across the planes (dim, m) in which their places
+    lie.
+    """
     for axis, there in enumerate(in_plane):
         images = np.flatnonzero(there[row])
         other = offset[:, images].copy()
@@ -232,54 +243,73 @@ def _both_sides(
 
 
 def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements make each patch."""
+    """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements
+    make each patch.
+    """
     count = mesh.p.shape[1]
     vertices, point = np.unique(mesh.t), np.asarray(region.point, dtype=float)
     if region.boundary:
         known = mesh.boundaries or {}
         if region.boundary not in known:
             raise InputError(
-                f"body '{name}' has no boundary {region.boundary!r}; it has {', '.join(sorted(known)) or 'none'}."
+                f"body '{name}' has no boundary {region.boundary!r}; it has"
+                f" {', '.join(sorted(known)) or 'none'}."
             )
         vertices = np.unique(mesh.facets[:, known[region.boundary]])
     elif region.radius is not None:
-        vertices = vertices[np.linalg.norm(mesh.p[:, vertices] - point[:, None], axis=0) <= region.radius]
+        vertices = vertices[
+            np.linalg.norm(mesh.p[:, vertices] - point[:, None], axis=0) <= region.radius
+        ]
     elif len(point):
         vertices = vertices[:0]
-    seeds = sp.csr_matrix((np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), (len(vertices), count))
+    seeds = sp.csr_matrix(
+        (np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), (len(vertices), count)
+    )
     places = mesh.p[:, vertices]
     if len(point):
         corners, beyond = _holder(mesh, point)
         if beyond <= OUTSIDE:
-            own = sp.csr_matrix((np.ones(len(corners)), (np.zeros(len(corners), int), corners)), (1, count))
+            own = sp.csr_matrix(
+                (np.ones(len(corners)), (np.zeros(len(corners), int), corners)), (1, count)
+            )
             seeds, places = sp.vstack([seeds, own]).tocsr(), np.column_stack([places, point])
             vertices = np.append(vertices, -1)
         elif not len(vertices):
             place = ", ".join(f"{x:g}" for x in point)
-            raise InputError(f"the point ({place}) lies outside body '{name}'; give one inside it or on its surface.")
+            raise InputError(
+                f"the point ({place}) lies outside body '{name}'; give one inside it or on its"
+                " surface."
+            )
     return places, vertices, seeds
 
 
 def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
-    """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its size it misses the point."""
+    """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
+    size it misses the point.
+    """
     cells = simplices(mesh)
     origin = cells.p[:, cells.t[0]]
     edges = cells.p[:, cells.t[1:]] - origin[:, None]
-    shares = np.linalg.solve(np.moveaxis(edges, 2, 0), (point[:, None] - origin).T[..., None])[..., 0]
+    shares = np.linalg.solve(np.moveaxis(edges, 2, 0), (point[:, None] - origin).T[..., None])[
+        ..., 0
+    ]
     beyond = -np.minimum(shares.min(axis=1), 1 - shares.sum(axis=1))
     best = int(np.argmin(beyond))
     return cells.t[:, best], float(beyond[best])
 
 
-def _patches(mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float) -> sp.csr_matrix:
+def _patches(
+    mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float
+) -> sp.csr_matrix:
     """Mask (m, elements) of the elements that make each patch.
 
-    With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at least `least` where the mesh
-    has them.
+    With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at
+    least `least` where the mesh has them.
     """
     count = mesh.t.shape[1]
     around = sp.csr_matrix(
-        (np.ones(mesh.t.size), (mesh.t.ravel(), np.tile(np.arange(count), len(mesh.t)))), (mesh.p.shape[1], count)
+        (np.ones(mesh.t.size), (mesh.t.ravel(), np.tile(np.arange(count), len(mesh.t)))),
+        (mesh.p.shape[1], count),
     )
     patches = seeds @ around
     rim = mesh.facets[:, mesh.boundary_facets()]
@@ -305,14 +335,19 @@ def _replaced(rows: sp.csr_matrix, chosen: np.ndarray, others: sp.csr_matrix) ->
 
 def _terms(dim: int, degree: int) -> list[tuple[int, ...]]:
     """The monomials up to a degree as tuples of axes, the constant first."""
-    return [axes for order in range(degree + 1) for axes in combinations_with_replacement(range(dim), order)]
+    return [
+        axes
+        for order in range(degree + 1)
+        for axes in combinations_with_replacement(range(dim), order)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
 class PatchFit:
     """The least-squares fits around m places.
 
-    row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among all points
+    row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among
+             all points
     powers   (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
     """
 
@@ -327,7 +362,9 @@ class PatchFit:
         return np.asarray(np.sum(self.inverse[self.row, 0] * self.powers, axis=1))
 
     def deviation(self, values: np.ndarray) -> np.ndarray:
-        """Standard error (m,) of the fit of values (points,) at the places, from what the fit leaves."""
+        """Standard error (m,) of the fit of values (points,) at the places, from what the fit
+        leaves.
+        """
         count, own = len(self.inverse), values[self.column]
         sums = [np.bincount(self.row, own * power, count) for power in self.powers.T]
         coefficients = np.einsum("mab,bm->ma", self.inverse, np.array(sums))
@@ -337,7 +374,13 @@ class PatchFit:
         return np.asarray(np.sqrt(np.maximum(self.inverse[:, 0, 0], 0.0) * variance))
 
 
-def _fit(offset: np.ndarray, row: np.ndarray, column: np.ndarray, count: int, terms: list[tuple[int, ...]]) -> PatchFit:
+def _fit(
+    offset: np.ndarray,
+    row: np.ndarray,
+    column: np.ndarray,
+    count: int,
+    terms: list[tuple[int, ...]],
+) -> PatchFit:
     """The fits of points at `offset` (dim, p) from the places to which `row` says they belong."""
     size = np.zeros(count)
     np.maximum.at(size, row, np.linalg.norm(offset, axis=0))
@@ -355,13 +398,11 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    stress : (m, 4 or 6)
-        Stresses, whose first three columns are the normal ones.
+    stress : (m, 4 or 6) Stresses, whose first three columns are the normal ones.
 
     Returns
     -------
-    (m,) array
-        Their von Mises stress, in the unit of the stresses.
+    (m,) array : Their von Mises stress, in the unit of the stresses.
     """
     normal, shear = stress[:, :3], stress[:, 3:]
     deviator = normal - normal.mean(axis=1, keepdims=True)
@@ -373,14 +414,14 @@ def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    stress : (m, 4 or 6)
-        Stresses, whose first three columns are the normal ones.
+    stress : (m, 4 or 6) Stresses, whose first three columns are the normal ones.
 
     Returns
     -------
-    (m, 4 or 6) array
-        Derivatives by the components; 0 where there is no stress.
+    (m, 4 or 6) array : Derivatives by the components; 0 where there is no stress.
     """
     normal, size = stress[:, :3], von_mises(stress)[:, None]
-    slopes = np.concatenate([1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1)
+    slopes = np.concatenate(
+        [1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1
+    )
     return np.divide(slopes, size, out=np.zeros(slopes.shape), where=size > 0)

@@ -1,8 +1,9 @@
 """Stresses below the surface of a half-space under uniform tractions on the cells of its grid.
 
-Stresses of point forces (Boussinesq, Cerruti) and line forces (Flamant) are averaged over cells by Gauss's rule, which is exact to
-many digits from half a spacing below the surface on, and summed over all cells by fast Fourier transforms.
-Sources: Johnson (1985), Contact Mechanics, sections 2.2, 2.3, 3.2 and 3.6.
+Stresses of point forces (Boussinesq, Cerruti) and line forces (Flamant) are averaged over cells by
+Gauss's rule, which is exact to many digits from half a spacing below the surface on, and summed
+over all cells by fast Fourier transforms. Sources: Johnson (1985), Contact Mechanics, sections 2.2,
+2.3, 3.2 and 3.6.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from contactopt.bodies.half_space import HalfSpaceBody
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 
-# Distance in longer sides of a cell within which the finer of two Gauss rules is used, and the points of both.
+# Distance in longer sides of a cell within which the finer of two Gauss rules is used, and the
+# points of both.
 NEAR, FINE, COARSE = 8, 12, 3
 PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
 
@@ -27,27 +29,23 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
 
     Parameters
     ----------
-    body
-        The half-space; not a periodic one.
-    force
-        (k, dim) forces on its points in its components [force].
-    depths
-        (j,) depths below the surface [length], at least half a spacing.
+    body : The half-space; not a periodic one.
+    force : (k, dim) forces on its points in its components [force].
+    depths : (j,) depths below the surface [length], at least half a spacing.
 
     Returns
     -------
-    ndarray
-        (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid [stress]. In plane
-        strain the third axis is that across the plane.
+    (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid
+    [stress]. In plane strain the third axis is that across the plane.
 
     Raises
     ------
-    InputError
-        For a periodic surface and for depths that are too small.
+    InputError : For a periodic surface and for depths that are too small.
     """
     if body.part.periodic:
         raise InputError(
-            f"half-space '{body.name}' is periodic; stresses below the surface are those of a single one only."
+            f"half-space '{body.name}' is periodic; stresses below the surface are those of a"
+            " single one only."
         )
     least = max(body.spacing) / 2
     for depth in depths:
@@ -64,7 +62,9 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
             stress = irfftn(total, padded)[tuple(slice(n) for n in grid)] * inward[a] * inward[b]
             out[place, ..., a, b] = out[place, ..., b, a] = stress
         if dim == 2:
-            out[place, ..., 2, 2] = body.part.material.nu * (out[place, ..., 0, 0] + out[place, ..., 1, 1])
+            out[place, ..., 2, 2] = body.part.material.nu * (
+                out[place, ..., 0, 0] + out[place, ..., 1, 1]
+            )
     return out / (body.thickness if dim == 2 else 1.0)
 
 
@@ -73,25 +73,27 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    stress
-        (..., 3, 3) stress tensors [stress].
+    stress : (..., 3, 3) stress tensors [stress].
 
     Returns
     -------
-    ndarray
-        (...) von Mises stresses [stress].
+    (...) von Mises stresses [stress].
     """
     deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1))))
 
 
 def _coefficients(body: HalfSpaceBody, padded: tuple[int, ...], depth: float) -> np.ndarray:
-    """(stress component, loaded component, *padded) stress per unit of force, at the distances of a circulant."""
+    """(stress component, loaded component, *padded) stress per unit of force, at the distances of a
+    circulant.
+    """
     offsets = [np.fft.fftfreq(m, 1 / m) for m in padded]
     out, longer = _mean(body, offsets, depth, COARSE), max(body.spacing)
     if depth >= NEAR * longer:
         return out
-    near = [np.flatnonzero(h * np.abs(row) <= NEAR * longer) for row, h in zip(offsets, body.spacing)]
+    near = [
+        np.flatnonzero(h * np.abs(row) <= NEAR * longer) for row, h in zip(offsets, body.spacing)
+    ]
     there: Any = (slice(None), slice(None), *np.ix_(*near))
     points = FINE if depth < 2 * longer else 2 * COARSE
     out[there] = _mean(body, [row[some] for row, some in zip(offsets, near)], depth, points)
@@ -120,19 +122,19 @@ def flamant(x: np.ndarray, z: float) -> np.ndarray:
 
     Parameters
     ----------
-    x
-        Places of any shape along the surface, from the force [length].
-    z
-        The depth [length].
+    x : Places of any shape along the surface, from the force [length].
+    z : The depth [length].
 
     Returns
     -------
-    ndarray
-        (3, 2, ...): the stresses xx, zz and xz under each of the two forces, at the places [1 / length].
+    (3, 2, ...): the stresses xx, zz and xz under each of the two forces, at the places [1 /
+    length].
     """
     square = x**2 + z**2
     radial = [-2 / np.pi * x / square**2, -2 / np.pi * z / square**2]
-    return np.array([[r * x**2 for r in radial], [r * z**2 for r in radial], [r * x * z for r in radial]])
+    return np.array(
+        [[r * x**2 for r in radial], [r * z**2 for r in radial], [r * x * z for r in radial]]
+    )
 
 
 def boussinesq_cerruti(x: np.ndarray, y: np.ndarray, z: float, nu: float) -> np.ndarray:
@@ -142,25 +144,22 @@ def boussinesq_cerruti(x: np.ndarray, y: np.ndarray, z: float, nu: float) -> np.
 
     Parameters
     ----------
-    x, y
-        Places along the surface, from the force, of shapes that fit each other [length].
-    z
-        The depth, greater than 0 [length].
-    nu
-        Poisson's ratio.
+    x, y : Places along the surface, from the force, of shapes that fit each other [length].
+    z : The depth, greater than 0 [length].
+    nu : Poisson's ratio.
 
     Returns
     -------
-    ndarray
-        (6, 3, ...): the stresses xx, yy, zz, xy, xz and yz under each of the three forces, at the places [1 /
-        length^2].
+    (6, 3, ...): the stresses xx, yy, zz, xy, xz and yz under each of the three forces, at the
+    places [1 / length^2].
     """
     x, y = np.broadcast_arrays(x, y)
     rho = np.sqrt(x**2 + y**2 + z**2)
     along = _cerruti(x, y, z, rho, nu)
     across = _cerruti(y, x, z, rho, nu)[[1, 0, 2, 3, 5, 4]]
     s, m = rho + z, 1 - 2 * nu
-    even, mixed = z / rho**3 - 1 / (rho * s), (2 * rho + z) / (rho**3 * s**2)  # these have no singularity on the axis
+    # these have no singularity on the axis
+    even, mixed = z / rho**3 - 1 / (rho * s), (2 * rho + z) / (rho**3 * s**2)
     down = np.array(
         [
             m * (even + x**2 * mixed) - 3 * z * x**2 / rho**5,

@@ -1,14 +1,19 @@
-"""Bodies so thin or so weakly held that rounding moves them: how soft they are, and the ground that holds them meanwhile.
+"""Bodies so thin or so weakly held that rounding moves them: how soft they are, and the ground that
+holds them meanwhile.
 
-Between a layer's stiffness against bending and that of its elements lie more digits than numbers have once its thickness is a
-thousandth of its width. What bends is held by the contact, but the compliance, which knows the body alone, is made of rounding.
+Between a layer's stiffness against bending and that of its elements lie more digits than numbers
+have once its thickness is a thousandth of its width. What bends is held by the contact, but the
+compliance, which knows the body alone, is made of rounding.
 
-A ground resists the displacement by p M, where M is the volume of the nodes. The grounded body has the compliance
-(A + p M)^-1, of moderate size, and is pulled by the forces p M U' towards a displacement U'. Where the contact problem of the
-grounded bodies gives U = U' the ground bears nothing, so that U is the answer for the bodies without a ground: repeated with
-the last U as the next U', the problem converges where contacts, supports or the body itself resist more than the ground does.
+A ground resists the displacement by p M, where M is the volume of the nodes. The grounded body has
+the compliance (A + p M)^-1, of moderate size, and is pulled by the forces p M U' towards a
+displacement U'. Where the contact problem of the grounded bodies gives U = U' the ground bears
+nothing, so that U is the answer for the bodies without a ground: repeated with the last U as the
+next U', the problem converges where contacts, supports or the body itself resist more than the
+ground does.
 
-Source: Rockafellar (1976), Monotone operators and the proximal point algorithm, SIAM J. Control Optim. 14, 877-898.
+Source: Rockafellar (1976), Monotone operators and the proximal point algorithm, SIAM J. Control
+Optim. 14, 877-898.
 """
 
 from __future__ import annotations
@@ -21,7 +26,8 @@ import numpy as np
 from contactopt.bodies.body import Assembly
 from contactopt.bodies.elements import weight_at
 
-SHARE = 1e-5  # stiffness of the ground over that of a block of the softest material on the contact surface
+# stiffness of the ground over that of a block of the softest material on the contact surface
+SHARE = 1e-5
 THIN = 20.0  # bodies softer than this many times such a ground are thin
 
 
@@ -30,45 +36,47 @@ def volumes(body: Assembly) -> np.ndarray:
 
     Parameters
     ----------
-    body
-        The assembled body of n unknowns.
+    body : The assembled body of n unknowns.
 
     Returns
     -------
-    ndarray
-        (n,) with the measure of the body's integrals, all positive [length^3].
+    (n,) with the measure of the body's integrals, all positive [length^3].
     """
     basis = body.basis
-    volume = np.sum(basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates())), axis=1)
+    volume = np.sum(
+        basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates())), axis=1
+    )
     share = np.broadcast_to(volume * len(body.unknowns) / basis.Nbfun, basis.element_dofs.shape)
     return np.bincount(basis.element_dofs.ravel(), share.ravel(), len(body.load))
 
 
 def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether a body resists some displacement little more than a ground of its own material would.
+    """Tell whether a body resists some displacement little more than a ground of its own material
+    would.
 
     Parameters
     ----------
-    body
-        The assembled body of n unknowns.
-    relieved
-        Function from nodal forces (n,) to the displacements (n,) that they make.
+    body : The assembled body of n unknowns.
+    relieved : Function from nodal forces (n,) to the displacements (n,) that they make.
 
     Returns
     -------
-    bool
-        Whether the least eigenvalue of A U = lambda M U, which one step of inverse iteration finds within
-        a factor where it is far below the others, is below 20 p: so it is for layers up to about a
-        thirtieth of their width.
+    Whether the least eigenvalue of A U = lambda M U, which one step of inverse iteration finds
+    within a factor where it is far below the others, is below 20 p: so it is for layers up to about
+    a thirtieth of their width.
     """
     M = volumes(body)
     forces = M * np.random.default_rng(0).standard_normal(len(body.load))
     U = relieved(forces)
-    return float(U @ (body.A @ U)) < THIN * _per_volume(body, M, body.material.E) * float(U @ (M * U))
+    return float(U @ (body.A @ U)) < THIN * _per_volume(body, M, body.material.E) * float(
+        U @ (M * U)
+    )
 
 
 def _per_volume(body: Assembly, M: np.ndarray, modulus: float) -> float:
-    """p: a small share of the stiffness of a block of a modulus on the contact surface, as high as the body is wide."""
+    """p: a small share of the stiffness of a block of a modulus on the contact surface, as high as
+    the body is wide.
+    """
     surface = max(float(trace.areas.sum()) for trace in body.traces.values())
     size = float(np.ptp(body.locations, axis=1).max())
     return SHARE * modulus * surface * len(body.unknowns) / (size * float(M.sum()))
@@ -79,16 +87,13 @@ def on_ground(body: Assembly, modulus: float) -> tuple[Assembly, np.ndarray]:
 
     Parameters
     ----------
-    body
-        The assembled body of n unknowns.
-    modulus
-        Young's modulus of the softest body [stress].
+    body : The assembled body of n unknowns.
+    modulus : Young's modulus of the softest body [stress].
 
     Returns
     -------
-    tuple
-        The body, whose inertia forces are those of M, so that the ground does not resist its free motions; and the
-        stiffness p M of the ground (n,) [force / length].
+    The body, whose inertia forces are those of M, so that the ground does not resist its free
+    motions; and the stiffness p M of the ground (n,) [force / length].
     """
     M, motions = volumes(body), body.rigid_motions
     forces = M[:, None] * motions.fields

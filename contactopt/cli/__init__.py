@@ -1,6 +1,7 @@
 """The command line.
 
-Exit codes: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that cannot be used, 130 interrupted.
+Exit codes: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that cannot
+be used, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -25,14 +26,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Parameters
     ----------
-    arguments
-        The arguments after the name of the program; by default those of the process.
+    arguments : The arguments after the name of the program; by default those of the process.
 
     Returns
     -------
-    int
-        The exit code: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that cannot be used,
-        130 interrupted.
+    The exit code: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that
+    cannot be used, 130 interrupted.
     """
     told = sys.argv[1:] if arguments is None else list(arguments)
     options = make_parser().parse_args(told, argparse.Namespace(team=None, ranks=None))
@@ -49,12 +48,18 @@ def _answered(command: Callable[[], int]) -> int:
         return 2
     except MemoryError as error:
         why = f" ({error})" if str(error) else ""
-        print(f"contactopt: this needs more memory than there is{why}; take fewer elements.", file=sys.stderr)
+        print(
+            f"contactopt: this needs more memory than there is{why}; take fewer elements.",
+            file=sys.stderr,
+        )
         return 2
     except BrokenPipeError:
         raise
     except OSError as error:  # a name that no file can have, a disk that is gone
-        print(f"contactopt: cannot use '{error.filename}': {error.strerror or error}.", file=sys.stderr)
+        print(
+            f"contactopt: cannot use '{error.filename}': {error.strerror or error}.",
+            file=sys.stderr,
+        )
         return 2
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)
@@ -66,7 +71,11 @@ def _execute(options: argparse.Namespace, told: list[str]) -> int:
     if (comm := world()) is None:
         if options.ranks is not None:
             check_bodies(scene_asked(options), options.ranks)  # before any of them is started
-        return int(options.command(options)) if options.ranks in (None, 1) else launch(options.ranks, told)
+        return (
+            int(options.command(options))
+            if options.ranks in (None, 1)
+            else launch(options.ranks, told)
+        )
     if comm.rank:
         serve(comm)
         return 0
@@ -79,16 +88,22 @@ def _execute(options: argparse.Namespace, told: list[str]) -> int:
 
 def _on_ranks(options: argparse.Namespace) -> int:
     if options.command is not run:
-        raise InputError("only the command 'run' uses several ranks; start the others without mpiexec.")
+        raise InputError(
+            "only the command 'run' uses several ranks; start the others without mpiexec."
+        )
     if options.ranks not in (None, options.team.size):
-        raise InputError(f"--ranks {options.ranks} was asked for, but mpiexec started {options.team.size} ranks.")
+        raise InputError(
+            f"--ranks {options.ranks} was asked for, but mpiexec started {options.team.size} ranks."
+        )
     check_bodies(scene_asked(options), options.team.size)
     return run(options)
 
 
 @contextmanager
 def _logging(verbose: int, quiet: bool) -> Iterator[None]:
-    """-v sends what the package logs to the standard error: once its steps, twice also their details. -q leaves errors only."""
+    """-v sends what the package logs to the standard error: once its steps, twice also their
+    details. -q leaves errors only.
+    """
     logger = logging.getLogger("contactopt")
     before, handler = logger.level, logging.StreamHandler()
     handler.setFormatter(logging.Formatter("  %(name)s: %(message)s"))

@@ -15,12 +15,21 @@ from contactopt.errors import InputError
 from contactopt.methods.method import NATIVE
 from contactopt.readings.resultants import resultant_words
 
-FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa"): "MN", ("in", "psi"): "lbf"}
+FORCES = {
+    ("mm", "MPa"): "N",
+    ("m", "Pa"): "N",
+    ("m", "kPa"): "kN",
+    ("m", "MPa"): "MN",
+    ("in", "psi"): "lbf",
+}
 Command = Callable[[argparse.Namespace], int]
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
-    """The values of NAME=VALUE texts. A value is a number, true, false or a list as in TOML; anything else is a text."""
+    """The values of NAME=VALUE texts.
+
+    A value is a number, true, false or a list as in TOML; anything else is a text.
+    """
     found: dict[str, Any] = {}
     for text in texts:
         name, sign, value = text.partition("=")
@@ -35,7 +44,9 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
 
 
 def _changes(options: argparse.Namespace) -> dict[str, Any]:
-    """The arguments of the scene that the command line gives; InputError for one that is given twice."""
+    """The arguments of the scene that the command line gives; InputError for one that is given
+    twice.
+    """
     names = ("mu", "force", "degree", "simplices", "elements")
     changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     given = _arguments_of(options.set)
@@ -49,13 +60,11 @@ def scene_asked(options: argparse.Namespace) -> Any:
 
     Parameters
     ----------
-    options
-        The options of the command.
+    options : The options of the command.
 
     Returns
     -------
-    Scene
-        The scene; of a load path its last state.
+    The scene; of a load path its last state.
     """
     from contactopt.runner import scene_of
 
@@ -67,18 +76,15 @@ def run(options: argparse.Namespace) -> int:
 
     Parameters
     ----------
-    options
-        The options of the command `run`.
+    options : The options of the command `run`.
 
     Returns
     -------
-    int
-        The exit code: 0 if it is solved, to the accuracy asked for, else 1.
+    The exit code: 0 if it is solved, to the accuracy asked for, else 1.
 
     Raises
     ------
-    InputError
-        If an argument of the scene is given twice, or as `contactopt.run` raises it.
+    InputError : If an argument of the scene is given twice, or as `contactopt.run` raises it.
     """
     from contactopt.runner import run
 
@@ -113,9 +119,12 @@ def run(options: argparse.Namespace) -> int:
         _print_result(result, out)
         if options.team is not None:
             print(
-                f"{options.team.size} ranks, {options.team.traffic.messages} messages, {options.team.traffic.length} bytes"
+                f"{options.team.size} ranks, {options.team.traffic.messages} messages,"
+                f" {options.team.traffic.length} bytes"
             )
-    return 0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
+    return (
+        0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
+    )
 
 
 def _print_result(result: Any, out: str) -> None:
@@ -148,16 +157,24 @@ def _print_result(result: Any, out: str) -> None:
     if result.estimate is not None:
         _print_estimate(result.estimate)
     seconds = s["seconds"]
-    print(f"{seconds['total']:.1f} s: " + ", ".join(f"{k} {v:.2f}" for k, v in seconds.items() if k != "total"))
+    print(
+        f"{seconds['total']:.1f} s: "
+        + ", ".join(f"{k} {v:.2f}" for k, v in seconds.items() if k != "total")
+    )
     print(f"files in {out}: {', '.join(sorted(file.name for file in Path(out).iterdir()))}")
 
 
 def _print_estimate(estimate: Any) -> None:
     error = "unknown" if estimate.error is None else f"{estimate.error:.1e}"
-    print(f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for {estimate.target:g}:")
+    print(
+        f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for"
+        f" {estimate.target:g}:"
+    )
     print(f"  {estimate.message}")
     for level in estimate.levels:
-        print(f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s")
+        print(
+            f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s"
+        )
 
 
 def view(options: argparse.Namespace) -> int:
@@ -185,7 +202,9 @@ def simplify(options: argparse.Namespace) -> int:
     from contactopt.runner import scene_of
     from contactopt.simplification import simplify
 
-    print(simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve))
+    print(
+        simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve)
+    )
     return 0
 
 
@@ -199,7 +218,9 @@ def new(options: argparse.Namespace) -> int:
 
 
 def bench(options: argparse.Namespace) -> int:
-    """Execute the runs of an experiment file and write their report; returns the exit code, 130 if it was interrupted."""
+    """Execute the runs of an experiment file and write their report; returns the exit code, 130 if
+    it was interrupted.
+    """
     from contactopt.benchmark.campaign import run_campaign
     from contactopt.benchmark.report_page import refusals, report_campaign
     from contactopt.benchmark.store import load
@@ -215,16 +236,25 @@ def bench(options: argparse.Namespace) -> int:
             quiet=options.quiet,
         )
     except KeyboardInterrupt:
-        print("contactopt: interrupted; finished runs are kept, go on with --resume", file=sys.stderr)
+        print(
+            "contactopt: interrupted; finished runs are kept, go on with --resume", file=sys.stderr
+        )
         return 130
     table = load(folder)
     runs = count(len(table), "run")
-    print(f"{runs}: " + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items()))
+    print(
+        f"{runs}: "
+        + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items())
+    )
     for sentence in refusals(table):
         print(f"  {sentence}")
     print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
     page = report_campaign(folder, options.file)
-    more = "" if page.suffix == ".html" else "; a page to explore needs: pip install 'contactopt[view]'"
+    more = (
+        ""
+        if page.suffix == ".html"
+        else "; a page to explore needs: pip install 'contactopt[view]'"
+    )
     print(f"report: {page}{more}")
     return 0
 
@@ -234,7 +264,11 @@ def report(options: argparse.Namespace) -> int:
     from contactopt.benchmark.campaign import run_reports
     from contactopt.benchmark.report_page import report_campaign
 
-    folders = [Path(name) for name in options.names if Path(name).is_dir() and any(Path(name).glob("rows.*"))]
+    folders = [
+        Path(name)
+        for name in options.names
+        if Path(name).is_dir() and any(Path(name).glob("rows.*"))
+    ]
     if folders and len(folders) == len(options.names) and not options.run:
         for folder in folders:
             print(f"report: {report_campaign(folder)}")

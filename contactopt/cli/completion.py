@@ -1,4 +1,5 @@
-"""Scripts that complete commands, options and names of scenes in a shell, made from the parser itself by shtab.
+"""Scripts that complete commands, options and names of scenes in a shell, made from the parser
+itself by shtab.
 
 bash:  contactopt completion bash > ~/.local/share/bash-completion/completions/contactopt
 zsh:   contactopt completion zsh >> ~/.zshrc
@@ -34,20 +35,20 @@ def script(parser: argparse.ArgumentParser, shell: str) -> str:
 
     Parameters
     ----------
-    parser
-        The parser of the command line. It is changed, and completes names afterwards where it also takes files.
-    shell
-        One of SHELLS.
+    parser : The parser of the command line. It is changed, and completes names afterwards where it
+        also takes files.
+    shell : One of SHELLS.
 
     Returns
     -------
-    str
-        The text of the script.
+    The text of the script.
     """
     import shtab
 
     for commands in parser._actions:
-        for made in commands.choices.values() if isinstance(commands, argparse._SubParsersAction) else ():
+        for made in (
+            commands.choices.values() if isinstance(commands, argparse._SubParsersAction) else ()
+        ):
             for action in made._actions:
                 action.choices = VALUES.get(action.dest, action.choices)
     return str(shtab.complete(parser, shell))

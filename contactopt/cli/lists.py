@@ -12,7 +12,9 @@ from contactopt.scenes import PATHS, SCENES
 
 
 def print_lists() -> None:
-    """Scenes, laws, methods, solvers, preconditioners and backends, each with a line that says what it is."""
+    """Scenes, laws, methods, solvers, preconditioners and backends, each with a line that says what
+    it is.
+    """
     print("scenes")
     for name, (_, _, what, *_) in SCENES.items():
         print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
@@ -27,8 +29,14 @@ def print_lists() -> None:
     print("preconditioners of the interface operator")
     for name, (_, _, what) in PRECONDITIONERS.items():
         print(f"  {name:20} {what}")
-    for title, table in (("QP backends (normal; tangential in 2D)", QP), ("conic backends (tangential in 3D)", CONIC)):
+    for title, table in (
+        ("QP backends (normal; tangential in 2D)", QP),
+        ("conic backends (tangential in 3D)", CONIC),
+    ):
         print(title)
         for backend in table.values():
             missing = f"not installed: pip install {backend.package}"
-            print(f"  {backend.name:12} {f'installed, {backend.version}' if backend.installed else missing}")
+            print(
+                f"  {backend.name:12}"
+                f" {f'installed, {backend.version}' if backend.installed else missing}"
+            )

@@ -15,15 +15,12 @@ def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    tuple
-        The Fields of each body that has any, upper body first.
+    The Fields of each body that has any, upper body first.
     """
     displaced = zip(reduction.bodies, reduction.displaced(solution))
     fields = each(lambda pair: pair[0].fields(pair[1]), displaced)

@@ -1,8 +1,9 @@
-"""The contact surface's own coordinates and the local frames, both laid out from the surface itself.
+"""The contact surface's own coordinates and the local frames, both laid out from the surface
+itself.
 
-Neither depends on how the bodies lie in space: everything is derived from contact normals, from the cells that join the
-contacts, from planes of symmetry and from the distribution of the areas. A body that is turned takes its chart and its
-frames along.
+Neither depends on how the bodies lie in space: everything is derived from contact normals, from the
+cells that join the contacts, from planes of symmetry and from the distribution of the areas. A body
+that is turned takes its chart and its frames along.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ NEAR = 1e-9  # what counts as zero beside the size of the contact surface, or be
 FLAT = 0.1  # a mean normal shorter than this belongs to a surface that closes on itself
 STEEP = 0.9  # cosine beyond which a direction is too near the normal to make a tangent of it
 EQUAL = 1e-3  # relative difference below which principal moments count as equal
-RANK = 1e-6  # places that differ by less than this fraction of the size belong to one row of contacts
+# places that differ by less than this fraction of the size belong to one row of contacts
+RANK = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +29,8 @@ class ContactPoints:
     points   (dim, k) positions [length];  normals (dim, k) contact normals;  areas (k,)
     cells    (v, c) contacts at the corners of the cells of the surface
     held     (dim, k) whether both bodies are held there in that component
-    gap      (k,) initial gap: where a chart could start at several places it starts where the gap is least
+    gap      (k,) initial gap: where a chart could start at several places it starts where the gap
+             is least
     """
 
     points: np.ndarray
@@ -45,7 +48,9 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class SymmetryPlane:
-    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the contacts."""
+    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the
+    contacts.
+    """
 
     inward: np.ndarray
     offset: float
@@ -55,39 +60,34 @@ class SymmetryPlane:
 
         Parameters
         ----------
-        points
-            (dim, k) points [length].
-        size
-            The size of the contact surface, beside which rounding is zero [length].
+        points : (dim, k) points [length].
+        size : The size of the contact surface, beside which rounding is zero [length].
 
         Returns
         -------
-        ndarray
-            (k,) mask.
+        (k,) mask.
         """
         return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 
-def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[Chart, np.ndarray, np.ndarray]:
+def lay_out(
+    contacts: ContactPoints, copies: int, axisymmetric: bool
+) -> tuple[Chart, np.ndarray, np.ndarray]:
     """Lay out the chart and the local frames of a contact surface.
 
-    Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n turned clockwise. In
-    3D it is the first direction of the chart, made orthogonal to n.
+    Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n
+    turned clockwise. In 3D it is the first direction of the chart, made orthogonal to n.
 
     Parameters
     ----------
-    contacts
-        The k contacts in any order.
-    copies
-        Number of mirror images that make the whole bodies: a plane of symmetry mirrors the chart if there is more than
-        one.
-    axisymmetric
-        Whether the first coordinate is the distance from an axis.
+    contacts : The k contacts in any order.
+    copies : Number of mirror images that make the whole bodies: a plane of symmetry mirrors the
+        chart if there is more than one.
+    axisymmetric : Whether the first coordinate is the distance from an axis.
 
     Returns
     -------
-    tuple
-        The chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
+    The chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
     """
     planes = symmetry_planes(contacts)
     mirrors = copies > 1
@@ -97,7 +97,11 @@ def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[C
         frames = np.stack([contacts.normals.T, _clockwise(contacts.normals).T], axis=1)
         places, mirrored, period = _line(contacts, frames[:, 1].T, planes, mirrors)
         order = np.argsort(places[0], kind="stable")
-        return Chart(places[:, order], mirrored, period, _renumbered(contacts.cells, order)), frames[order], order
+        return (
+            Chart(places[:, order], mirrored, period, _renumbered(contacts.cells, order)),
+            frames[order],
+            order,
+        )
     axes = _axes(contacts, planes)
     places, mirrored = _plane(contacts, axes, planes, mirrors)
     order = np.lexsort([_rank(row, contacts.size) for row in places])
@@ -117,17 +121,16 @@ def _clockwise(normals: np.ndarray) -> np.ndarray:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """Find the planes across one component on which exactly the tangential displacement along it is held.
+    """Find the planes across one component on which exactly the tangential displacement along it is
+    held.
 
     Parameters
     ----------
-    contacts
-        The contacts with their normals and held components.
+    contacts : The contacts with their normals and held components.
 
     Returns
     -------
-    list
-        The planes, at most one for each component.
+    The planes, at most one for each component.
     """
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
@@ -138,7 +141,8 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
         plane = np.abs(points[c] - offset) <= NEAR * contacts.size
         side = np.sign(points[c, ~plane] - offset)
         tangential = np.all(np.abs(normals[c, plane]) < 0.5)
-        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)  # along the normal, at least
+        # along the normal, at least
+        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)
         if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
             inward = np.zeros(len(points))
             inward[c] = side[0]
@@ -149,23 +153,24 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
     """Put the normals at planes of symmetry into these planes.
 
-    The mean over the facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
+    The mean over the facets that are modelled leaves out their mirror images, and so is tilted on a
+    curved surface.
 
     Parameters
     ----------
-    contacts
-        The k contacts.
+    contacts : The k contacts.
 
     Returns
     -------
-    ndarray
-        (dim, k) unit normals.
+    (dim, k) unit normals.
     """
     normals = contacts.normals
     for plane in symmetry_planes(contacts):
         straight = normals - plane.inward[:, None] * (plane.inward @ normals)
         straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
-        tilted = plane.contains(contacts.points, contacts.size) & (np.abs(plane.inward @ normals) > NEAR)
+        tilted = plane.contains(contacts.points, contacts.size) & (
+            np.abs(plane.inward @ normals) > NEAR
+        )
         normals = np.where(tilted, straight, normals)
     return normals
 
@@ -173,10 +178,11 @@ def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
 def _line(
     contacts: ContactPoints, tangents: np.ndarray, planes: list[SymmetryPlane], mirrors: bool
 ) -> tuple[np.ndarray, tuple[bool, ...], float | None]:
-    """Arc length (1, k) along t1, whether it is mirrored at 0, and its period if the line is closed.
+    """Arc length (1, k) along t1, whether it is mirrored at 0, and its period if the line is
+    closed.
 
-    It is measured from an end in a plane of symmetry, otherwise from the middle; on a closed line from the contact with
-    the least gap.
+    It is measured from an end in a plane of symmetry, otherwise from the middle; on a closed line
+    from the contact with the least gap.
     """
     chains, period = _chains(contacts, tangents)
     place = np.zeros(contacts.points.shape[1])
@@ -190,15 +196,23 @@ def _line(
     if period is not None:
         return place[None], (False,), period
     ends = [chains[0][0][0], chains[-1][0][-1]]
-    cut = [i for i in ends if any(p.contains(contacts.points[:, [i]], contacts.size)[0] for p in planes)]
+    cut = [
+        i
+        for i in ends
+        if any(p.contains(contacts.points[:, [i]], contacts.size)[0] for p in planes)
+    ]
     if cut:
         at = cut[_least(contacts.gap[cut], contacts.size)]
         return (place - place[at])[None], (mirrors,), None
     return (place - end / 2)[None], (False,), None
 
 
-def _chains(contacts: ContactPoints, tangents: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], float | None]:
-    """The pieces of the contact line in their order, each as contacts and the steps between them; the period of a loop."""
+def _chains(
+    contacts: ContactPoints, tangents: np.ndarray
+) -> tuple[list[tuple[np.ndarray, np.ndarray]], float | None]:
+    """The pieces of the contact line in their order, each as contacts and the steps between them;
+    the period of a loop.
+    """
     k = contacts.points.shape[1]
     following, length = np.full(k, -1), np.zeros(k)
     step = _steps(contacts.points, tangents, *contacts.cells)
@@ -217,7 +231,9 @@ def _chains(contacts: ContactPoints, tangents: np.ndarray) -> tuple[list[tuple[n
             seen[chain] = True
             chains.append((chain, length[chain[:-1]]))
     mean = tangents @ contacts.areas
-    return sorted(chains, key=lambda piece: float(mean @ contacts.points[:, piece[0]].mean(axis=1))), None
+    return sorted(
+        chains, key=lambda piece: float(mean @ contacts.points[:, piece[0]].mean(axis=1))
+    ), None
 
 
 def _walk(following: np.ndarray, start: int) -> np.ndarray:
@@ -228,7 +244,9 @@ def _walk(following: np.ndarray, start: int) -> np.ndarray:
 
 
 def _steps(points: np.ndarray, tangents: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """From the contacts i to the contacts j along the mean of their tangents; on a circle this is the chord."""
+    """From the contacts i to the contacts j along the mean of their tangents; on a circle this is
+    the chord.
+    """
     mean, chord = tangents[:, i] + tangents[:, j], points[:, j] - points[:, i]
     size, along = np.linalg.norm(mean, axis=0), np.sum(mean * chord, axis=0)
     return np.where(size > NEAR, along / np.maximum(size, NEAR), np.linalg.norm(chord, axis=0))
@@ -242,8 +260,9 @@ def _least(gap: np.ndarray, size: float) -> int:
 def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndarray, np.ndarray]:
     """Two orthogonal directions (3,) of a surface, right-handed with its normal.
 
-    Planes of symmetry give them: both point into the bodies. One such plane gives the second. Without any the first is the
-    direction in which the areas spread most, or, where they spread evenly, that of the longest edge of the rim.
+    Planes of symmetry give them: both point into the bodies. One such plane gives the second.
+    Without any the first is the direction in which the areas spread most, or, where they spread
+    evenly, that of the longest edge of the rim.
     """
     n = _mean_normal(contacts)
     inward = [plane.inward - (plane.inward @ n) * n for plane in planes]
@@ -265,13 +284,16 @@ def _mean_normal(contacts: ContactPoints) -> np.ndarray:
         return np.asarray(mean / size)
     centred = contacts.points - contacts.points.mean(axis=1, keepdims=True)
     vectors = np.linalg.svd(centred, full_matrices=True)[0]
-    return np.asarray(vectors[:, 2] * (1.0 if vectors[:, 2] @ contacts.normals[:, 0] >= 0 else -1.0))
+    return np.asarray(
+        vectors[:, 2] * (1.0 if vectors[:, 2] @ contacts.normals[:, 0] >= 0 else -1.0)
+    )
 
 
 def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
     """The first direction of a surface without planes of symmetry.
 
-    Its sense is that in which the areas reach further, or, where they reach equally far, that of the first contact.
+    Its sense is that in which the areas reach further, or, where they reach equally far, that of
+    the first contact.
     """
     points, areas = contacts.points, contacts.areas
     centred = points - (points @ areas / areas.sum())[:, None]
@@ -285,14 +307,22 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
         first = first / np.linalg.norm(first)
     along = first @ centred
     third = float(areas @ along**3) / max(float(areas @ np.abs(along) ** 3), 1e-300)
-    sense = third if abs(third) > EQUAL else float(along[np.argmax(np.abs(along) > NEAR * contacts.size)])
+    sense = (
+        third
+        if abs(third) > EQUAL
+        else float(along[np.argmax(np.abs(along) > NEAR * contacts.size)])
+    )
     return np.asarray(first if sense >= 0 else -first)
 
 
 def _rim_direction(contacts: ContactPoints) -> np.ndarray:
-    """Along the longest edge of the rim, which belongs to one cell only; the first of those that are equally long."""
+    """Along the longest edge of the rim, which belongs to one cell only; the first of those that
+    are equally long.
+    """
     corners = contacts.cells
-    edges = np.concatenate([np.stack([corners[i], corners[i - 1]]) for i in range(len(corners))], axis=1)
+    edges = np.concatenate(
+        [np.stack([corners[i], corners[i - 1]]) for i in range(len(corners))], axis=1
+    )
     known, count = np.unique(np.sort(edges, axis=0), axis=1, return_counts=True)
     rim = known[:, count == 1] if np.any(count == 1) else known
     chords = contacts.points[:, rim[1]] - contacts.points[:, rim[0]]
@@ -301,20 +331,31 @@ def _rim_direction(contacts: ContactPoints) -> np.ndarray:
 
 
 def _plane(
-    contacts: ContactPoints, axes: tuple[np.ndarray, np.ndarray], planes: list[SymmetryPlane], mirrors: bool
+    contacts: ContactPoints,
+    axes: tuple[np.ndarray, np.ndarray],
+    planes: list[SymmetryPlane],
+    mirrors: bool,
 ) -> tuple[np.ndarray, tuple[bool, ...]]:
-    """Coordinates (2, k) along the axes, from planes of symmetry or from the middle, and which of them are mirrored."""
+    """Coordinates (2, k) along the axes, from planes of symmetry or from the middle, and which of
+    them are mirrored.
+    """
     places, mirrored = np.stack(axes) @ contacts.points, []
     for axis, row in zip(axes, places):
         across = [p for p in planes if abs(axis @ p.inward) > 1 - NEAR]
-        origin = across[0].offset * float(np.sign(axis @ across[0].inward)) if across else (row.max() + row.min()) / 2
+        origin = (
+            across[0].offset * float(np.sign(axis @ across[0].inward))
+            if across
+            else (row.max() + row.min()) / 2
+        )
         row -= origin
         mirrored.append(mirrors and bool(across))
     return places, tuple(mirrored)
 
 
 def _rank(row: np.ndarray, size: float) -> np.ndarray:
-    """(k,) numbers of the rows that values belong to; neighbours closer than rounding belong to one."""
+    """(k,) numbers of the rows that values belong to; neighbours closer than rounding belong to
+    one.
+    """
     order = np.argsort(row)
     rank = np.empty(len(row), dtype=int)
     rank[order] = np.concatenate([[0], np.cumsum(np.diff(row[order]) > RANK * size)])
@@ -322,7 +363,9 @@ def _rank(row: np.ndarray, size: float) -> np.ndarray:
 
 
 def _frames(normals: np.ndarray, axes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Rows n, t1, t2 at each contact: t1 is the first direction made orthogonal to n, or the second where n is close to it."""
+    """Rows n, t1, t2 at each contact: t1 is the first direction made orthogonal to n, or the second
+    where n is close to it.
+    """
     n = normals.T
     steep = np.abs(n @ axes[0]) > STEEP
     towards = np.where(steep[:, None], axes[1], axes[0])

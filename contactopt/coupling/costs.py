@@ -1,7 +1,8 @@
 """The choice between the ways to a solution by their cost, with every number that it rests on.
 
-`python -m experiments.questions.ways` measures the ways on punches of growing size, in the plane and in space, fits COSTS to the
-measured times and draws both as maps (reports/ways/report.md). MOST_EXPLICIT is not fitted but chosen: an array of half a gigabyte.
+`python -m experiments.questions.ways` measures the ways on punches of growing size, in the plane
+and in space, fits COSTS to the measured times and draws both as maps (reports/ways/report.md).
+MOST_EXPLICIT is not fitted but chosen: an array of half a gigabyte.
 """
 
 from __future__ import annotations
@@ -25,26 +26,27 @@ COSTS: dict[tuple[int, str], tuple[float, ...]] = {
 def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
     """Compute what the cost of a way grows with.
 
-    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and
-    n^2 in space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
+    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5
+    operations in the plane and n^2 in space, a dense Q m^3, and products with Q n log2 n or n^(4/3)
+    (nested dissection).
 
     Parameters
     ----------
-    way
-        A name in WAYS.
-    m, n
-        Number of unknowns on the contact surface, and of all unknowns of the largest body.
-    dim
-        Dimension of space, 2 or 3.
+    way : A name in WAYS.
+    m, n : Number of unknowns on the contact surface, and of all unknowns of the largest body.
+    dim : Dimension of space, 2 or 3.
 
     Returns
     -------
-    ndarray
-        (4,) terms, to which COSTS gives the seconds.
+    (4,) terms, to which COSTS gives the seconds.
     """
     factors = n ** (1.5 if dim == 2 else 2.0)
     substitution = n * np.log2(max(n, 2)) if dim == 2 else n ** (4 / 3)
-    of_way = {"dense": (n, factors, m**3, 0), "products": (n, factors, 0, substitution), "coupled": (n, 0, 0, 0)}
+    of_way = {
+        "dense": (n, factors, m**3, 0),
+        "products": (n, factors, 0, substitution),
+        "coupled": (n, 0, 0, 0),
+    }
     return np.array(of_way[way], dtype=float)
 
 
@@ -53,15 +55,12 @@ def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
 
     Parameters
     ----------
-    way, m, n, dim
-        As for `terms`.
-    solver
-        Name of the solver of the bodies with factors.
+    way, m, n, dim : As for `terms`.
+    solver : Name of the solver of the bodies with factors.
 
     Returns
     -------
-    float
-        The time [s].
+    The time [s].
     """
     return float(np.dot(COSTS[dim, solver], terms(way, m, n, dim)))
 
@@ -73,21 +72,15 @@ def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") 
 
     Parameters
     ----------
-    m
-        Number of unknowns on the contact surface of the body that has most of them.
-    n
-        Number of unknowns of the largest body.
-    dim
-        Dimension of space, 2 or 3.
-    iterative
-        Whether a body has no factors.
-    solver
-        Name of the solver of the bodies with factors.
+    m : Number of unknowns on the contact surface of the body that has most of them.
+    n : Number of unknowns of the largest body.
+    dim : Dimension of space, 2 or 3.
+    iterative : Whether a body has no factors.
+    solver : Name of the solver of the bodies with factors.
 
     Returns
     -------
-    str
-        'explicit' or 'implicit'.
+    'explicit' or 'implicit'.
     """
     if iterative or m > MOST_EXPLICIT:
         return "implicit"

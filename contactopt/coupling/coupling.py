@@ -1,13 +1,14 @@
 """How the contacts of an interface problem see the displacements of the bodies.
 
-A coupling is made once for each pair of surfaces of a scene and kept with its reduction. It says where the contacts are,
-how their local frames lie, how far apart the bodies are there, and how the displacements U of both bodies make the relative
-displacement
+A coupling is made once for each pair of surfaces of a scene and kept with its reduction. It says
+where the contacts are, how their local frames lie, how far apart the bodies are there, and how the
+displacements U of both bodies make the relative displacement
 
     u = T_upper U_upper - T_lower U_lower + gap n,
 
-so that contact forces r act on the bodies with the nodal forces T_upper' r and -T_lower' r. Reduction, recovery, energies
-and load paths use these maps alone. How they come about is known only to the kind of the coupling.
+so that contact forces r act on the bodies with the nodal forces T_upper' r and -T_lower' r.
+Reduction, recovery, energies and load paths use these maps alone. How they come about is known only
+to the kind of the coupling.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ COUPLINGS = {
     "matching": (
         "contactopt.coupling.matching",
         "couple_nodes",
-        "contacts are the nodes of a body, whose partners on the other body lie on the same normals",
+        (
+            "contacts are the nodes of a body, whose partners on the other body lie on the same"
+            " normals"
+        ),
     ),
     "mortar": (
         "contactopt.coupling.mortar_surfaces",
@@ -48,14 +52,16 @@ COUPLINGS = {
 class Coupling:
     """The coupling of two surfaces at k contacts.
 
-    upper, lower  sparse maps T (k dim, n) from the displacement unknowns of each body to the components of its
-                  displacement in the frames, contact by contact, normal component first
+    upper, lower  sparse maps T (k dim, n) from the displacement unknowns of each body to the
+                  components of its displacement in the frames, contact by contact, normal component
+                  first
     frames        (k, dim, dim) rows n, t1[, t2]; n is the outward normal of the lower body
     gap           (k,) initial gap along n [length]
     areas         (k,) nodal areas [length^2]
     positions     (dim, k) positions of the contacts in space [length]
     chart         places of the contacts on the contact surface
-    cells         (v, c) contacts at the corners of the linear cells of the surface, for figures and files
+    cells         (v, c) contacts at the corners of the linear cells of the surface, for figures and
+                  files
     planes        planes that cut the surface and on which the bodies are held along the normal only
     kind          name in COUPLINGS
     carrier       'upper' or 'lower': the side whose nodes carry the contacts
@@ -84,23 +90,19 @@ def couple(
 
     Parameters
     ----------
-    scene, pair
-        The scene and one of its pairs.
-    upper, lower
-        Its bodies.
-    kind
-        A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes where they match, or where
-        a body has no mesh, and otherwise mortar.
+    scene, pair : The scene and one of its pairs.
+    upper, lower : Its bodies.
+    kind : A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes
+        where they match, or where a body has no mesh, and otherwise mortar.
 
     Returns
     -------
-    Coupling
-        The contacts with their frames, gaps and areas, and the maps from the bodies' displacements to theirs.
+    The contacts with their frames, gaps and areas, and the maps from the bodies' displacements to
+    theirs.
 
     Raises
     ------
-    InputError
-        For an unknown kind, and for surfaces that this kind cannot couple.
+    InputError : For an unknown kind, and for surfaces that this kind cannot couple.
     """
     kind = kind or pair.coupling
     if kind != "auto":
@@ -120,7 +122,9 @@ def _kind(name: str) -> Callable[[Scene, Contact, AssembledBody, AssembledBody],
     if name not in COUPLINGS:
         raise InputError(f"unknown coupling {name!r}; choose from auto, {', '.join(COUPLINGS)}.")
     module, function, _ = COUPLINGS[name]
-    made: Callable[[Scene, Contact, AssembledBody, AssembledBody], Coupling] = getattr(import_module(module), function)
+    made: Callable[[Scene, Contact, AssembledBody, AssembledBody], Coupling] = getattr(
+        import_module(module), function
+    )
     return made
 
 
@@ -129,15 +133,12 @@ def renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    cells
-        (v, c) contacts at the corners of each cell.
-    order
-        (k,) the old numbers of the contacts in their new order.
+    cells : (v, c) contacts at the corners of each cell.
+    order : (k,) the old numbers of the contacts in their new order.
 
     Returns
     -------
-    ndarray
-        (v, c) the same cells in new numbers.
+    (v, c) the same cells in new numbers.
     """
     place = np.empty(len(order), dtype=int)
     place[order] = np.arange(len(order))
@@ -145,24 +146,24 @@ def renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
 
 
 def local_map(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
-    """Make the map from a body's unknowns to the displacement of some of its contacts in their frames.
+    """Make the map from a body's unknowns to the displacement of some of its contacts in their
+    frames.
 
     Parameters
     ----------
-    surface
-        The contact surface of the body, which has n unknowns.
-    contacts
-        (k,) numbers of contacts on this surface.
-    frames
-        (k, dim, dim) unit vectors n, t1[, t2] of each contact, as rows.
+    surface : The contact surface of the body, which has n unknowns.
+    contacts : (k,) numbers of contacts on this surface.
+    frames : (k, dim, dim) unit vectors n, t1[, t2] of each contact, as rows.
 
     Returns
     -------
-    csr_matrix
-        T (k dim, n), with dim rows for each contact, normal first.
+    T (k dim, n), with dim rows for each contact, normal first.
     """
     k, dim = frames.shape[:2]
-    if all(trace.nnz == trace.shape[0] and np.all(np.diff(trace.indptr) == 1) for trace in surface.traces):
+    if all(
+        trace.nnz == trace.shape[0] and np.all(np.diff(trace.indptr) == 1)
+        for trace in surface.traces
+    ):
         return _from_single_unknowns(surface, contacts, frames)
     rows, columns = np.arange(k * dim), np.repeat(np.arange(k), dim)
     parts = [
@@ -174,15 +175,22 @@ def local_map(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.
     return T
 
 
-def _from_single_unknowns(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
-    """local_map of a surface on which every component of a contact is one unknown of the body, times a number."""
+def _from_single_unknowns(
+    surface: Surface, contacts: np.ndarray, frames: np.ndarray
+) -> sp.csr_matrix:
+    """local_map of a surface on which every component of a contact is one unknown of the body,
+    times a number.
+    """
     k, dim = frames.shape[:2]
     unknowns = np.stack([trace.indices[contacts] for trace in surface.traces], axis=1)  # (k, dim)
     values = np.stack([trace.data[contacts] for trace in surface.traces], axis=1)
     if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
         rows, columns = np.nonzero(frames[0])
         count = np.append(0, np.cumsum(np.tile(np.bincount(rows, minlength=dim), k)))
-        data, indices = (values[:, columns] * frames[0][rows, columns]).ravel(), unknowns[:, columns].ravel()
+        data, indices = (
+            (values[:, columns] * frames[0][rows, columns]).ravel(),
+            unknowns[:, columns].ravel(),
+        )
     else:
         used = frames != 0
         count = np.append(0, np.cumsum(np.count_nonzero(used, axis=2).ravel()))

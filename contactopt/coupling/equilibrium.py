@@ -12,19 +12,17 @@ from contactopt.linear.saddle_point import BodyTerm, CoupledForm
 
 
 def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> CoupledForm:
-    """Make Q from the equilibrium of the iterative bodies, all at once, and from products with the others.
+    """Make Q from the equilibrium of the iterative bodies, all at once, and from products with the
+    others.
 
     Parameters
     ----------
-    bodies
-        All bodies, at least one of them with an `equilibrium`.
-    maps
-        Their signed maps B (k dim, n), as in contactopt.coupling.reduction.
+    bodies : All bodies, at least one of them with an `equilibrium`.
+    maps : Their signed maps B (k dim, n), as in contactopt.coupling.reduction.
 
     Returns
     -------
-    CoupledForm
-        Q before condensation.
+    Q before condensation.
     """
     terms: list[BodyTerm] = []
     others = []

@@ -1,8 +1,10 @@
-"""A contact surface as the mortar coupling sees it: faces, the linear cells of its multipliers, places on it.
+"""A contact surface as the mortar coupling sees it: faces, the linear cells of its multipliers,
+places on it.
 
-A face is described by the nodes of its displacement; its geometry is interpolated from their coordinates with the same
-shape functions, which is exact for straight and for isoparametric elements alike. The multipliers live on linear cells,
-the same as on one body alone (contactopt.bodies.elements): halves of lines, quarters of squares, whole triangles.
+A face is described by the nodes of its displacement; its geometry is interpolated from their
+coordinates with the same shape functions, which is exact for straight and for isoparametric
+elements alike. The multipliers live on linear cells, the same as on one body alone
+(contactopt.bodies.elements): halves of lines, quarters of squares, whole triangles.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ _SHAPES = {
     "RefTet": (3, {1: skfem.ElementTriP1(), 2: skfem.ElementTriP2()}),
     "RefHex": (4, {1: skfem.ElementQuad1(), 2: skfem.ElementQuad2()}),
 }
-_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a triangle with nodes on its edges
+# of a triangle with nodes on its edges
+_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 STRAIGHT = 1e-9  # a node on an edge is at its middle within this fraction of the face
 NEWTON, STEPS = 1e-13, 30  # accuracy of a place on a face, in its own coordinates
 
@@ -36,13 +39,16 @@ class Faces:
     kind    of its elements, the key of contactopt.bodies.elements.FACES
     degree  of the displacement, 1 or 2
     points  (dim, n) coordinates of all nodes of the body [length]
-    faces   (f, j) nodes of every face: its corners in cyclic order, then the nodes on its edges, then its centre
-    turn    (f,) +1 where the normal of the corners' order (in 2D: the direction of the face turned clockwise) points
-            outward, -1 where it points inward
-    weight  of the integrals: a factor, and whether it is multiplied by r (contactopt.bodies.elements.weight_at)
-    curve   function (dim, m) -> (dim, m) that puts points of the faces on the true surface; None: the faces are it
-    mirror  (dim, n) components across planes of symmetry that nodes lie in: what is modelled is half of what is there;
-            None: there is no such plane
+    faces   (f, j) nodes of every face: its corners in cyclic order, then the nodes on its edges,
+            then its centre
+    turn    (f,) +1 where the normal of the corners' order (in 2D: the direction of the face turned
+            clockwise) points outward, -1 where it points inward
+    weight  of the integrals: a factor, and whether it is multiplied by r
+            (contactopt.bodies.elements.weight_at)
+    curve   function (dim, m) -> (dim, m) that puts points of the faces on the true surface; None:
+            the faces are it
+    mirror  (dim, n) components across planes of symmetry that nodes lie in: what is modelled is
+            half of what is there; None: there is no such plane
     """
 
     name: str
@@ -73,11 +79,15 @@ class Faces:
     @property
     def cells(self) -> np.ndarray:
         """(c, v) nodes of a face that are the vertices of its linear cells."""
-        return np.arange(self.corners)[None] if self.degree == 1 else np.asarray(FACES[self.kind][3])
+        return (
+            np.arange(self.corners)[None] if self.degree == 1 else np.asarray(FACES[self.kind][3])
+        )
 
     @cached_property
     def curved(self) -> bool:
-        """Whether a node on an edge or within a face lies off the linear interpolation of the corners."""
+        """Whether a node on an edge or within a face lies off the linear interpolation of the
+        corners.
+        """
         count = self.corners
         hats = evaluate(FACES[self.kind][1], self.places)[0][:count, count:]
         nodes = self.points[:, self.faces]
@@ -87,10 +97,16 @@ class Faces:
 
     @cached_property
     def distorted(self) -> bool:
-        """Whether the map from the reference face is more than affine: no polynomial is one in the other's coordinates."""
+        """Whether the map from the reference face is more than affine: no polynomial is one in the
+        other's coordinates.
+        """
         nodes = self.points[:, self.faces]
         size = np.ptp(nodes, axis=2).max(axis=0)
-        skew = nodes[:, :, 0] - nodes[:, :, 1] + nodes[:, :, 2] - nodes[:, :, 3] if self.corners == 4 else 0 * size
+        skew = (
+            nodes[:, :, 0] - nodes[:, :, 1] + nodes[:, :, 2] - nodes[:, :, 3]
+            if self.corners == 4
+            else 0 * size
+        )
         return self.curved or bool(np.any(np.abs(skew) > STRAIGHT * size))
 
     def shapes(self, at: np.ndarray) -> np.ndarray:
@@ -99,15 +115,22 @@ class Faces:
 
     def local(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Coordinates (dim - 1, m) on linear cells (m,), 0 to 1, of places `at` on the face."""
-        first, last = self.places[:, self.cells[:, 0]], self.places[:, self.cells[:, [1, -1]]].max(axis=2)
-        return np.asarray((at - first[:, cell]) / np.where(last > first, last - first, 1.0)[:, cell])
+        first, last = (
+            self.places[:, self.cells[:, 0]],
+            self.places[:, self.cells[:, [1, -1]]].max(axis=2),
+        )
+        return np.asarray(
+            (at - first[:, cell]) / np.where(last > first, last - first, 1.0)[:, cell]
+        )
 
     def hats(self, local: np.ndarray) -> np.ndarray:
         """(v, m) hat functions of a linear cell at coordinates (dim - 1, m) on it."""
         return evaluate(FACES[self.kind][1], local)[0]
 
     def locations(self, face: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (dim, m) on faces (m,) at reference coordinates (dim - 1, m), and tangents (dim, dim - 1, m) there."""
+        """Places (dim, m) on faces (m,) at reference coordinates (dim - 1, m), and tangents (dim,
+        dim - 1, m) there.
+        """
         element = _SHAPES[self.kind][1][self.degree] if self.curved else FACES[self.kind][1]
         N, slope = evaluate(element, at)
         place, tangents = np.zeros((self.dim, len(face))), np.zeros((self.dim, len(at), len(face)))
@@ -118,7 +141,9 @@ class Faces:
         return place, tangents
 
     def mirrored(self, vectors: np.ndarray, nodes: np.ndarray | None = None) -> np.ndarray:
-        """Vectors (dim, k) at some nodes (k,), or at all, summed up with their mirror images: none points out of its plane."""
+        """Vectors (dim, k) at some nodes (k,), or at all, summed up with their mirror images: none
+        points out of its plane.
+        """
         if self.mirror is None:
             return vectors
         return np.where(self.mirror if nodes is None else self.mirror[:, nodes], 0.0, vectors)
@@ -127,8 +152,11 @@ class Faces:
         """Points (dim, m) of the faces moved to the true surface."""
         return x if self.curve is None else np.asarray(self.curve(x), dtype=float)
 
-    def locate(self, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Reference coordinates (dim - 1, m) on faces (m,) where axes (m, dim - 1, dim) see the points x (dim, m).
+    def locate(
+        self, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray
+    ) -> np.ndarray:
+        """Reference coordinates (dim - 1, m) on faces (m,) where axes (m, dim - 1, dim) see the
+        points x (dim, m).
 
         Newton's iteration from `start`; a single step is exact on affine faces.
         """
@@ -139,7 +167,10 @@ class Faces:
             apart = x - here
             step = _solve(
                 [
-                    [sum(a * t for a, t in zip(axis.T, tangent)) for tangent in tangents.transpose(1, 0, 2)]
+                    [
+                        sum(a * t for a, t in zip(axis.T, tangent))
+                        for tangent in tangents.transpose(1, 0, 2)
+                    ]
                     for axis in seen
                 ],
                 [sum(a * d for a, d in zip(axis.T, apart)) for axis in seen],
@@ -163,19 +194,18 @@ def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Parameters
     ----------
-    element
-        A scikit-fem element with j shape functions.
-    at
-        (dim - 1, m) reference coordinates.
+    element : A scikit-fem element with j shape functions.
+    at : (dim - 1, m) reference coordinates.
 
     Returns
     -------
-    tuple
-        Values (j, m) and derivatives (j, dim - 1, m).
+    Values (j, m) and derivatives (j, dim - 1, m).
     """
     values = [element.lbasis(at, j) for j in range(len(element.doflocs))]
     value = np.stack([np.broadcast_to(v, at.shape[1:]) for v, _ in values])
-    return value, np.stack([np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values])
+    return value, np.stack(
+        [np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values]
+    )
 
 
 def faces_of(
@@ -192,19 +222,14 @@ def faces_of(
 
     Parameters
     ----------
-    name, kind, degree
-        As in Faces.
-    nodes
-        (f, j) nodes of every face, as `faces` in Faces.
-    outward
-        (dim, f) a vector for every face that points out of the body.
-    weight, points, curve
-        As in Faces.
+    name, kind, degree : As in Faces.
+    nodes : (f, j) nodes of every face, as `faces` in Faces.
+    outward : (dim, f) a vector for every face that points out of the body.
+    weight, points, curve : As in Faces.
 
     Returns
     -------
-    Faces
-        The surface, with the sign of each face that makes its normal point outward.
+    The surface, with the sign of each face that makes its normal point outward.
     """
     made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
     return replace(made, turn=np.sign(np.sum(face_normals(made) * outward, axis=0)))
@@ -215,13 +240,11 @@ def face_normals(surface: Faces) -> np.ndarray:
 
     Parameters
     ----------
-    surface
-        A surface of f faces.
+    surface : A surface of f faces.
 
     Returns
     -------
-    ndarray
-        (dim, f) normals.
+    (dim, f) normals.
     """
     middle = surface.places[:, : surface.corners].mean(axis=1)
     count = len(surface.faces)
@@ -235,13 +258,11 @@ def cross(tangents: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    tangents
-        (dim, dim - 1, m) derivatives of the places by the reference coordinates.
+    tangents : (dim, dim - 1, m) derivatives of the places by the reference coordinates.
 
     Returns
     -------
-    ndarray
-        (dim, m) normals, as long as the surface is stretched.
+    (dim, m) normals, as long as the surface is stretched.
     """
     if len(tangents) == 2:
         return np.stack([tangents[1, 0], -tangents[0, 0]])
@@ -255,15 +276,13 @@ def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    surface
-        The surface.
-    own
-        Whether this side carries the multipliers.
+    surface : The surface.
+    own : Whether this side carries the multipliers.
 
     Returns
     -------
-    tuple
-        The vertices (p, v) of each polygon among the nodes of a face, and the cell (p,) in which it lies.
+    The vertices (p, v) of each polygon among the nodes of a face, and the cell (p,) in which it
+    lies.
     """
     if surface.curved and surface.kind == "RefTet":
         return _QUARTERS, np.zeros(4, dtype=int)

@@ -1,4 +1,5 @@
-"""Which facets of two surfaces may face each other: the pairs that a line along a normal of the first meets.
+"""Which facets of two surfaces may face each other: the pairs that a line along a normal of the
+first meets.
 
 An own facet sees along a cone of directions: its normals. Both surfaces are halved again and again
 into clusters of near facets. A cluster is enclosed in a ball, and its directions in a cone. Pairs
@@ -46,19 +47,17 @@ class Facets:
 
 
 def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find all pairs of facets of which the first may see the second along its normals, on either side.
+    """Find all pairs of facets of which the first may see the second along its normals, on either
+    side.
 
     Parameters
     ----------
-    own, other
-        The facets of the two surfaces.
-    facing
-        The cosine, at most zero, that the normals of facets which face each other stay below.
+    own, other : The facets of the two surfaces.
+    facing : The cosine, at most zero, that the normals of facets which face each other stay below.
 
     Returns
     -------
-    tuple
-        The numbers (j,) of the own and of the other facet of each pair, sorted by the own one.
+    The numbers (j,) of the own and of the other facet of each pair, sorted by the own one.
     """
     trees = [_tree(facets) for facets in (own, other)]
     first, second = np.zeros(1, dtype=int), np.zeros(1, dtype=int)
@@ -104,7 +103,9 @@ def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
         start, cluster = bounds[used], np.repeat(np.arange(len(used)), np.diff(bounds)[used])
         x = facets.centre[:, order]
         low, high = np.minimum.reduceat(x, start, axis=1), np.maximum.reduceat(x, start, axis=1)
-        levels.append(_clusters(facets.take(order), (low + high) / 2, start, cluster, used, 2**level))
+        levels.append(
+            _clusters(facets.take(order), (low + high) / 2, start, cluster, used, 2**level)
+        )
         widest = x[np.argmax(high - low, axis=0)[cluster], np.arange(n)]
         if level < np.log2(n):
             order = order[np.lexsort((widest, cluster))]
@@ -132,6 +133,8 @@ def _clusters(
     length = np.linalg.norm(axis, axis=0)
     axis = np.where(length > 0, axis, facets.axis[:, start]) / np.where(length > 0, length, 1.0)
     away = np.linalg.norm(facets.centre - centre[:, cluster], axis=0) + facets.radius
-    turn = np.arccos(np.clip(np.sum(facets.axis * axis[:, cluster], axis=0), -1.0, 1.0)) + facets.angle
+    turn = (
+        np.arccos(np.clip(np.sum(facets.axis * axis[:, cluster], axis=0), -1.0, 1.0)) + facets.angle
+    )
     radius, angle = (np.maximum.reduceat(values, start) for values in (away, turn))
     return Facets(placed(centre), placed(radius), placed(axis), placed(angle))

@@ -1,4 +1,6 @@
-"""The rotation of a surface around its contacts, and the levers by which it carries displacements (contactopt.coupling.mortar)."""
+"""The rotation of a surface around its contacts, and the levers by which it carries displacements
+(contactopt.coupling.mortar).
+"""
 
 from __future__ import annotations
 
@@ -7,29 +9,27 @@ import scipy.sparse as sp
 
 from contactopt.coupling.faces import Faces
 
-SHARE = 1 / 8  # of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
+# of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
+SHARE = 1 / 8
 ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 
 
 def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Compute the levers l_i by which displacements are carried: the part of e_i that is no gap, and a share of the
+    """Compute the levers l_i by which displacements are carried: the part of e_i that is no gap,
+    and a share of the
     gap.
 
     Parameters
     ----------
-    e
-        (dim, k) vectors from where forces act on the other side to where they act on the own side [length].
-    up
-        (dim, k) unit normals along which e opens the gap.
-    gap
-        (k,) initial gap [length].
-    sizes
-        (k,) sizes of the contacts' cells [length].
+    e : (dim, k) vectors from where forces act on the other side to where they act on the own side
+        [length].
+    up : (dim, k) unit normals along which e opens the gap.
+    gap : (k,) initial gap [length].
+    sizes : (k,) sizes of the contacts' cells [length].
 
     Returns
     -------
-    ndarray
-        (dim, k) levers [length]; zero where they would be rounding alone.
+    (dim, k) levers [length]; zero where they would be rounding alone.
     """
     limit = SHARE * sizes
     lever = e - up * (gap - np.clip(gap, -limit, limit))
@@ -40,23 +40,20 @@ def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) ->
 def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
     """Make the matrices from the displacements of a surface to omega_i x l_i at its contacts.
 
-    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a
-    plane of symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane
-    alone.
+    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas
+    of the faces. In a plane of symmetry, where the mirror images of these faces count as well, it
+    turns about the normal of the plane alone.
 
     Parameters
     ----------
-    lever
-        (dim, k) levers l_i [length].
-    own
-        The surface, with n points.
-    nodes
-        (k,) its points that are contacts.
+    lever : (dim, k) levers l_i [length].
+    own : The surface, with n points.
+    nodes : (k,) its points that are contacts.
 
     Returns
     -------
-    list
-        Matrices [c][d] (k, n) from the component d of the displacement to the component c of the product.
+    Matrices [c][d] (k, n) from the component d of the displacement to the component c of the
+    product.
     """
     # Weight of node j around contact i: the sizes of the faces that hold both, summed.
     f, size = len(own.faces), own.points.shape[1]
@@ -65,8 +62,11 @@ def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[li
     columns = np.repeat(np.arange(f), own.faces.shape[1])
     incident = sp.csr_matrix((np.ones(own.faces.size), (own.faces.ravel(), columns)), (size, f))
     needed = sp.diags(np.any(lever != 0, axis=0).astype(float))
-    around = sp.csr_matrix(needed @ incident[nodes] @ sp.diags(radius ** (own.dim - 1)) @ incident.T)
-    about = np.ones((3, len(nodes)), dtype=bool)  # the axes about which the surface turns at a contact
+    around = sp.csr_matrix(
+        needed @ incident[nodes] @ sp.diags(radius ** (own.dim - 1)) @ incident.T
+    )
+    # the axes about which the surface turns at a contact
+    about = np.ones((3, len(nodes)), dtype=bool)
     for c, there in enumerate(own.mirror[:, nodes] if own.mirror is not None else ()):
         about[np.arange(3) != c] &= ~there
     return _rotations(around, own.points, lever, about)
@@ -75,14 +75,18 @@ def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[li
 def _rotations(
     around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray, about: np.ndarray
 ) -> list[list[sp.csr_matrix]]:
-    """As above, from the weights (k, n) of the nodes around every contact, and its axes (3, k); in the plane, embedded in space."""
+    """As above, from the weights (k, n) of the nodes around every contact, and its axes (3, k); in
+    the plane, embedded in space.
+    """
     dim, k = lever.shape
     w = sp.coo_matrix(around)
     active = w.data > 0
     i, j, weight = w.row[active], w.col[active], w.data[active]
     # rho_j, the places of the nodes from their weighted mean.
     total = np.bincount(i, weight, k)
-    centre = np.stack([np.bincount(i, weight * x[j], k) for x in points]) / np.where(total > 0, total, 1.0)
+    centre = np.stack([np.bincount(i, weight * x[j], k) for x in points]) / np.where(
+        total > 0, total, 1.0
+    )
     rho = points[:, j] - centre[:, i]
     # The matrices rho_j x of the cross products, in space also for plane scenes.
     cross3 = np.zeros((len(i), 3, 3))  # rho x
@@ -90,16 +94,23 @@ def _rotations(
     full[:dim] = rho
     cross3[:, 0, 1], cross3[:, 0, 2], cross3[:, 1, 2] = -full[2], full[1], -full[0]
     cross3 -= cross3.transpose(0, 2, 1)
-    # J = sum_j w_j (rho_j^2 - rho_j rho_j') is the sum of -w_j (rho_j x)^2; axes that do not turn are left out.
+    # J = sum_j w_j (rho_j^2 - rho_j rho_j') is the sum of -w_j (rho_j x)^2; axes that do not turn
+    # are left out.
     moments = -np.einsum("g,gab,gbc->gac", weight, cross3, cross3)
-    J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(k, 3, 3)
+    J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(
+        k, 3, 3
+    )
     J = np.where(about.T[:, :, None] & about.T[:, None, :], J, 0.0)
     inverse = np.linalg.pinv(J, rcond=1e-10, hermitian=True)
-    # omega x l = -l x omega with omega = J^-1 sum_j w_j rho_j x u_j: the product of four factors for every node.
+    # omega x l = -l x omega with omega = J^-1 sum_j w_j rho_j x u_j: the product of four factors
+    # for every node.
     arm = np.zeros((k, 3, 3))  # -(lever x) = x lever
     tall = np.zeros((3, k))
     tall[:dim] = lever
     arm[:, 0, 1], arm[:, 0, 2], arm[:, 1, 2] = tall[2], -tall[1], tall[0]
     arm -= arm.transpose(0, 2, 1)
     values = np.einsum("gab,gbc,gcd,g->gad", arm[i], inverse[i], cross3, weight)
-    return [[sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)] for c in range(dim)]
+    return [
+        [sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)]
+        for c in range(dim)
+    ]

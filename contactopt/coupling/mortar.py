@@ -1,61 +1,70 @@
 """Mortar coupling of two surfaces whose nodes do not match, with dual multipliers.
 
-One side, the finer one unless told otherwise, carries the contacts. Its linear cells (contactopt.coupling.faces) have
-hat functions phi_i; on the part G of every cell that the other side covers,
+One side, the finer one unless told otherwise, carries the contacts. Its linear cells
+(contactopt.coupling.faces) have hat functions phi_i; on the part G of every cell that the other
+side covers,
 
     a_i = int_G phi_i,    psi_i linear on the cell,    int_G psi_i phi_j = delta_ij a_i,
 
-the dual basis of the covered part. With the shape functions N_j of the own side and N'_j of the other, evaluated at the
-places that face each other,
+the dual basis of the covered part. With the shape functions N_j of the own side and N'_j of the
+other, evaluated at the places that face each other,
 
     W_ij = int_G psi_i N_j / a_i,    W'_ij = int_G psi_i N'_j / a_i,    u_i = W_ij u_j - W'_ij u'_j,
 
-and a contact force r_i acts by r_i W_ij on the own side, by -r_i W'_ij on the other. The functional psi_i / a_i of a field
-is the value at contact i of its best linear fit on the covered part. Hence:
+and a contact force r_i acts by r_i W_ij on the own side, by -r_i W'_ij on the other. The functional
+psi_i / a_i of a field is the value at contact i of its best linear fit on the covered part. Hence:
 
 * Rows of W and of W' add up to one, so that forces are equal and opposite.
-* The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides exactly the integral of
-  its shape function: the patch test. It holds on partly covered faces too.
+* The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides
+  exactly the integral of its shape function: the patch test. It holds on partly covered faces too.
 * A cell that is partly covered is cut down to the smallest similar cell around G, with hat
   functions of its own: a contact outside the other surface moves to its edge, where the force acts.
   Continued to the node, the normals and the gap of a steep side mean nothing. Contacts without any
   covered cell are left out. Those that are hardly covered (WEAK) pass their share on to the
   strongest contact of the cell: the force of an edge over the area of a sliver is no pressure.
 
-**Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these places is zero where the
-surfaces lie on each other, but not where both are polygons inscribed in one curve; the moment of interface forces is the
-sum of e_i x r_i. It has a part that belongs to the geometry: a gap g_i closes along the normal before forces arise, so
-that e_i - g_i n_i is the lever that remains in contact. This rest is removed by evaluating the displacement of the own
-side at the other end of the lever, as a rotating surface carries it there:
+**Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these
+places is zero where the surfaces lie on each other, but not where both are polygons inscribed in
+one curve; the moment of interface forces is the sum of e_i x r_i. It has a part that belongs to the
+geometry: a gap g_i closes along the normal before forces arise, so that e_i - g_i n_i is the lever
+that remains in contact. This rest is removed by evaluating the displacement of the own side at the
+other end of the lever, as a rotating surface carries it there:
 
-    u_i = W u - W' u' - omega_i(u) x l_i,      omega_i(u) = J^-1 sum_j w_j rho_j x u_j,   J = sum_j w_j (rho_j^2 - rho_j rho_j'),
+    u_i = W u - W' u' - omega_i(u) x l_i,      omega_i(u) = J^-1 sum_j w_j rho_j x u_j,   J = sum_j
+                                               w_j (rho_j^2 - rho_j rho_j'),
 
-with omega_i the mean rotation of the nodes of the faces around contact i, rho_j their places from their centre, w_j the
-areas of the faces. It is exact for rigid motions, so that these give u = 0 at l_i = e_i, and by transposition forces on both bodies have
-no resultant moment. Since the lever is of second order in the size of the faces, so is what it changes. l_i also
-contains the gap itself, but at most an eighth of the size of a face (levers.SHARE): an arc deviates from a chord as long as
-its radius by about that much, so that polygons are in equilibrium whether their curve is known or not, and the rest of a
-larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry, and no lever is needed.
+with omega_i the mean rotation of the nodes of the faces around contact i, rho_j their places from
+their centre, w_j the areas of the faces. It is exact for rigid motions, so that these give u = 0 at
+l_i = e_i, and by transposition forces on both bodies have no resultant moment. Since the lever is
+of second order in the size of the faces, so is what it changes. l_i also contains the gap itself,
+but at most an eighth of the size of a face (levers.SHARE): an arc deviates from a chord as long as
+its radius by about that much, so that polygons are in equilibrium whether their curve is known or
+not, and the rest of a larger gap is left to the geometry. In an axisymmetric scene moments vanish
+by symmetry, and no lever is needed.
 
-**Kinks of linear elements.** With linear elements on the other side, W' has a further term, which rounds off the kinks of its
-displacement (contactopt.coupling.rounded_kinks): otherwise finer contacts would follow them, and pressures converge in first order.
+**Kinks of linear elements.** With linear elements on the other side, W' has a further term, which
+rounds off the kinks of its displacement (contactopt.coupling.rounded_kinks): otherwise finer
+contacts would follow them, and pressures converge in first order.
 
-**Frames.** Normals are those of the lower body, whichever side carries the contacts: as everywhere, and so that the answer
-does not depend on the choice.
+**Frames.** Normals are those of the lower body, whichever side carries the contacts: as everywhere,
+and so that the answer does not depend on the choice.
 
-**Planes of symmetry.** At a contact in such a plane the model holds one half of the faces around it. What the whole would give
-is the sum with the mirror image: normals, gaps and levers have no component out of the plane, and the mean rotation none about axes
-in it (Faces.mirror). Otherwise a gap that closes along the plane would also be a slip, and raise friction.
+**Planes of symmetry.** At a contact in such a plane the model holds one half of the faces around
+it. What the whole would give is the sum with the mirror image: normals, gaps and levers have no
+component out of the plane, and the mean rotation none about axes in it (Faces.mirror). Otherwise a
+gap that closes along the plane would also be a slip, and raise friction.
 
-**Contacts that are supported.** Where a support holds a component at a contact's node, that component of u_i is taken from
-this node alone, and from the other body at the place that faces it (`alone`); on a plane of symmetry both are at
-rest. The cone of the contact is untouched.
+**Contacts that are supported.** Where a support holds a component at a contact's node, that
+component of u_i is taken from this node alone, and from the other body at the place that faces it
+(`alone`); on a plane of symmetry both are at rest. The cone of the contact is untouched.
 
-Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange multiplier, SIAM J. Numer. Anal.
-38, 989-1012; Popp, Gitterle, Gee, Wall (2010), A dual mortar approach for 3D finite deformation contact with consistent
-linearization, Int. J. Numer. Meth. Engng 83, 1428-1465; Cichosz, Bischoff (2011), Consistent treatment of boundaries with
-mortar contact formulations using dual Lagrange multipliers, Comput. Methods Appl. Mech. Engrg 200, 1317-1332; Puso (2004),
-A 3D mortar method for solid mechanics, Int. J. Numer. Meth. Engng 59, 315-336 (rigid motions of curved interfaces).
+Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange
+multiplier, SIAM J. Numer. Anal. 38, 989-1012; Popp, Gitterle, Gee, Wall (2010), A dual mortar
+approach for 3D finite deformation contact with consistent linearization, Int. J. Numer. Meth. Engng
+83, 1428-1465; Cichosz, Bischoff (2011), Consistent treatment of boundaries with mortar contact
+formulations using dual Lagrange multipliers, Comput. Methods Appl. Mech. Engrg 200, 1317-1332; Puso
+(2004), A 3D mortar method for solid mechanics, Int. J. Numer. Meth. Engng 59, 315-336 (rigid
+motions of curved interfaces).
 """
 
 from __future__ import annotations
@@ -91,11 +100,14 @@ class Mortar:
     gap      (k,) initial gap [length]
     points   (dim, k) positions: of the nodes, or of the other surface's edge if it ends before
     share    (k,) the areas over those of the faces: less than one where the other surface ends
-    weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of the contacts
-    alone    two (k, nodes of the body): the displacement at the contact's own node, and at the place facing it
-    lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie on each other
-    carried  [c][d] (k, nodes of the own body): what displacements d contribute to component c of omega_i x l_i; empty
-             where all levers are zero
+    weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of
+             the contacts
+    alone    two (k, nodes of the body): the displacement at the contact's own node, and at the
+             place facing it
+    lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie
+             on each other
+    carried  [c][d] (k, nodes of the own body): what displacements d contribute to component c of
+             omega_i x l_i; empty where all levers are zero
     """
 
     own: int
@@ -111,7 +123,8 @@ class Mortar:
     carried: list[list[sp.csr_matrix]]
 
     def components(self, body: int, held: np.ndarray) -> list[list[sp.csr_matrix]]:
-        """Matrices [c][d] (k, nodes): what displacements d of the nodes of a body contribute to component c of the contacts.
+        """Matrices [c][d] (k, nodes): what displacements d of the nodes of a body contribute to
+        component c of the contacts.
 
         The relative displacement is that of the upper body, 0, less that of the lower one, 1.
 
@@ -135,41 +148,44 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
 
     Parameters
     ----------
-    upper, lower
-        The two surfaces.
-    own
-        'upper' or 'lower': the body that carries the contacts; by default the one with more contacts where they face
-        each other.
+    upper, lower : The two surfaces.
+    own : 'upper' or 'lower': the body that carries the contacts; by default the one with more
+        contacts where they face each other.
 
     Returns
     -------
-    Mortar
-        The contacts with areas, normals and gaps, and the weights of the displacements of both sides.
+    The contacts with areas, normals and gaps, and the weights of the displacements of both sides.
 
     Raises
     ------
-    InputError
-        If the surfaces face each other nowhere, or `own` has another value.
+    InputError : If the surfaces face each other nowhere, or `own` has another value.
     """
     if own not in (None, "upper", "lower"):
-        raise InputError(f"the side that carries the contacts must be 'upper', 'lower' or None; got {own!r}.")
+        raise InputError(
+            f"the side that carries the contacts must be 'upper', 'lower' or None; got {own!r}."
+        )
     pair = (upper, lower)
     first = 0 if own == "upper" else 1
     mine, theirs = pair[first], pair[1 - first]
     # Where the surfaces face each other, along the normals of the side that carries the contacts.
     normals, sizes, full = contact_normals(mine)
     points = overlap(mine, theirs, normals)
-    if own is None and _contacts(theirs, points.face) > _contacts(mine, points.cell // len(mine.cells)):
+    if own is None and _contacts(theirs, points.face) > _contacts(
+        mine, points.cell // len(mine.cells)
+    ):
         return mortar(upper, lower, "upper")
     sign = 1.0 if first == 1 else -1.0  # normals leave the lower body
     if not len(points.cell):
         raise InputError(
-            f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other nowhere; "
-            "check the boundaries' names, the bodies' positions, and which of them is the upper one."
+            f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other"
+            " nowhere; check the boundaries' names, the bodies' positions, and which of them is"
+            " the upper one."
         )
-    # Integrals of the dual functions: areas a_i, weights W and W', and the mean vector x - x' between the sides.
+    # Integrals of the dual functions: areas a_i, weights W and W', and the mean vector x - x'
+    # between the sides.
     sums = integrate(mine, theirs, points, full)
-    # Normals are always those of the lower body: its own at its nodes, or as they are seen from the contacts.
+    # Normals are always those of the lower body: its own at its nodes, or as they are seen from the
+    # contacts.
     n = normals[:, sums.nodes] if first == 1 else _seen(theirs, sums.other)
     n = mine.mirrored(n, sums.nodes)
     n = n / np.linalg.norm(n, axis=0)
@@ -177,7 +193,8 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     gap = -sign * np.sum(n * mine.mirrored(sums.apart, sums.nodes), axis=0)
     lever = np.zeros_like(n)
     if not mine.weight[1]:
-        # e_i = W x - W' x', the vector between the places where the two forces of a contact act, and its lever.
+        # e_i = W x - W' x', the vector between the places where the two forces of a contact act,
+        # and its lever.
         e = sums.own @ mine.points.T - sums.other @ theirs.points.T
         lever = levers(mine.mirrored(e.T, sums.nodes), -sign * n, gap, sizes[sums.nodes])
     carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
@@ -187,7 +204,11 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
         where = ", ".join(f"{c:.4g}" for c in sums.nearest)
         _log.warning(
-            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)", upper.name, lower.name, -sums.least, where
+            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)",
+            upper.name,
+            lower.name,
+            -sums.least,
+            where,
         )
     weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes, normals)
     if first == 1:
@@ -197,9 +218,12 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
 
 
 def _seen(other: Faces, weights: sp.csr_matrix) -> np.ndarray:
-    """Unit normals (dim, k) of the other side where it faces the contacts, by their weights (k, nodes)."""
+    """Unit normals (dim, k) of the other side where it faces the contacts, by their weights (k,
+    nodes).
+    """
     normals = contact_normals(other)[0]
-    between = np.setdiff1d(np.arange(other.faces.shape[1]), other.cells)  # nodes that are no vertices of linear cells
+    # nodes that are no vertices of linear cells
+    between = np.setdiff1d(np.arange(other.faces.shape[1]), other.cells)
     hats = evaluate(FACES[other.kind][1], other.places[:, between])[0]
     normals[:, other.faces[:, between]] = normals[:, other.faces[:, : other.corners]] @ hats
     n = weights @ normals.T
@@ -217,14 +241,12 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
     Parameters
     ----------
-    surface
-        A surface of n points.
+    surface : A surface of n points.
 
     Returns
     -------
-    tuple
-        Unit normals (dim, n), sizes (n,) [length] and integrals (n,), with the surface's weight.
-        All are zero at points that are no contact nodes.
+    Unit normals (dim, n), sizes (n,) [length] and integrals (n,), with the surface's weight. All
+    are zero at points that are no contact nodes.
     """
     n, count = surface.points.shape[1], len(surface.faces)
     total, area, full = np.zeros(surface.points.shape), np.zeros(n), np.zeros(n)
@@ -240,7 +262,9 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         normal = cross(tangents) * surface.turn[face]
         split = normal.reshape(len(normal), count, -1)
         length = np.linalg.norm(split, axis=0)
-        weighted = length * np.broadcast_to(weight_at(surface.weight, x), len(face)).reshape(length.shape)
+        weighted = length * np.broadcast_to(weight_at(surface.weight, x), len(face)).reshape(
+            length.shape
+        )
         for v, corner in enumerate(cell):
             node = surface.faces[:, corner]
             area += np.bincount(node, length @ (phi[v] * share), n)
@@ -248,14 +272,18 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
             for d in range(len(total)):
                 total[d] += np.bincount(node, split[d] @ (dual[v] * share), n)
     total = surface.mirrored(total)
-    normals = np.divide(total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total))
+    normals = np.divide(
+        total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total)
+    )
     return normals, area ** (1 / (surface.dim - 1)), full
 
 
 def _alone(
     own: Faces, other: Faces, points: Overlap, nodes: np.ndarray, normals: np.ndarray
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The own node of every contact, and the shape functions of the other side at the place on its normal."""
+    """The own node of every contact, and the shape functions of the other side at the place on its
+    normal.
+    """
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
     x = own.points[:, nodes]
@@ -267,5 +295,10 @@ def _alone(
     if other.corners == 3:
         there /= np.maximum(there.sum(axis=0), 1.0)
     N = other.shapes(there)
-    theirs = collect(N.T[:, None, :], np.arange(k)[:, None], other.faces[points.face[near]], (k, other.points.shape[1]))
+    theirs = collect(
+        N.T[:, None, :],
+        np.arange(k)[:, None],
+        other.faces[points.face[near]],
+        (k, other.points.shape[1]),
+    )
     return mine, tidy(theirs)

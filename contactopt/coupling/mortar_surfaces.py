@@ -1,4 +1,6 @@
-"""The coupling of bodies whose contact nodes do not match: contacts on one side, integrals over the overlap of both."""
+"""The coupling of bodies whose contact nodes do not match: contacts on one side, integrals over the
+overlap of both.
+"""
 
 from __future__ import annotations
 
@@ -20,29 +22,29 @@ from contactopt.scenes.scene import Scene
 log = logging.getLogger(__name__)
 
 
-def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody) -> Coupling:
-    """The mortar coupling of two bodies with meshes (contactopt.coupling.mortar), numbered along the chart.
+def couple_surfaces(
+    scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
+) -> Coupling:
+    """The mortar coupling of two bodies with meshes (contactopt.coupling.mortar), numbered along
+    the chart.
 
-    The contacts are carried by the side that the pair names, otherwise by that with more contacts where they face each other.
+    The contacts are carried by the side that the pair names, otherwise by that with more contacts
+    where they face each other.
 
     Parameters
     ----------
-    scene
-        The kind of the scene and its law.
-    pair
-        The pair of surfaces.
-    upper, lower
-        The two bodies, both with a mesh.
+    scene : The kind of the scene and its law.
+    pair : The pair of surfaces.
+    upper, lower : The two bodies, both with a mesh.
 
     Returns
     -------
-    Coupling
-        One contact for each node of that body that faces the other one.
+    One contact for each node of that body that faces the other one.
 
     Raises
     ------
-    InputError
-        If a body has no mesh on its contact surface, or if the surfaces face each other nowhere.
+    InputError : If a body has no mesh on its contact surface, or if the surfaces face each other
+        nowhere.
     """
     meshes = [_mesh(body.surface(name)) for body, name in zip((upper, lower), pair.surfaces)]
     # The contacts, with their weights on both sides.
@@ -53,30 +55,50 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     own_held = mine.held[mine.unknowns[:, m.nodes]]
     other_held = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
     mirror = sides[m.own].mirror
-    if mirror is not None:  # the other side is held as well where a plane of symmetry of both cuts it
+    # the other side is held as well where a plane of symmetry of both cuts it
+    if mirror is not None:
         other_held |= mirror[:, m.nodes]
     cells = _cells(sides[m.own], m.nodes)
-    # Chart and frames, and the maps T from the displacements of both bodies in the order of the chart.
+    # Chart and frames, and the maps T from the displacements of both bodies in the order of the
+    # chart.
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
     maps = [_map(m, i, mesh, own_held, frames, order) for i, mesh in enumerate(meshes)]
     areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
     cells, carrier = renumbered(cells, order), SIDES[m.own]
-    log.info("contact '%s': mortar, %d contacts on the %s body '%s'", pair.name, len(order), carrier, sides[m.own].name)
+    log.info(
+        "contact '%s': mortar, %d contacts on the %s body '%s'",
+        pair.name,
+        len(order),
+        carrier,
+        sides[m.own].name,
+    )
     gap, share = m.gap[order], m.share[order]
-    return Coupling(maps[0], maps[1], frames, gap, areas, places, chart, cells, planes, "mortar", carrier, share)
+    return Coupling(
+        maps[0], maps[1], frames, gap, areas, places, chart, cells, planes, "mortar", carrier, share
+    )
 
 
 def _mesh(surface: Surface) -> Mesh:
     if surface.mesh is None:
         raise InputError(
-            f"body '{surface.body}' has no mesh on its contact surface, so that its points must be those of the other surface."
+            f"body '{surface.body}' has no mesh on its contact surface, so that its points must be"
+            " those of the other surface."
         )
     return surface.mesh
 
 
 def _faces(name: str, mesh: Mesh) -> Faces:
-    return faces_of(name, mesh.kind, mesh.degree, mesh.faces, mesh.outward, mesh.measure, mesh.locations, mesh.curve)
+    return faces_of(
+        name,
+        mesh.kind,
+        mesh.degree,
+        mesh.faces,
+        mesh.outward,
+        mesh.measure,
+        mesh.locations,
+        mesh.curve,
+    )
 
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
@@ -86,7 +108,10 @@ def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
     common = [
         plane
         for plane in planes[0]
-        if any(np.all(plane.inward == p.inward) and abs(plane.offset - p.offset) <= NEAR * size for p in planes[1])
+        if any(
+            np.all(plane.inward == p.inward) and abs(plane.offset - p.offset) <= NEAR * size
+            for p in planes[1]
+        )
     ]
     if not common:
         return sides
@@ -101,10 +126,14 @@ def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
 
 def _vertices(side: Faces, mesh: Mesh) -> ContactPoints:
     """All vertices of the linear cells of a surface, as candidates for contacts."""
-    nodes, cells = np.unique(side.faces[:, side.cells].reshape(-1, side.cells.shape[1]), return_inverse=True)
+    nodes, cells = np.unique(
+        side.faces[:, side.cells].reshape(-1, side.cells.shape[1]), return_inverse=True
+    )
     held, none = mesh.held[mesh.unknowns[:, nodes]], np.zeros(len(nodes))
     normals = contact_normals(side)[0][:, nodes]
-    return ContactPoints(side.points[:, nodes], normals, none, cells.reshape(-1, side.cells.shape[1]).T, held, none)
+    return ContactPoints(
+        side.points[:, nodes], normals, none, cells.reshape(-1, side.cells.shape[1]).T, held, none
+    )
 
 
 def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
@@ -115,8 +144,12 @@ def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
     return np.asarray(cells[np.all(cells >= 0, axis=1)].T)
 
 
-def _map(m: Mortar, body: int, mesh: Mesh, held: np.ndarray, frames: np.ndarray, order: np.ndarray) -> sp.csr_matrix:
-    """T (k dim, n): the body's unknowns -> its part of the displacement of the contacts, in the frames and their order."""
+def _map(
+    m: Mortar, body: int, mesh: Mesh, held: np.ndarray, frames: np.ndarray, order: np.ndarray
+) -> sp.csr_matrix:
+    """T (k dim, n): the body's unknowns -> its part of the displacement of the contacts, in the
+    frames and their order.
+    """
     k, dim = frames.shape[:2]
     place = np.empty(k, dtype=int)
     place[order] = np.arange(k)

@@ -1,19 +1,21 @@
-"""What linear elements leave out between the nodes of the other side: rounding off the kinks of its displacement.
+"""What linear elements leave out between the nodes of the other side: rounding off the kinks of its
+displacement.
 
-A surface of linear elements stays a polygon when it is bent. Where the contacts are finer than the other side, they would
-see its kinks, and pressures would have to follow them: first order in h, however smooth the bodies' true deformation is.
-They see instead, on every face,
+A surface of linear elements stays a polygon when it is bent. Where the contacts are finer than the
+other side, they would see its kinks, and pressures would have to follow them: first order in h,
+however smooth the bodies' true deformation is. They see instead, on every face,
 
     u' + sum_e (B_e - mean of B_e) m_e,     m_e = (grad_a - grad_b) . (x_b - x_a) / 8,
 
-with B_e the hierarchical quadratic function of edge e, which joins nodes a and b, and m_e the rise of its middle that the
-recovered gradients ask for. These come from least-squares fits of quadratic functions to the nodes around each node: quadratic
-displacements are rounded exactly, linear ones not at all. The mean is that over the covered part of the face, so that a
-uniform pressure still gives every node exactly the integral of its shape function. Since all is linear in the
+with B_e the hierarchical quadratic function of edge e, which joins nodes a and b, and m_e the rise
+of its middle that the recovered gradients ask for. These come from least-squares fits of quadratic
+functions to the nodes around each node: quadratic displacements are rounded exactly, linear ones
+not at all. The mean is that over the covered part of the face, so that a uniform pressure still
+gives every node exactly the integral of its shape function. Since all is linear in the
 displacements of the nodes, forces follow by transposition, and remain in equilibrium.
 
-Source of the recovery: Zhang, Naga (2005), A new finite element gradient recovery method: superconvergence property, SIAM J.
-Sci. Comput. 26, 1192-1213.
+Source of the recovery: Zhang, Naga (2005), A new finite element gradient recovery method:
+superconvergence property, SIAM J. Sci. Comput. 26, 1192-1213.
 """
 
 from __future__ import annotations
@@ -24,23 +26,31 @@ import scipy.sparse as sp
 from contactopt.coupling.faces import Faces
 from contactopt.coupling.segments import Overlap
 
-FLAT = 1e-8  # singular values of a fit, over the largest, below which the nodes around do not determine it
+# singular values of a fit, over the largest, below which the nodes around do not determine it
+FLAT = 1e-8
 
 
 class Rounding:
-    """The rounding of the displacement of a surface of linear elements, at the points of integration of an overlap.
+    """The rounding of the displacement of a surface of linear elements, at the points of
+    integration of an overlap.
 
     rises  (f e, n) from the nodes' values to m_e of the edges of every face
     """
 
     def __init__(self, surface: Faces, points: Overlap) -> None:
         c = surface.corners
-        self.edges = np.array([[0, 1]]) if c == 2 else np.stack([np.arange(c), (np.arange(c) + 1) % c], axis=1)
+        self.edges = (
+            np.array([[0, 1]])
+            if c == 2
+            else np.stack([np.arange(c), (np.arange(c) + 1) % c], axis=1)
+        )
         self.surface, self.points = surface, points
         self.rises = _rises(surface, self.edges)
         count = len(surface.faces)
         content = np.bincount(points.face, points.measure, count)
-        moments = [np.bincount(points.face, points.measure * B, count) for B in self._bubbles(points.there)]
+        moments = [
+            np.bincount(points.face, points.measure * B, count) for B in self._bubbles(points.there)
+        ]
         self.means = np.stack(moments) / np.where(content > 0, content, 1.0)  # (e, f)
 
     def values(self, block: slice) -> np.ndarray:
@@ -53,7 +63,9 @@ class Rounding:
         return np.asarray(self.points.face[block][first][:, None] * e + np.arange(e))
 
     def _bubbles(self, at: np.ndarray) -> np.ndarray:
-        """(e, m) B_e at reference coordinates (dim - 1, m): one in the middle of its edge, zero on the others."""
+        """(e, m) B_e at reference coordinates (dim - 1, m): one in the middle of its edge, zero on
+        the others.
+        """
         hats = self.surface.shapes(at)
         first, second = hats[self.edges[:, 0]], hats[self.edges[:, 1]]
         both = first + second if self.surface.corners == 4 else np.ones(1)
@@ -61,23 +73,31 @@ class Rounding:
 
 
 def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
-    """(f e, n) from the nodes' values to m_e; zero where the gradient at an end of an edge is unknown."""
+    """(f e, n) from the nodes' values to m_e; zero where the gradient at an end of an edge is
+    unknown.
+    """
     gradients = _gradients(surface)
-    # m_e = (grad_a - grad_b) . (x_b - x_a) / 8 as a matrix on the nodes' values; unknown gradients give no rise.
+    # m_e = (grad_a - grad_b) . (x_b - x_a) / 8 as a matrix on the nodes' values; unknown gradients
+    # give no rise.
     a, b = (surface.faces[:, edges[:, i]].ravel() for i in (0, 1))
     along = (surface.points[:, b] - surface.points[:, a]) / 8
     determined = np.asarray(sum(np.diff(G.indptr) for G in gradients) > 0)
     known = sp.diags((determined[a] & determined[b]).astype(float))
-    return sp.csr_matrix(known @ sum(sp.diags(step) @ (G[a] - G[b]) for step, G in zip(along, gradients)))
+    return sp.csr_matrix(
+        known @ sum(sp.diags(step) @ (G[a] - G[b]) for step, G in zip(along, gradients))
+    )
 
 
 def _gradients(surface: Faces) -> list[sp.csr_matrix]:
-    """Matrices (n, n), one for each component of space, from the nodes' values to the tangential gradient at the nodes.
+    """Matrices (n, n), one for each component of space, from the nodes' values to the tangential
+    gradient at the nodes.
 
     Rows of nodes that too few others surround are empty.
     """
     n, (f, j) = surface.points.shape[1], surface.faces.shape
-    incident = sp.csr_matrix((np.ones(f * j), (surface.faces.ravel(), np.repeat(np.arange(f), j))), (n, f))
+    incident = sp.csr_matrix(
+        (np.ones(f * j), (surface.faces.ravel(), np.repeat(np.arange(f), j))), (n, f)
+    )
     near = sp.csr_matrix(incident @ incident.T)
     terms = 3 if surface.dim == 2 else 6
     wider = sp.csr_matrix(near @ near)
@@ -98,17 +118,22 @@ def _gradients(surface: Faces) -> list[sp.csr_matrix]:
 
 
 def _fit(apart: np.ndarray, directions: int, terms: int) -> np.ndarray | None:
-    """(dim, m) weights of m nodes in the gradient of the quadratic fit where `apart` (dim, m) is zero; None: undetermined."""
+    """(dim, m) weights of m nodes in the gradient of the quadratic fit where `apart` (dim, m) is
+    zero; None: undetermined.
+    """
     if apart.shape[1] < terms:
         return None
     # Coordinates y in the tangent plane through the nodes, scaled to one.
-    axes = np.linalg.svd(apart - apart.mean(axis=1, keepdims=True), full_matrices=False)[0][:, :directions]
+    axes = np.linalg.svd(apart - apart.mean(axis=1, keepdims=True), full_matrices=False)[0][
+        :, :directions
+    ]
     y = axes.T @ apart
     size = np.abs(y).max()
     if size == 0:
         return None
     y = y / size
-    # Least squares for 1, y and the products y_i y_k; rows 1 to `directions` of the pseudo-inverse give the gradient.
+    # Least squares for 1, y and the products y_i y_k; rows 1 to `directions` of the pseudo-inverse
+    # give the gradient.
     squares = [y[i] * y[k] for i in range(directions) for k in range(i, directions)]
     A = np.stack([np.ones(len(y.T)), *y, *squares], axis=1)
     U, s, Vt = np.linalg.svd(A, full_matrices=False)

@@ -1,17 +1,21 @@
-"""Where two surfaces that face each other overlap: pieces that lie on one face of each, with points of integration.
+"""Where two surfaces that face each other overlap: pieces that lie on one face of each, with points
+of integration.
 
-In the plane, the ends of the other side's faces are projected on the own side along its field of nodal normals, linear on
-every cell. The field is continuous, so that the pieces neither overlap nor leave gaps. In space, both sides are projected
-on a plane through every own cell, normal to it, polygons are cut there, and triangles made of them.
+In the plane, the ends of the other side's faces are projected on the own side along its field of
+nodal normals, linear on every cell. The field is continuous, so that the pieces neither overlap nor
+leave gaps. In space, both sides are projected on a plane through every own cell, normal to it,
+polygons are cut there, and triangles made of them.
 
-scikit-fem's supermeshing.intersect is not used: it takes meshes of one plane or line only, no surfaces in space; it
-rounds coordinates to ten decimals, so that its answer depends on the unit of length; it loops over all elements in Python
-and makes a new array for each; and it needs one more package (shapely).
+scikit-fem's supermeshing.intersect is not used: it takes meshes of one plane or line only, no
+surfaces in space; it rounds coordinates to ten decimals, so that its answer depends on the unit of
+length; it loops over all elements in Python and makes a new array for each; and it needs one more
+package (shapely).
 
-Sources: Yang, Laursen, Meng (2005), Two dimensional mortar contact methods for large deformation frictional sliding, Int.
-J. Numer. Meth. Engng 62, 1183-1225 (normal field); Puso, Laursen (2004), A mortar segment-to-segment contact method for
-large deformation solid mechanics, Comput. Methods Appl. Mech. Engrg 193, 601-629 (planes); Sutherland, Hodgman (1974),
-Reentrant polygon clipping, Commun. ACM 17, 32-42.
+Sources: Yang, Laursen, Meng (2005), Two dimensional mortar contact methods for large deformation
+frictional sliding, Int. J. Numer. Meth. Engng 62, 1183-1225 (normal field); Puso, Laursen (2004), A
+mortar segment-to-segment contact method for large deformation solid mechanics, Comput. Methods
+Appl. Mech. Engrg 193, 601-629 (planes); Sutherland, Hodgman (1974), Reentrant polygon clipping,
+Commun. ACM 17, 32-42.
 """
 
 from __future__ import annotations
@@ -30,11 +34,13 @@ from contactopt.coupling.faces import Faces, cross, face_normals, patches
 from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.errors import InputError
 
-SMALLEST = 1e-8  # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
+# cells that are covered by less than this fraction count as uncovered: the noise of coordinates
+SMALLEST = 1e-8
 WHOLE = 1e-9  # and those that are covered but for less than this count as covered
 FACING = -0.1  # the cosine between normals of faces that face each other is below this
 FOLD = 1.05  # a cell that is covered by more than this faces two layers of the other surface
-# degrees added to the quadrature where a face is distorted, so that integrands are no polynomials: on flat interfaces, where
+# degrees added to the quadrature where a face is distorted, so that integrands are no polynomials:
+# on flat interfaces, where
 # uniform pressure is exact up to this error, and on curved ones, where it is not
 FLAT, CURVED = 12, 4
 
@@ -43,14 +49,16 @@ FLAT, CURVED = 12, 4
 class Overlap:
     """Points of integration on the overlap of two surfaces, g of them.
 
-    cell    (g,) linear cell of the own side: face times cells of a face, plus its number on the face
+    cell    (g,) linear cell of the own side: face times cells of a face, plus its number on the
+            face
     at      (dim - 1, g) reference coordinates on the own face
     face    (g,) face of the other side
     there   (dim - 1, g) reference coordinates on it
-    axes    (g, dim - 1, dim) directions across which both places coincide: the line between them is normal to these
+    axes    (g, dim - 1, dim) directions across which both places coincide: the line between them is
+            normal to these
     measure (g,) area that every point stands for, with the weight of the integrals
-    window  (2, dim - 1, own cells) begin and width, from 0 to 1, of the smallest similar cell around
-            the covered part
+    window  (2, dim - 1, own cells) begin and width, from 0 to 1, of the smallest similar cell
+            around the covered part
     """
 
     cell: np.ndarray
@@ -67,22 +75,17 @@ def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
 
     Parameters
     ----------
-    own
-        The side that carries the contacts, with n points.
-    other
-        The other side.
-    normals
-        (dim, n) normals of the own side at its points.
+    own : The side that carries the contacts, with n points.
+    other : The other side.
+    normals : (dim, n) normals of the own side at its points.
 
     Returns
     -------
-    Overlap
-        The points on both surfaces, in the order of the own cells.
+    The points on both surfaces, in the order of the own cells.
 
     Raises
     ------
-    InputError
-        If the other surface is folded, so that some cell faces two of its layers.
+    InputError : If the other surface is folded, so that some cell faces two of its layers.
     """
     return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 
@@ -113,11 +116,17 @@ def _cut(surface: Faces, own: bool) -> _Polygons:
     centre = x.mean(axis=2)
     radius = np.linalg.norm(x - centre[:, :, None], axis=0).max(axis=1)
     normal = _polygon_normals(x) * surface.turn[face]
-    return _Polygons(x, at, face, face * len(surface.cells) + np.tile(cell, count), normal, centre, radius)
+    return _Polygons(
+        x, at, face, face * len(surface.cells) + np.tile(cell, count), normal, centre, radius
+    )
 
 
-def _facing(mine: _Polygons, theirs: _Polygons, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of polygons that may face each other; own ones see within `spread` (p,) of their normals."""
+def _facing(
+    mine: _Polygons, theirs: _Polygons, spread: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of polygons that may face each other; own ones see within `spread` (p,) of their
+    normals.
+    """
     none = np.zeros(0, dtype=int)
     if not len(mine.face) or not len(theirs.face):
         return none, none
@@ -162,7 +171,10 @@ def _nearest(
     covered = np.bincount(cell[keep], content[keep], cells)
     several = np.flatnonzero(keep & (covered[cell] > FOLD))
     if len(several):
-        layer, away = _layers(other, cell[several], theirs.face[second[several]]), np.abs(height[several])
+        layer, away = (
+            _layers(other, cell[several], theirs.face[second[several]]),
+            np.abs(height[several]),
+        )
         least, nearest = np.full(layer.max() + 1, np.inf), np.full(cells, np.inf)
         np.minimum.at(least, layer, away)
         np.minimum.at(nearest, cell[several], away)
@@ -173,7 +185,9 @@ def _nearest(
 
 
 def _layers(other: Faces, cell: np.ndarray, face: np.ndarray) -> np.ndarray:
-    """Numbers (q,) of the layers of faces (q,) seen from cells (q,): those of a layer hang together."""
+    """Numbers (q,) of the layers of faces (q,) seen from cells (q,): those of a layer hang
+    together.
+    """
     nodes = other.faces[face, : other.corners]
     known, hub = np.unique(cell[:, None] * other.points.shape[1] + nodes, return_inverse=True)
     q = len(face)
@@ -187,7 +201,8 @@ def _polygon_normals(x: np.ndarray) -> np.ndarray:
     if len(x) == 2:
         normal = cross((x[:, :, 1] - x[:, :, 0])[:, None])
     else:
-        normal = np.cross(x[:, :, 2] - x[:, :, 0], x[:, :, -1] - x[:, :, 1], axis=0)  # of a triangle: twice its area
+        # of a triangle: twice its area
+        normal = np.cross(x[:, :, 2] - x[:, :, 0], x[:, :, -1] - x[:, :, 1], axis=0)
     return np.asarray(normal / np.linalg.norm(normal, axis=0))
 
 
@@ -201,7 +216,9 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     n0, n1 = normals[:, ends[first, 0]], normals[:, ends[first, 1]]
     turn = n1 - n0
     x = theirs.vertices[:, second]
-    s = np.sort([_project(own, face, start, width, n0, turn, x[:, :, i]) for i in (0, 1)], axis=0).clip(0.0, 1.0)
+    s = np.sort(
+        [_project(own, face, start, width, n0, turn, x[:, :, i]) for i in (0, 1)], axis=0
+    ).clip(0.0, 1.0)
     length, middle = s[1] - s[0], s.mean(axis=0)
     direction = n0 + turn * middle
     direction /= np.linalg.norm(direction, axis=0)
@@ -218,9 +235,15 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     axes = (np.stack([n[1], -n[0]]) / np.linalg.norm(n, axis=0)).T[:, None, :]
     x, tangents = own.locations(face[pair], here)
     there = other.locate(theirs.face[second[pair]], x, axes, np.array([[0.5]]))
-    measure = (share * length[keep, None]).ravel() * np.abs(width[0, pair]) * np.linalg.norm(tangents[:, 0], axis=0)
+    measure = (
+        (share * length[keep, None]).ravel()
+        * np.abs(width[0, pair])
+        * np.linalg.norm(tangents[:, 0], axis=0)
+    )
     measure *= weight_at(own.weight, x)
-    return Overlap(mine.cell[first[pair]], here, theirs.face[second[pair]], there, axes, measure, window)
+    return Overlap(
+        mine.cell[first[pair]], here, theirs.face[second[pair]], there, axes, measure, window
+    )
 
 
 def _project(
@@ -232,7 +255,9 @@ def _project(
     turn: np.ndarray,
     x: np.ndarray,
 ) -> np.ndarray:
-    """Place s on cells, from 0 to 1, whose normal n0 + s turn passes through the points x (2, m); clipped beyond."""
+    """Place s on cells, from 0 to 1, whose normal n0 + s turn passes through the points x (2, m);
+    clipped beyond.
+    """
     s = np.full(len(face), 0.5)
     for _ in range(30):
         here, tangents = own.locations(face, start + width * s)
@@ -253,7 +278,8 @@ def _project(
 
 def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
     """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners
-    (dim - 1, q, v) of pieces on cells (q,); all of a cell where it is covered as a whole."""
+    (dim - 1, q, v) of pieces on cells (q,); all of a cell where it is covered as a whole.
+    """
     window = np.stack([np.zeros((own.dim - 1, len(covered))), np.ones((own.dim - 1, len(covered)))])
     low, high = np.ones(window[0].shape), np.zeros(window[0].shape)
     for d, x in enumerate(corners):
@@ -273,8 +299,9 @@ def _check_fold(other: Faces, mine: _Polygons, covered: np.ndarray) -> None:
     if covered.max(initial=0.0) > FOLD:
         where = mine.centre[:, np.argmax(mine.cell == np.argmax(covered))]
         raise InputError(
-            f"body '{other.name}': its contact boundary is folded, two layers of it face the same place near "
-            f"({', '.join(f'{c:.4g}' for c in where)}); name only the part of it that can touch."
+            f"body '{other.name}': its contact boundary is folded, two layers of it face the same"
+            f" place near ({', '.join(f'{c:.4g}' for c in where)}); name only the part of it that"
+            " can touch."
         )
 
 
@@ -290,13 +317,20 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     area = _areas(frame)
     frame = np.where((area < 0)[:, None, None], frame[:, ::-1], frame)  # counterclockwise
     size = np.sqrt(np.abs(area))
-    subject = np.einsum("pad,dpv->pva", axes[first], theirs.vertices[:, second] - origin[:, first, None])
+    subject = np.einsum(
+        "pad,dpv->pva", axes[first], theirs.vertices[:, second] - origin[:, first, None]
+    )
     low, high = frame.min(axis=1)[first], frame.max(axis=1)[first]
-    near = np.flatnonzero(np.all((subject.max(axis=1) > low) & (subject.min(axis=1) < high), axis=1))
+    near = np.flatnonzero(
+        np.all((subject.max(axis=1) > low) & (subject.min(axis=1) < high), axis=1)
+    )
     first, second = first[near], second[near]
     polygon = _clip(subject[near], frame[first], size[first])
     # a fan of triangles around the first vertex
-    triangles = np.stack([np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1), polygon[:, 1:-1], polygon[:, 2:]], 2)
+    triangles = np.stack(
+        [np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1), polygon[:, 1:-1], polygon[:, 2:]],
+        2,
+    )
     content = np.abs(_areas(triangles.reshape(-1, 3, 2))).reshape(triangles.shape[:2])
     full = np.bincount(mine.cell, np.abs(area), len(own.faces) * len(own.cells))
     part = content.sum(axis=1) / full[mine.cell[first]]
@@ -324,12 +358,16 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     there = other.locate(theirs.face[theirs_at], x, E, theirs.at[:, theirs_at].mean(axis=2))
     place, tangents = own.locations(mine.face[mine_at], here)
     seen = np.abs(np.linalg.det(np.einsum("gad,dcg->gac", E, tangents)))
-    measure = content * np.linalg.norm(cross(tangents), axis=0) / seen * weight_at(own.weight, place)
+    measure = (
+        content * np.linalg.norm(cross(tangents), axis=0) / seen * weight_at(own.weight, place)
+    )
     return Overlap(mine.cell[mine_at], here, theirs.face[theirs_at], there, E, measure, window)
 
 
 def _order(own: Faces, other: Faces) -> int:
-    """Degree of the quadrature on triangles: exact for products of hat functions and shape functions on affine faces."""
+    """Degree of the quadrature on triangles: exact for products of hat functions and shape
+    functions on affine faces.
+    """
 
     def highest(surface: Faces) -> int:
         return surface.degree * (2 if surface.corners == 4 else 1)
@@ -350,7 +388,8 @@ def _areas(polygons: np.ndarray) -> np.ndarray:
 
 
 def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Parts (p, v', 2) of polygons (p, v, 2) inside convex counterclockwise windows (p, w, 2); `size` (p,) of the windows.
+    """Parts (p, v', 2) of polygons (p, v, 2) inside convex counterclockwise windows (p, w, 2);
+    `size` (p,) of the windows.
 
     Unused places at the end repeat the last vertex; a polygon without vertices is zero.
     """
@@ -360,7 +399,9 @@ def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarr
         inward = np.stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]], axis=1)
         inward /= np.linalg.norm(inward, axis=1)[:, None]
         used = np.arange(polygon.shape[1]) < count[:, None]
-        following = np.where(np.arange(polygon.shape[1]) == count[:, None] - 1, 0, np.arange(polygon.shape[1]) + 1)
+        following = np.where(
+            np.arange(polygon.shape[1]) == count[:, None] - 1, 0, np.arange(polygon.shape[1]) + 1
+        )
         following = np.minimum(following, polygon.shape[1] - 1)
         inside = np.einsum("pva,pa->pv", polygon - a[:, None], inward)
         inside = np.where(np.abs(inside) < 1e-13 * size[:, None], 0.0, inside)

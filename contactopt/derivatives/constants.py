@@ -8,9 +8,12 @@ Tolerances that follow from rounding stand beside the code that uses them.
 from __future__ import annotations
 
 # The trust region of a design (contactopt.derivatives.design).
-TAKEN, GOOD = 0.05, 0.7  # share of the promised gain from which on a step is taken, and the trust region grows
+# share of the promised gain from which on a step is taken, and the trust region grows
+TAKEN, GOOD = 0.05, 0.7
 SHRINK, GROW = 0.3, 2.0  # factors by which its radius changes
-FIRST_RADIUS = 0.1  # of the first one, in changes that move the pressure somewhere by the largest one
+# of the first one, in changes that move the pressure somewhere by the largest one
+FIRST_RADIUS = 0.1
 
 # Linear systems solved by iteration (contactopt.derivatives.linear).
-ROUND, INNER = 1e-4, 1e-6  # reduction of the residual by one round of GMRES, and by GMRES for the model of Q
+# reduction of the residual by one round of GMRES, and by GMRES for the model of Q
+ROUND, INNER = 1e-4, 1e-6

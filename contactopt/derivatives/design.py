@@ -1,14 +1,18 @@
-"""Design: profiles and loads that make the largest pressure as small as it can be, by sequential convex programs.
+"""Design: profiles and loads that make the largest pressure as small as it can be, by sequential
+convex programs.
 
-The profile is an initial gap g0 + sum_j c_j shape_j over the contacts; loads and other scalar parameters may be free as well. With
-x all variables, p(x) the pressures of the certified solution and J = dp/dx from its sensitivity, one step solves
+The profile is an initial gap g0 + sum_j c_j shape_j over the contacts; loads and other scalar
+parameters may be free as well. With x all variables, p(x) the pressures of the certified solution
+and J = dp/dx from its sensitivity, one step solves
 
-    min  t   over d, t:   p_i + (J d)_i <= t at all contacts,   x + d within bounds and convex constraints,   |d_j| <= radius size_j.
+    min  t   over d, t:   p_i + (J d)_i <= t at all contacts,   x + d within bounds and convex
+         constraints,   |d_j| <= radius size_j.
 
-The largest pressure is kept as it is: the program has its kink as constraints, nothing is smoothed. A step is taken if the largest
-pressure of the solved scene falls by a fair part of what the program promised; otherwise the trust region shrinks. Every state visited
-is certified. Contacts that open or slip on the way are kinks of p(x). There J is that of one side, and the trust
-region has the last word.
+The largest pressure is kept as it is: the program has its kink as constraints, nothing is smoothed.
+A step is taken if the largest pressure of the solved scene falls by a fair part of what the program
+promised; otherwise the trust region shrinks. Every state visited is certified. Contacts that open
+or slip on the way are kinks of p(x). There J is that of one side, and the trust region has the last
+word.
 
 Sources: Conn, Gould, Toint (2000), Trust-region methods, chapter 11; Outrata, Kocvara, Zowe (1998).
 """
@@ -39,12 +43,15 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 IDLE = 1e-10  # change of the forces, over what is usual, that is rounding
-SETTLED = 1e-6  # promised relative gain, and relative size of a trust region, at which the design ends
+# promised relative gain, and relative size of a trust region, at which the design ends
+SETTLED = 1e-6
 
 
 @dataclass(frozen=True)
 class Visit:
-    """One state visited: the largest pressure [stress], its certificate, the radius, whether the step was taken, weak contacts."""
+    """One state visited: the largest pressure [stress], its certificate, the radius, whether the
+    step was taken, weak contacts.
+    """
 
     peak: float
     certificate: float
@@ -59,7 +66,8 @@ class Design:
 
     profile    (m,) coefficients of the shapes;  values  name -> value of the free parameters
     gap        (k,) initial gap [length];  pressure  (k,) [stress];  peak  the largest
-    unevenness largest over mean pressure, the mean over the nodal areas of the contacts that touch [-]
+    unevenness largest over mean pressure, the mean over the nodal areas of the contacts that touch
+    [-]
     visits     all states visited, in their order;  converged, message  of the iteration
     reduction, solution  of the best state, whose problem has the designed gap
     """
@@ -81,7 +89,12 @@ class _States:
     """Solves the scene for given variables x = (coefficients, parameters)."""
 
     def __init__(
-        self, scene: Scene, shapes: Callable | np.ndarray | None, which: tuple[Parameter, ...], Q: str, tol: float
+        self,
+        scene: Scene,
+        shapes: Callable | np.ndarray | None,
+        which: tuple[Parameter, ...],
+        Q: str,
+        tol: float,
     ):
         self.scene, self.which, self.tol, self.Q = scene, which, tol, Q
         self.base = reduce_bodies(scene, Q=Q)
@@ -95,7 +108,9 @@ class _States:
         )
         self.shapes = real_array("shapes", made)
         if self.shapes.ndim != 2 or len(self.shapes) != k:
-            raise InputError(f"shapes must have one row per contact, ({k}, m); got {self.shapes.shape}.")
+            raise InputError(
+                f"shapes must have one row per contact, ({k}, m); got {self.shapes.shape}."
+            )
 
     def step(self, x: np.ndarray, start: Solution | None) -> Step:
         """The solved state; InputError if it has no certified solution."""
@@ -121,7 +136,9 @@ class _States:
             columns.append(step.sensitivity.forward(q=q).reactions[:, 0])
         for one in self.which:
             explicit = step.explicit({one: 1.0}, step.reduction)
-            columns.append(step.sensitivity.forward(q=explicit.u, mu=explicit.mu, s=explicit.s).reactions[:, 0])
+            columns.append(
+                step.sensitivity.forward(q=explicit.u, mu=explicit.mu, s=explicit.s).reactions[:, 0]
+            )
         return np.stack(columns, axis=1)
 
 
@@ -141,12 +158,14 @@ def design(
     Parameters
     ----------
     scene : what is designed; its own gap is where the design starts
-    shapes : (k, m) functions that may be added to the initial gap at the contacts, or a function that makes them from the
-        places (dim - 1, k) on the contact surface; None: the profile stays
-    free : names of scalar parameters that are free as well, such as loads (contactopt.derivatives.parameters)
-    bounds : name -> (lowest, highest) value of a free parameter, and 'profile' -> bounds of all coefficients; a pair alone is
-        that of the profile. Free parameters need bounds
-    constraints : function of the cvxpy variable of all unknowns, coefficients first, that gives a list of convex constraints
+    shapes : (k, m) functions that may be added to the initial gap at the contacts, or a function
+        that makes them from the places (dim - 1, k) on the contact surface; None: the profile stays
+    free : names of scalar parameters that are free as well, such as loads
+        (contactopt.derivatives.parameters)
+    bounds : name -> (lowest, highest) value of a free parameter, and 'profile' -> bounds of all
+        coefficients; a pair alone is that of the profile. Free parameters need bounds
+    constraints : function of the cvxpy variable of all unknowns, coefficients first, that gives a
+        list of convex constraints
     Q : form of Q, as for contactopt.reduce; an array makes many derivatives cheap
     tol : bound on the certificate of every state visited
     steps : states visited at most
@@ -157,8 +176,8 @@ def design(
 
     Raises
     ------
-    InputError : for shapes of the wrong shape, free parameters without bounds, nothing that is free, constraints that leave no
-        room, and a scene that cannot be solved at the start
+    InputError : for shapes of the wrong shape, free parameters without bounds, nothing that is
+        free, constraints that leave no room, and a scene that cannot be solved at the start
 
     Sources: those of the head of this module.
     """
@@ -170,12 +189,16 @@ def design(
     m = states.shapes.shape[1]
     x = np.concatenate([np.zeros(m), [one.read(scene) for one in which]])
     if len(x) == 0:
-        raise InputError("nothing is free; give shapes of the profile, or names of free parameters.")
+        raise InputError(
+            "nothing is free; give shapes of the profile, or names of free parameters."
+        )
     low, high = _bounds(bounds, which, m)
     now, radius, visits, message = states.step(x, None), FIRST_RADIUS, [], "the steps ran out"
     visits.append(Visit(_peak(now), now.solution.residual, radius, True, len(now.sensitivity.weak)))
     slopes = states.slopes(now)
-    steepest = np.abs(slopes / np.maximum(now.problem.areas, 1e-300)[:, None]).max(axis=0, initial=0.0)
+    steepest = np.abs(slopes / np.maximum(now.problem.areas, 1e-300)[:, None]).max(
+        axis=0, initial=0.0
+    )
     if not np.all(np.abs(slopes).max(axis=0) > IDLE * _usual(states, now, x)):
         raise InputError("a shape or a free parameter does not change the pressure; leave it out.")
     sizes = _peak(now) / steepest  # each changes the pressure somewhere by as much as the largest
@@ -192,7 +215,9 @@ def design(
             continue
         gain = (_peak(now) - _peak(trial)) / promised
         taken = gain >= TAKEN
-        visits.append(Visit(_peak(trial), trial.solution.residual, radius, taken, len(trial.sensitivity.weak)))
+        visits.append(
+            Visit(_peak(trial), trial.solution.residual, radius, taken, len(trial.sensitivity.weak))
+        )
         radius *= SHRINK if not taken else GROW if gain >= GOOD else 1.0
         if taken:
             now, x = trial, x + d
@@ -200,7 +225,9 @@ def design(
     return _designed(states, now, x, tuple(visits), message)
 
 
-def _designed(states: _States, now: Step, x: np.ndarray, visits: tuple[Visit, ...], message: str) -> Design:
+def _designed(
+    states: _States, now: Step, x: np.ndarray, visits: tuple[Visit, ...], message: str
+) -> Design:
     m, problem, r = states.shapes.shape[1], now.problem, now.solution.reactions
     pressure, touching = _pressure(now), problem.law.pressed(r)
     mean = float(r[touching, 0].sum() / problem.areas[touching].sum()) if touching.any() else np.nan
@@ -208,7 +235,17 @@ def _designed(states: _States, now: Step, x: np.ndarray, visits: tuple[Visit, ..
     values = {one.name: float(value) for one, value in zip(states.which, x[m:])}
     peak, converged = _peak(now), message != "the steps ran out"
     return Design(
-        x[:m], values, gap, pressure, peak, peak / mean, visits, converged, message, now.reduction, now.solution
+        x[:m],
+        values,
+        gap,
+        pressure,
+        peak,
+        peak / mean,
+        visits,
+        converged,
+        message,
+        now.reduction,
+        now.solution,
     )
 
 
@@ -246,7 +283,9 @@ def _program(
     except cp.SolverError as error:
         raise InputError(f"the convex program of a design step failed: {error}.") from error
     if d.value is None:
-        raise InputError("the constraints and bounds leave no room for the design at its start; loosen them.")
+        raise InputError(
+            "the constraints and bounds leave no room for the design at its start; loosen them."
+        )
     step = np.clip(d.value, -1.0, 1.0)
     return reach * step, peak * float(p.max() - (p + J @ step).max())
 
@@ -254,7 +293,9 @@ def _program(
 def _pressure(step: Step) -> np.ndarray:
     """(k,) [stress]; zero at a contact without an area."""
     areas = step.problem.areas
-    return np.divide(step.solution.reactions[:, 0], areas, out=np.zeros(len(areas)), where=areas > 0)
+    return np.divide(
+        step.solution.reactions[:, 0], areas, out=np.zeros(len(areas)), where=areas > 0
+    )
 
 
 def _peak(step: Step) -> float:
@@ -262,17 +303,29 @@ def _peak(step: Step) -> float:
 
 
 def _usual(states: _States, now: Step, x: np.ndarray) -> np.ndarray:
-    """What each variable would change the forces by if every contact were on its own, for parameters in units of their own."""
+    """What each variable would change the forces by if every contact were on its own, for
+    parameters in units of their own.
+    """
     compliance = float(np.mean(diagonal(now.problem.Q)))
     rest = np.where(x[states.shapes.shape[1] :] != 0, np.abs(x[states.shapes.shape[1] :]), 1.0)
     largest = float(np.abs(now.solution.reactions).max())
-    return np.concatenate([np.abs(states.shapes).max(axis=0, initial=0.0) / compliance, largest / rest])
+    return np.concatenate(
+        [np.abs(states.shapes).max(axis=0, initial=0.0) / compliance, largest / rest]
+    )
 
 
 def _bounds(
-    bounds: Mapping[str, tuple[float, float]] | tuple[float, float] | None, which: tuple[Parameter, ...], m: int
+    bounds: Mapping[str, tuple[float, float]] | tuple[float, float] | None,
+    which: tuple[Parameter, ...],
+    m: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    given = dict(bounds) if isinstance(bounds, Mapping) else {} if bounds is None else {"profile": bounds}
+    given = (
+        dict(bounds)
+        if isinstance(bounds, Mapping)
+        else {}
+        if bounds is None
+        else {"profile": bounds}
+    )
     pairs = [given.get("profile", (-np.inf, np.inf))] * m
     for one in which:
         if one.name not in given:

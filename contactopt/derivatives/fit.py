@@ -1,13 +1,17 @@
-"""Calibration: parameters of a scene from measured quantities, by nonlinear least squares with exact derivatives.
+"""Calibration: parameters of a scene from measured quantities, by nonlinear least squares with
+exact derivatives.
 
-With the model's quantities m(x), the data y, and the standard deviation sigma of the noise, x minimises sum ((m - y) / sigma)^2.
-scipy's trust-region method gets the Jacobian from one forward solve for each parameter and state. Near the solution the estimate
-is normally distributed with the covariance (J' J)^-1, J = dm/dx / sigma; without a given sigma it is estimated from the residuals,
-and Student's distribution takes the place of the normal one. The singular values of J, for parameters in units of their own
-size, say what the data can tell: a direction with the singular value s is known to the relative accuracy 1 / s, and where s
-vanishes it is not identifiable. Friction of contacts that all stick is the example to remember.
+With the model's quantities m(x), the data y, and the standard deviation sigma of the noise, x
+minimises sum ((m - y) / sigma)^2. scipy's trust-region method gets the Jacobian from one forward
+solve for each parameter and state. Near the solution the estimate is normally distributed with the
+covariance (J' J)^-1, J = dm/dx / sigma; without a given sigma it is estimated from the residuals,
+and Student's distribution takes the place of the normal one. The singular values of J, for
+parameters in units of their own size, say what the data can tell: a direction with the singular
+value s is known to the relative accuracy 1 / s, and where s vanishes it is not identifiable.
+Friction of contacts that all stick is the example to remember.
 
-Sources: Bates, Watts (1988), Nonlinear regression analysis and its applications; Branch, Coleman, Li (1999), the method `trf`.
+Sources: Bates, Watts (1988), Nonlinear regression analysis and its applications; Branch, Coleman,
+Li (1999), the method `trf`.
 """
 
 from __future__ import annotations
@@ -36,21 +40,27 @@ CONFIDENCE = 0.95
 BLIND = 1e-8  # singular values below this fraction of the largest tell nothing
 SHARE = 1e-3  # of such a direction, from which on a parameter is not identifiable
 HALVINGS = 10  # of the friction coefficients that are tried where contacts stick
-LIMITS = {"E": (1e-12, np.inf), "nu": (-0.999, 0.4999), "mu": (0.0, np.inf)}  # E over its first value
+# E over its first value
+LIMITS = {"E": (1e-12, np.inf), "nu": (-0.999, 0.4999), "mu": (0.0, np.inf)}
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Fitted parameters, and what the data say of them.
 
-    values        name -> value;  intervals  name -> (low, high) of the confidence 95 %, infinite where not identifiable
+    values        name -> value;  intervals  name -> (low, high) of the confidence 95 %, infinite
+                  where not identifiable
     covariance    (p, p) of the values, in the order of `names`
-    singular      (p,) singular values of the Jacobian by the parameters over their size and the data over their noise,
-                  largest first; directions (p, p): in its rows the combinations of parameters they belong to
+    singular      (p,) singular values of the Jacobian by the parameters over their size and the
+                  data over their noise, largest first; directions (p, p): in its rows the
+                  combinations of parameters they belong to
     identifiable  name -> whether the data say anything of it
-    data, model   quantity -> (states,) measured and computed;  noise  quantity -> standard deviation
-    evaluations   of the model;  certificates  (evaluations,) largest certificate of the states visited each time
-    weak          (number of the state, contact) of weakly active contacts at the solution, where the model has kinks
+    data, model   quantity -> (states,) measured and computed;  noise  quantity -> standard
+                  deviation
+    evaluations   of the model;  certificates  (evaluations,) largest certificate of the states
+                  visited each time
+    weak          (number of the state, contact) of weakly active contacts at the solution, where
+                  the model has kinks
     scenes        the states with the fitted values;  converged, message  of the optimiser
     """
 
@@ -80,7 +90,8 @@ class Fit:
             for name, (low, high) in self.intervals.items()
         ]  # fmt: skip
         kinks = (
-            f"; {len(self.weak)} contacts are weakly active there, so the intervals hold on one side"
+            f"; {len(self.weak)} contacts are weakly active there, so the intervals hold on one"
+            " side"
             if self.weak
             else ""
         )
@@ -88,13 +99,22 @@ class Fit:
 
 
 class _Model:
-    """The quantities of a path as functions of the parameters, with warm starts and the certificates of all states visited."""
+    """The quantities of a path as functions of the parameters, with warm starts and the
+    certificates of all states visited.
+    """
 
     def __init__(
-        self, scenes: tuple[Scene, ...], which: tuple[Parameter, ...], data: dict[str, np.ndarray], Q: str, tol: float
+        self,
+        scenes: tuple[Scene, ...],
+        which: tuple[Parameter, ...],
+        data: dict[str, np.ndarray],
+        Q: str,
+        tol: float,
     ):
         self.scenes, self.which, self.data, self.Q, self.tol = scenes, which, data, Q, tol
-        self.measured = {name: np.flatnonzero(np.isfinite(values)).tolist() for name, values in data.items()}
+        self.measured = {
+            name: np.flatnonzero(np.isfinite(values)).tolist() for name, values in data.items()
+        }
         self.last: tuple[np.ndarray, Chain] | None = None
         self.certificates: list[float] = []
 
@@ -123,7 +143,11 @@ class _Model:
     def slopes(self, values: np.ndarray) -> dict[str, np.ndarray]:
         """Derivatives (states, p) of every quantity."""
         chain = self.chain(values)
-        seeds = {(name, n): seeds_of(name, chain.steps[n]) for name, numbers in self.measured.items() for n in numbers}
+        seeds = {
+            (name, n): seeds_of(name, chain.steps[n])
+            for name, numbers in self.measured.items()
+            for n in numbers
+        }
         out = {name: np.full((len(chain.steps), len(self.which)), np.nan) for name in self.data}
         for j, one in enumerate(self.which):
             for n, moved in enumerate(chain.forward({one: 1.0})):
@@ -150,11 +174,12 @@ def fit(
     Parameters
     ----------
     scene : a Scene, or the states of a load path in their order
-    data : name of a quantity (contactopt.derivatives.outputs) -> its measured value, on a path one per state; nan where it was
-        not measured
+    data : name of a quantity (contactopt.derivatives.outputs) -> its measured value, on a path one
+        per state; nan where it was not measured
     parameters : names of scalar parameters (contactopt.derivatives.parameters)
-    noise : standard deviation of the data, one number or one for each quantity, in their units; None: estimated from what
-        the model leaves, for all quantities relative to the size of their data
+    noise : standard deviation of the data, one number or one for each quantity, in their units;
+        None: estimated from what the model leaves, for all quantities relative to the size of their
+        data
     start : name -> first value; by default that of the scene
     bounds : name -> (lowest, highest) value; by default what makes sense for E, nu and mu
     Q : form of Q, as for contactopt.reduce
@@ -167,8 +192,8 @@ def fit(
 
     Raises
     ------
-    InputError : for parameters that do not enter, data of the wrong shape, fewer data than parameters, and a first state
-        that cannot be solved
+    InputError : for parameters that do not enter, data of the wrong shape, fewer data than
+        parameters, and a first state that cannot be solved
 
     Sources: those of the head of this module.
     """
@@ -179,7 +204,10 @@ def fit(
     which = parameters_of(parameters, scenes[0])
     fields = [one.name for one in which if one.is_field]
     if fields:
-        raise InputError(f"'{fields[0]}' has one number per contact; fit takes parameters that are single numbers.")
+        raise InputError(
+            f"'{fields[0]}' has one number per contact; fit takes parameters that are single"
+            " numbers."
+        )
     known = _data(data, len(scenes))
     first = _first(which, scenes, start or {})
     sigma = _noise(noise, known)
@@ -187,7 +215,8 @@ def fit(
     count = sum(len(numbers) for numbers in model.measured.values())
     if count < len(which) + (noise is None):
         raise InputError(
-            f"{count} data cannot determine {len(which)} parameters and their accuracy; measure more states."
+            f"{count} data cannot determine {len(which)} parameters and their accuracy; measure"
+            " more states."
         )
     size = np.where(first != 0, np.abs(first), 1.0)
     low, high = _bounds(which, bounds or {}, first)
@@ -212,7 +241,9 @@ def fit(
 
     def minimised(x: np.ndarray) -> Any:
         limits = low / size, high / size
-        return least_squares(misfit, x, jacobian, limits, "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations)
+        return least_squares(
+            misfit, x, jacobian, limits, "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations
+        )
 
     found = minimised(first / size)
     spread = np.sqrt(2 * found.cost / max(count - len(which), 1)) if noise is None else 1.0
@@ -230,14 +261,20 @@ def fit(
 def _slipping(
     misfit: Callable[[np.ndarray], np.ndarray], x: np.ndarray, sticks: np.ndarray, low: np.ndarray
 ) -> np.ndarray | None:
-    """The best point with less friction, where the data hardly know friction because contacts stick; None if there is none.
+    """The best point with less friction, where the data hardly know friction because contacts
+    stick; None if there is none.
 
     sticks  (p,) mask of the friction coefficients that do not matter at x
     """
-    points = [np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x) for i in range(1, HALVINGS + 1)]
+    points = [
+        np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x)
+        for i in range(1, HALVINGS + 1)
+    ]
     here = misfit(x)
     costs = [float(np.sum(residuals**2)) for residuals in map(misfit, points)]
-    told = [(cost, i) for i, cost in enumerate(costs) if np.isfinite(cost) and cost != np.sum(here**2)]
+    told = [
+        (cost, i) for i, cost in enumerate(costs) if np.isfinite(cost) and cost != np.sum(here**2)
+    ]
     return points[min(told)[1]] if told else None
 
 
@@ -245,7 +282,10 @@ def _better(found: Any, other: Any) -> Any:
     """The optimum of the smaller cost; the second one says how it was found."""
     if not other.cost < found.cost:
         return found
-    told = "contacts stick at the first values, where the data hardly know friction; the fit went on from less of it"
+    told = (
+        "contacts stick at the first values, where the data hardly know friction; the fit went on"
+        " from less of it"
+    )
     logger.info(told)
     other.message = f"{other.message} ({told})"
     return other
@@ -306,13 +346,16 @@ def _data(data: Mapping[str, Any], states: int) -> dict[str, np.ndarray]:
             raise InputError(f"the data of '{name}' must be numbers.") from error
         if array.shape != (states,):
             raise InputError(
-                f"the data of '{name}' must have one value per state, shape ({states},); got {array.shape}."
+                f"the data of '{name}' must have one value per state, shape ({states},); got"
+                f" {array.shape}."
             )
         out[name] = array
     return out
 
 
-def _first(which: tuple[Parameter, ...], scenes: tuple[Scene, ...], start: Mapping[str, float]) -> np.ndarray:
+def _first(
+    which: tuple[Parameter, ...], scenes: tuple[Scene, ...], start: Mapping[str, float]
+) -> np.ndarray:
     """First values (p,); InputError for a load that differs from state to state."""
     unknown = set(start) - {one.name for one in which}
     if unknown:
@@ -320,16 +363,22 @@ def _first(which: tuple[Parameter, ...], scenes: tuple[Scene, ...], start: Mappi
     for one in which:
         if len({one.read(scene) for scene in scenes}) > 1:
             raise InputError(
-                f"'{one.name}' differs from state to state of the path; fit parameters that all states share."
+                f"'{one.name}' differs from state to state of the path; fit parameters that all"
+                " states share."
             )
     return np.array([float(start.get(one.name, one.read(scenes[0]))) for one in which])
 
 
-def _noise(noise: float | Mapping[str, float] | None, data: dict[str, np.ndarray]) -> dict[str, float]:
+def _noise(
+    noise: float | Mapping[str, float] | None, data: dict[str, np.ndarray]
+) -> dict[str, float]:
     """quantity -> standard deviation, up to a common factor where it is to be estimated."""
     if noise is None:
         known = {name: values[np.isfinite(values)] for name, values in data.items()}
-        return {name: float(np.linalg.norm(v)) / max(len(v), 1) ** 0.5 or 1.0 for name, v in known.items()}
+        return {
+            name: float(np.linalg.norm(v)) / max(len(v), 1) ** 0.5 or 1.0
+            for name, v in known.items()
+        }
     given = dict(noise) if isinstance(noise, Mapping) else dict.fromkeys(data, noise)
     for name in data:
         if name not in given:
@@ -348,6 +397,7 @@ def _bounds(
         low[i], high[i] = bounds.get(one.name, (usual[0] * scale, usual[1]))
         if not low[i] < first[i] < high[i]:
             raise InputError(
-                f"the first value {first[i]:g} of '{one.name}' must lie between its bounds {low[i]:g}, {high[i]:g}."
+                f"the first value {first[i]:g} of '{one.name}' must lie between its bounds"
+                f" {low[i]:g}, {high[i]:g}."
             )
     return low, high

@@ -18,8 +18,9 @@ class Gradient:
     """A quantity and its derivatives.
 
     value  of the quantity;  by  name of a parameter -> derivative, a number or for a field (k,)
-    weak   (number of the state, contact) for every weakly active contact. Where there is one, the quantity has no gradient:
-           `by` is that of the piece at which the solver ended, and `onesided` gives the derivative along a direction
+    weak   (number of the state, contact) for every weakly active contact. Where there is one, the
+           quantity has no gradient: `by` is that of the piece at which the solver ended, and
+           `onesided` gives the derivative along a direction
     """
 
     value: float
@@ -38,14 +39,18 @@ class Gradient:
         """What the derivatives are, for people."""
         if self.differentiable:
             return "the quantity has a gradient here: no contact is weakly active"
-        named = ", ".join(f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak[:5])
+        named = ", ".join(
+            f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak[:5]
+        )
         return (
-            f"the quantity has no gradient here, only one-sided derivatives: {len(self.weak)} weakly active contacts, "
-            f"{named}{' and more' if len(self.weak) > 5 else ''}"
+            f"the quantity has no gradient here, only one-sided derivatives: {len(self.weak)}"
+            f" weakly active contacts, {named}{' and more' if len(self.weak) > 5 else ''}"
         )
 
     def onesided(self, direction: dict[str, Any]) -> float:
-        """The derivative along a direction, name of a parameter -> amount, one-sided where contacts are weakly active."""
+        """The derivative along a direction, name of a parameter -> amount, one-sided where contacts
+        are weakly active.
+        """
         scene = self.chain.steps[0].reduction.scene
         chosen = {which: direction[which.name] for which in parameters_of(tuple(direction), scene)}
         for number, moved in enumerate(self.chain.forward(chosen)):
@@ -55,20 +60,27 @@ class Gradient:
 
 
 def gradient(
-    result: Any, quantity: Any, parameters: str | Sequence[str], state: int = -1, distance: float | None = None
+    result: Any,
+    quantity: Any,
+    parameters: str | Sequence[str],
+    state: int = -1,
+    distance: float | None = None,
 ) -> Gradient:
-    """The gradient of a quantity of a solved scene, or of one state of a load path, by the parameters of the scene.
+    """The gradient of a quantity of a solved scene, or of one state of a load path, by the
+    parameters of the scene.
 
-    One adjoint solve of the interface problem and one of each body serve all parameters; on a path, those of every state.
+    One adjoint solve of the interface problem and one of each body serve all parameters; on a path,
+    those of every state.
 
     Parameters
     ----------
     result : what contactopt.run or contactopt.follow returned
-    quantity : a name of contactopt.derivatives.outputs, such as 'approach', 'energy', 'pressure:12' or 'shear_force', or a
-        Functional
-    parameters : names of contactopt.derivatives.parameters, such as 'mu', 'E:upper', 'force:upper:y' or 'gap'. A load of a
-        path is changed by the same amount in all states
-    state : of a load path, the number of the state at which the quantity is read; by default the last
+    quantity : a name of contactopt.derivatives.outputs, such as 'approach', 'energy', 'pressure:12'
+        or 'shear_force', or a Functional
+    parameters : names of contactopt.derivatives.parameters, such as 'mu', 'E:upper',
+        'force:upper:y' or 'gap'. A load of a path is changed by the same amount in all states
+    state : of a load path, the number of the state at which the quantity is read; by default the
+        last
     distance : to a kink within which a contact is weakly active, as for sensitivity()
 
     Returns
@@ -77,7 +89,8 @@ def gradient(
 
     Raises
     ------
-    InputError : for a result that is not certified, an unknown quantity, and a parameter that does not enter the scene
+    InputError : for a result that is not certified, an unknown quantity, and a parameter that does
+        not enter the scene
 
     Sources: those of contactopt.derivatives.
     """

@@ -1,4 +1,6 @@
-"""The derivative of a solution by the data of its interface problem: q, the law's parameter mu, s, Q and V."""
+"""The derivative of a solution by the data of its interface problem: q, the law's parameter mu, s,
+Q and V.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from contactopt.derivatives.linear import Tangent
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface, InterfaceOperator
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
-from contactopt.problem import InterfaceProblem, Scales, Solution, dimensionless, natural_map_residual
+from contactopt.problem import (
+    InterfaceProblem,
+    Scales,
+    Solution,
+    dimensionless,
+    natural_map_residual,
+)
 from contactopt.problem.scaling import immovable
 
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
@@ -25,7 +33,9 @@ ROUNDING = 100  # and this many times the certificate, if that is more
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """How a solution changes: reactions (k, dim), multipliers (p,) and displacements u (k, dim), for one direction."""
+    """How a solution changes: reactions (k, dim), multipliers (p,) and displacements u (k, dim),
+    for one direction.
+    """
 
     reactions: np.ndarray
     multipliers: np.ndarray
@@ -34,7 +44,8 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Dual:
-    """The gradient of a function of the solution by the data of the problem, in the unit of the function over theirs.
+    """The gradient of a function of the solution by the data of the problem, in the unit of the
+    function over theirs.
 
     q   (k, dim);  mu  (k,) by the law's parameter at each contact;  s  (p,)
     reactions, multipliers  of the solution, with which df = sum (q r') * dQ + sum V * dV
@@ -51,7 +62,9 @@ class Dual:
         return self.by_parameter()
 
     def along_Q(self, change: Any) -> float:
-        """df for a change of Q (k dim, k dim): an array, a sparse matrix, or an operator with products."""
+        """df for a change of Q (k dim, k dim): an array, a sparse matrix, or an operator with
+        products.
+        """
         return float(self.q.ravel() @ np.asarray(change @ self.reactions.ravel()))
 
     @property
@@ -114,7 +127,10 @@ class Sensitivity:
     @property
     def force(self) -> float:
         """The largest force, with which distances to kinks are compared."""
-        return float(np.linalg.norm(self.solution.reactions, axis=1).max(initial=0.0)) or self._scaled[1].force
+        return (
+            float(np.linalg.norm(self.solution.reactions, axis=1).max(initial=0.0))
+            or self._scaled[1].force
+        )
 
     @property
     def sentence(self) -> str:
@@ -124,21 +140,27 @@ class Sensitivity:
         named = ", ".join(f"{weak.contact} ({weak.edge})" for weak in self.weak[:5])
         more = f" and {len(self.weak) - 5} more" if len(self.weak) > 5 else ""
         return (
-            f"the solution has no gradient here, only one-sided derivatives: {len(self.weak)} of {self.problem.contacts} "
-            f"contacts are weakly active, within {self.distance:g} of the largest force of a kink: {named}{more}"
+            f"the solution has no gradient here, only one-sided derivatives: {len(self.weak)} of"
+            f" {self.problem.contacts} contacts are weakly active, within {self.distance:g} of the"
+            f" largest force of a kink: {named}{more}"
         )
 
     @cached_property
     def _moves(self) -> np.ndarray:
-        """1 where a component can move, else 0 (k, dim): on a plane of symmetry a displacement is no datum."""
+        """1 where a component can move, else 0 (k, dim): on a plane of symmetry a displacement is
+        no datum.
+        """
         return np.where(immovable(self.problem), 0.0, 1.0).reshape(self.problem.q.shape)
 
     @cached_property
     def _by_parameter(self) -> np.ndarray:
         return self.problem.law.project_by_parameter(self._point)
 
-    def forward(self, *, q: Any = None, mu: Any = None, s: Any = None, Q: Any = None, V: Any = None) -> Change:
-        """The change of the solution along one direction of the data; where contacts are weakly active, the one-sided one.
+    def forward(
+        self, *, q: Any = None, mu: Any = None, s: Any = None, Q: Any = None, V: Any = None
+    ) -> Change:
+        """The change of the solution along one direction of the data; where contacts are weakly
+        active, the one-sided one.
 
         Parameters
         ----------
@@ -154,7 +176,8 @@ class Sensitivity:
 
         Raises
         ------
-        InputError : on changes of the wrong shape, and where the solution has no derivative because it is not unique
+        InputError : on changes of the wrong shape, and where the solution has no derivative because
+            it is not unique
         """
         problem, r, lam = self.problem, self.solution.reactions, self.solution.multipliers
         du = _given("q", q, problem.q.shape).copy()
@@ -179,7 +202,9 @@ class Sensitivity:
         contacts = np.array([weak.contact for weak in self.weak], dtype=int)
 
         def response(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            dr, dlam = self._unscaled(*self.tangent.solve(error.ravel() / self._scaled[1].force, 0 * self.problem.s))
+            dr, dlam = self._unscaled(
+                *self.tangent.solve(error.ravel() / self._scaled[1].force, 0 * self.problem.s)
+            )
             return dr, dlam, self._moved(dr, dlam, 0 * dr)
 
         by_parameter = self._by_parameter if np.any(self.problem.law.rough) else 0 * self._point
@@ -194,11 +219,14 @@ class Sensitivity:
             response,
         )
 
-    def adjoint(self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None) -> Dual:
-        """The gradient by all data of a function f(r, lambda, u), from one solve with the transposed matrix.
+    def adjoint(
+        self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None
+    ) -> Dual:
+        """The gradient by all data of a function f(r, lambda, u), from one solve with the
+        transposed matrix.
 
-        Where contacts are weakly active (`differentiable` is False) it is the gradient of the piece at which the solver
-        ended, an element of the generalised derivative and no gradient of f.
+        Where contacts are weakly active (`differentiable` is False) it is the gradient of the piece
+        at which the solver ended, an element of the generalised derivative and no gradient of f.
 
         Parameters
         ----------
@@ -217,19 +245,24 @@ class Sensitivity:
         if np.any(by_u):
             by_r = by_r + _transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
-        z, a, b = self.tangent.solve_transposed((scales.force * by_r).ravel(), scales.multipliers * by_lam)
+        z, a, b = self.tangent.solve_transposed(
+            (scales.force * by_r).ravel(), scales.multipliers * by_lam
+        )
         by_q = by_u - self._moves * z.reshape(by_u.shape) / scales.length
         by_s = -b * scales.multipliers / (scales.force * scales.length)
 
         def by_parameter() -> np.ndarray:
             P_mu, whole = self._by_parameter, a
-            if np.any(P_mu.ravel()[~self.tangent.is_closed]):  # friction without a normal force, as in Tresca's law
+            # friction without a normal force, as in Tresca's law
+            if np.any(P_mu.ravel()[~self.tangent.is_closed]):
                 whole = a + self.tangent.on_open((scales.force * by_r).ravel(), z, b)
             return np.asarray(np.sum(P_mu * whole.reshape(P_mu.shape), axis=1) / scales.force)
 
         return Dual(by_q, by_s, self.solution.reactions, self.solution.multipliers, by_parameter)
 
-    def _solve(self, du: np.ndarray, dmu: np.ndarray | None, ds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _solve(
+        self, du: np.ndarray, dmu: np.ndarray | None, ds: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """dr and dlambda on the piece of P at which the solver ended."""
         _, scales = self._scaled
         error = -self.tangent.slope((self._moves * du).ravel() / scales.length)
@@ -247,8 +280,11 @@ class Sensitivity:
         return np.asarray(dr - self._rho[:, None] * moved)
 
 
-def sensitivity(problem: InterfaceProblem, solution: Solution, distance: float | None = None) -> Sensitivity:
-    """The derivative of a certified solution by the data of its problem, as an operator with products forward and adjoint.
+def sensitivity(
+    problem: InterfaceProblem, solution: Solution, distance: float | None = None
+) -> Sensitivity:
+    """The derivative of a certified solution by the data of its problem, as an operator with
+    products forward and adjoint.
 
     Nothing is solved before it is asked for; the factors are then kept and serve all directions.
 
@@ -256,12 +292,13 @@ def sensitivity(problem: InterfaceProblem, solution: Solution, distance: float |
     ----------
     problem : the interface problem
     solution : its certified solution
-    distance : to a kink, over the largest force, within which a contact counts as weakly active [-]; by default 1e-6, or a
-        hundred certificates of the solution if that is more
+    distance : to a kink, over the largest force, within which a contact counts as weakly active
+        [-]; by default 1e-6, or a hundred certificates of the solution if that is more
 
     Returns
     -------
-    Sensitivity : with `forward`, `adjoint`, `weak`, `differentiable` and a `sentence` that says what is known
+    Sensitivity : with `forward`, `adjoint`, `weak`, `differentiable` and a `sentence` that says
+        what is known
 
     Raises
     ------
@@ -277,8 +314,8 @@ def sensitivity(problem: InterfaceProblem, solution: Solution, distance: float |
     residual = natural_map_residual(problem, solution.reactions, solution.multipliers)
     if not solution.solved or not residual <= CERTIFIED:
         raise InputError(
-            f"only a certified solution has a derivative; this one is '{solution.status}' with the residual {residual:.1e} on "
-            "this problem: solve it with a smaller tol first."
+            f"only a certified solution has a derivative; this one is '{solution.status}' with the"
+            f" residual {residual:.1e} on this problem: solve it with a smaller tol first."
         )
     if distance is None:
         distance = max(NEAR, ROUNDING * residual)
@@ -293,15 +330,12 @@ def _slopes(problem: InterfaceProblem, y: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    problem
-        The interface problem, with k contacts in dim dimensions.
-    y
-        (k, dim) points r - rho u, normal first [force].
+    problem : The interface problem, with k contacts in dim dimensions.
+    y : (k, dim) points r - rho u, normal first [force].
 
     Returns
     -------
-    ndarray
-        (k, dim, dim) derivatives D [-].
+    (k, dim, dim) derivatives D [-].
     """
     D = problem.law.project(y)[1].copy()
     D[~problem.law.rough, 1:, :] = 0.0
@@ -323,5 +357,8 @@ def _given(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> Any:
     if getattr(value, "shape", None) != shape:
-        raise InputError(f"{name} must have the shape {shape}; got {getattr(value, 'shape', type(value).__name__)}.")
+        raise InputError(
+            f"{name} must have the shape {shape}; got"
+            f" {getattr(value, 'shape', type(value).__name__)}."
+        )
     return value

@@ -1,16 +1,19 @@
 """Weakly active contacts, and the one-sided derivatives of a solution there.
 
-At a weakly active contact the point y lies on an edge between pieces of the map P: between open and closed, between stick and
-slip, or at the apex where both meet. P has a directional derivative, P'(y; dy) = D dy on the piece into which dy leads. With
-the piece D0 that the other contacts see,
+At a weakly active contact the point y lies on an edge between pieces of the map P: between open and
+closed, between stick and slip, or at the apex where both meet. P has a directional derivative,
+P'(y; dy) = D dy on the piece into which dy leads. With the piece D0 that the other contacts see,
 
-    M (dr, dlambda) = right side + z,   z = (D - D0) dy + (P_mu - P_mu0) dmu,   z zero but at the weakly active contacts.
+    M (dr, dlambda) = right side + z,   z = (D - D0) dy + (P_mu - P_mu0) dmu,   z zero but at the
+                                        weakly active contacts.
 
-The linear system gives dy = dy0 + S z with as many columns as there are unknowns at these contacts. What is left is a
-small complementarity problem in z: which contacts open or slip in this direction. It is solved by Newton's method on the
-pieces, from many starts if need be, and what comes back has been checked to satisfy it.
+The linear system gives dy = dy0 + S z with as many columns as there are unknowns at these contacts.
+What is left is a small complementarity problem in z: which contacts open or slip in this direction.
+It is solved by Newton's method on the pieces, from many starts if need be, and what comes back has
+been checked to satisfy it.
 
-Sources: Robinson (1980), Strongly regular generalized equations; Luo, Pang, Ralph (1996), chapter 4.
+Sources: Robinson (1980), Strongly regular generalized equations; Luo, Pang, Ralph (1996), chapter
+4.
 """
 
 from __future__ import annotations
@@ -46,17 +49,13 @@ def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
 
     Parameters
     ----------
-    law
-        The law of the contacts.
-    y
-        (k, dim) points r - rho u, normal first [force].
-    distance
-        How near counts [force].
+    law : The law of the contacts.
+    y : (k, dim) points r - rho u, normal first [force].
+    distance : How near counts [force].
 
     Returns
     -------
-    tuple
-        The contacts with the names of the kinks at which they are.
+    The contacts with the names of the kinks at which they are.
     """
     kinks = law.kinks(y, distance)
     names = {
@@ -72,7 +71,8 @@ def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
 class Onesided:
     """The complementarity problem of m weakly active contacts.
 
-    law, y      of these contacts, y (m, d) on the kinks;  contacts  (m,) their numbers;  force  scale [force]
+    law, y      of these contacts, y (m, d) on the kinks;  contacts  (m,) their numbers;  force
+                scale [force]
     D, P_mu     (m, d, d) and (m, d) of the piece that M has
     dr, dlam    (m d, k, d) and (m d, p) responses to a unit of z
     S           (m d, m d) and the dy at these contacts that goes with it
@@ -100,12 +100,14 @@ class Onesided:
         force: float,
         response: Response,
     ) -> Onesided:
-        """From the map at all contacts, a scale of the forces, and the response (dr, dlambda, dy) of the linear system to an error (k, d)."""
+        """From the map at all contacts, a scale of the forces, and the response (dr, dlambda, dy)
+        of the linear system to an error (k, d).
+        """
         d, own = y.shape[1], law.select(contacts)
         if len(contacts) * d > MOST:
             raise InputError(
-                f"{len(contacts)} contacts are weakly active, too many for one-sided derivatives; solve the problem with a smaller "
-                "tol, or give a smaller distance."
+                f"{len(contacts)} contacts are weakly active, too many for one-sided derivatives;"
+                " solve the problem with a smaller tol, or give a smaller distance."
             )
         logger.info("one-sided derivative: %d weakly active contacts", len(contacts))
         kinks = law.kinks(y, distance)
@@ -121,7 +123,9 @@ class Onesided:
         return cls(own, place, contacts, force, D[contacts], P_mu[contacts], dr, dlam, S)
 
     def step(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What to add to dr (k, d) and dlambda (p,) of the piece M, from its dy (k, d) and dmu (k,)."""
+        """What to add to dr (k, d) and dlambda (p,) of the piece M, from its dy (k, d) and dmu
+        (k,).
+        """
         dy0, dmu = dy[self.contacts], dmu[self.contacts]
         z = self._solve(dy0, dmu)
         return np.tensordot(z, self.dr, 1), z @ self.dlam
@@ -138,19 +142,27 @@ class Onesided:
                 d, i = dy0.shape[1], np.arange(len(dy0))
                 change.reshape(len(i), d, len(i), d)[i, :, i, :] = D - self.D
                 try:
-                    z = np.linalg.solve(np.eye(len(self.S)) - change @ self.S, change @ dy0.ravel() + moved.ravel())
+                    z = np.linalg.solve(
+                        np.eye(len(self.S)) - change @ self.S, change @ dy0.ravel() + moved.ravel()
+                    )
                 except np.linalg.LinAlgError:
                     break
                 guess = dy0 + (self.S @ z).reshape(dy0.shape)
                 if self._error(z, guess, dmu) <= EXACT * (size + np.abs(guess).max()):
                     return np.asarray(z)
         raise InputError(
-            "no one-sided derivative was found: the complementarity problem of the weakly active contacts has none."
+            "no one-sided derivative was found: the complementarity problem of the weakly active"
+            " contacts has none."
         )
 
     def _piece(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """D (m, d, d) of the piece into which dy leads, and (P_mu - P_mu0) dmu (m, d)."""
-        size = max(float(np.abs(dy).max(initial=0.0)), self.force * float(np.abs(dmu).max(initial=0.0))) or 1.0
+        size = (
+            max(
+                float(np.abs(dy).max(initial=0.0)), self.force * float(np.abs(dmu).max(initial=0.0))
+            )
+            or 1.0
+        )
         t = STEP * self.force / size
         law, place = self.law.shifted(t * dmu), self.y + t * dy
         D = law.project(place)[1].copy()

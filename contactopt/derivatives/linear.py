@@ -1,10 +1,12 @@
-"""The matrix M of Newton's last step and its transpose: solved by factors, by products with Q, or with the bodies at once.
+"""The matrix M of Newton's last step and its transpose: solved by factors, by products with Q, or
+with the bodies at once.
 
     M = [[I - D + D rho Q, D rho V], [V', 0]]
 
-Open contacts, D = 0, have unit rows in M. They leave the system, and what is left is square in the closed contacts and the
-multipliers. Every form of Q has a class that solves that system K and its transpose for any number of right sides; the factors
-are made once. Iterative solves are repeated on what is left of the right side until it is small enough.
+Open contacts, D = 0, have unit rows in M. They leave the system, and what is left is square in the
+closed contacts and the multipliers. Every form of Q has a class that solves that system K and its
+transpose for any number of right sides; the factors are made once. Iterative solves are repeated on
+what is left of the right side until it is small enough.
 """
 
 from __future__ import annotations
@@ -40,11 +42,12 @@ ACCURACY = 1e-11  # relative residual of an iterative solve
 ROUNDS = 12  # of GMRES, which gain four digits each
 RESTART, CYCLES = 60, 3  # of GMRES
 UNIQUE = (
-    "the solution has no derivative, because its linear system is singular: forces or motions are not unique there; remove "
-    "redundant contacts, or hold the bodies."
+    "the solution has no derivative, because its linear system is singular: forces or motions are"
+    " not unique there; remove redundant contacts, or hold the bodies."
 )
 
-Pair = tuple[np.ndarray, np.ndarray]  # for the contacts (k d,), for the balance or the multipliers (p,)
+# for the contacts (k d,), for the balance or the multipliers (p,)
+Pair = tuple[np.ndarray, np.ndarray]
 Act = Callable[[np.ndarray], np.ndarray]
 
 
@@ -58,7 +61,8 @@ class Closed(Protocol):
 class Tangent:
     """M at a solution of a dimensionless problem.
 
-    problem  dimensionless;  rho  (k,) steps of the natural map;  D  (k, d, d) derivative of the map P
+    problem  dimensionless;  rho  (k,) steps of the natural map;  D  (k, d, d) derivative of the map
+             P
     """
 
     problem: InterfaceProblem
@@ -79,7 +83,9 @@ class Tangent:
     def solve_transposed(
         self, by_r: np.ndarray, by_multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """z = D' rho a (k d,), a (k d,) where D is not zero, and b (p,), with M' (a, b) = (by_r, by_multipliers)."""
+        """z = D' rho a (k d,), a (k d,) where D is not zero, and b (p,), with M' (a, b) = (by_r,
+        by_multipliers).
+        """
         closed, n = self.closed, len(self.closed)
         right = np.concatenate([by_r[closed], by_multipliers])
         x = self.system.solve(right, True) if len(right) else right
@@ -88,18 +94,24 @@ class Tangent:
         return self.slope_transposed(a), a, x[n:]
 
     def on_open(self, by_r: np.ndarray, z: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """a (k d,) on the contacts with D = 0, zero elsewhere, for what solve_transposed returned; one product with Q'."""
+        """a (k d,) on the contacts with D = 0, zero elsewhere, for what solve_transposed returned;
+        one product with Q'.
+        """
         Q = self.problem.Q
         moved = Q @ z if isinstance(Q, InterfaceOperator) else Q.T @ z
         return np.where(self.is_closed, 0.0, by_r - moved - self.problem.V @ b)
 
     def slope(self, moved: np.ndarray) -> np.ndarray:
         """D rho moved, (k d,)."""
-        return np.asarray(np.einsum("kab,k,kb->ka", self.D, self.rho, moved.reshape(self.D.shape[:2])).ravel())
+        return np.asarray(
+            np.einsum("kab,k,kb->ka", self.D, self.rho, moved.reshape(self.D.shape[:2])).ravel()
+        )
 
     def slope_transposed(self, a: np.ndarray) -> np.ndarray:
         """rho D' a, (k d,)."""
-        return np.asarray(np.einsum("kab,k,ka->kb", self.D, self.rho, a.reshape(self.D.shape[:2])).ravel())
+        return np.asarray(
+            np.einsum("kab,k,ka->kb", self.D, self.rho, a.reshape(self.D.shape[:2])).ravel()
+        )
 
     @cached_property
     def is_closed(self) -> np.ndarray:
@@ -127,10 +139,12 @@ class Tangent:
 
 
 class Stuck:
-    """K through the bonded system [[Q, V], [V', 0]] of a symmetric Q, one Cholesky factorisation, where most contacts stick.
+    """K through the bonded system [[Q, V], [V', 0]] of a symmetric Q, one Cholesky factorisation,
+    where most contacts stick.
 
-    M = L B + R with B the bonded matrix, L = D rho (rho where a contact sticks) and R = I - D. Hence w = L' a of the
-    transposed system M' a = g solves B w + R' a = g, and only the contacts N that do not stick are left as unknowns,
+    M = L B + R with B the bonded matrix, L = D rho (rho where a contact sticks) and R = I - D.
+    Hence w = L' a of the transposed system M' a = g solves B w + R' a = g, and only the contacts N
+    that do not stick are left as unknowns,
 
         (rho D' + (B^-1)_NN (I - D)') a_N = (B^-1 g)_N.
     """
@@ -144,7 +158,9 @@ class Stuck:
         full, n = np.zeros(k * d), len(tangent.closed)
         full[tangent.closed] = right[:n]
         if not transposed:
-            dr, multipliers = self.bonded.step(tangent.rho, full.reshape(k, d), -right[n:], tangent.D)
+            dr, multipliers = self.bonded.step(
+                tangent.rho, full.reshape(k, d), -right[n:], tangent.D
+            )
             return np.concatenate([dr.ravel()[tangent.closed], multipliers])
         w, multipliers = self.bonded.solve(full, -right[n:])
         a = w / np.repeat(tangent.rho, d)
@@ -190,13 +206,18 @@ class Dense:
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         if self.singular is not None:
             if not transposed:
-                raise InputError(UNIQUE)  # forces have no derivative, whatever one that an adjoint asks for may have
+                # forces have no derivative, whatever one that an adjoint asks for may have
+                raise InputError(UNIQUE)
             return _consistent(self.singular.T, right)
-        return np.asarray(la.lu_solve(self.factors, right, trans=int(not transposed), check_finite=False))
+        return np.asarray(
+            la.lu_solve(self.factors, right, trans=int(not transposed), check_finite=False)
+        )
 
 
 def _consistent(K: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The least solution of a singular system whose right side does not see what is undetermined; InputError for others."""
+    """The least solution of a singular system whose right side does not see what is undetermined;
+    InputError for others.
+    """
     x = la.lstsq(K, right, cond=UNSEEN, check_finite=False)[0]
     if np.linalg.norm(K @ x - right) > UNSEEN * np.linalg.norm(right):
         raise InputError(UNIQUE)
@@ -209,7 +230,9 @@ class Sparse:
     def __init__(self, tangent: Tangent):
         problem, closed, d = tangent.problem, tangent.closed, tangent.problem.dim
         k, p, V = problem.contacts, len(problem.s), sp.csr_array(problem.V)
-        scaled = sp.bsr_array((tangent.rho[:, None, None] * tangent.D, np.arange(k), np.arange(k + 1))).tocsr()
+        scaled = sp.bsr_array(
+            (tangent.rho[:, None, None] * tangent.D, np.arange(k), np.arange(k + 1))
+        ).tocsr()
         rest = sp.bsr_array((np.eye(d) - tangent.D, np.arange(k), np.arange(k + 1))).tocsr()
         rows = (scaled @ problem.Q + rest)[closed][:, closed]
         border = (scaled @ V)[closed], V[closed].T
@@ -227,7 +250,9 @@ class Sparse:
 
 
 class Krylov:
-    """K by products with Q: GMRES, preconditioned by the same system with the model of Q (contactopt.methods.preconditioners)."""
+    """K by products with Q: GMRES, preconditioned by the same system with the model of Q
+    (contactopt.methods.preconditioners).
+    """
 
     def __init__(self, tangent: Tangent, P: Preconditioner | None = None):
         self.tangent = tangent
@@ -250,11 +275,15 @@ class Krylov:
         return np.concatenate([top[tangent.closed], bottom])
 
     def inverse(self, transposed: bool) -> Act:
-        """An approximate inverse of K or K': that for the model of Q to INNER, or a rough one without a model."""
+        """An approximate inverse of K or K': that for the model of Q to INNER, or a rough one
+        without a model.
+        """
         rough, model = self.rough[transposed], self.P.model
         if model is None:
             return rough
-        return lambda x: _gmres(lambda y: self.product(y, transposed, model.matvec), x, INNER, rough)
+        return lambda x: _gmres(
+            lambda y: self.product(y, transposed, model.matvec), x, INNER, rough
+        )
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         Q = self.tangent.problem.Q
@@ -263,14 +292,18 @@ class Krylov:
             return self.product(x, transposed, lambda y: Q @ y)
 
         inverse = self.inverse(transposed)
-        return _refined(product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right)))
+        return _refined(
+            product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right))
+        )
 
 
 class Coupled:
-    """K with the equilibrium of the bodies beside it, so that no product with Q is needed (contactopt.methods.kernels.coupled_newton).
+    """K with the equilibrium of the bodies beside it, so that no product with Q is needed
+    (contactopt.methods.kernels.coupled_newton).
 
-    With Q = T A^-1 T' + R the unknowns X of the bodies are eliminated by A X = T' dr forward, by A X = -T' z in the adjoint.
-    One flexible GMRES iteration sees bodies and contacts; one V-cycle per body stands for A^-1 in its preconditioner.
+    With Q = T A^-1 T' + R the unknowns X of the bodies are eliminated by A X = T' dr forward, by A
+    X = -T' z in the adjoint. One flexible GMRES iteration sees bodies and contacts; one V-cycle per
+    body stands for A^-1 in its preconditioner.
     """
 
     def __init__(self, tangent: Tangent, form: CoupledForm):
@@ -301,38 +334,42 @@ class Coupled:
 
         rho = np.repeat(tangent.rho, tangent.problem.dim)[tangent.closed]
         share = rho**0.5 if transposed else rho**-0.5
-        weights = Stacked((*(form.diagonal() ** -0.5).parts, np.concatenate([share, np.ones(len(tangent.problem.s))])))
+        weights = Stacked(
+            (
+                *(form.diagonal() ** -0.5).parts,
+                np.concatenate([share, np.ones(len(tangent.problem.s))]),
+            )
+        )
         none = form.pulled(np.zeros(tangent.problem.q.size))
         whole = Stacked((*none.parts, right))
         found = _refined(
-            product, lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND), whole, weights
+            product,
+            lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND),
+            whole,
+            weights,
         )
         return np.asarray(found.parts[-1])
 
 
-def _refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
+def _refined(
+    product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector
+) -> Any:
     """Solve A x = b to the accuracy ACCURACY by solving again for what is left.
 
     Parameters
     ----------
-    product
-        x -> A x.
-    solve
-        b -> an approximate solution x.
-    right
-        The right-hand side b, an array (n,) or a vector in parts.
-    weights
-        Weights W of the rows, like b; the residual is measured by |W (b - A x)| / |W b|.
+    product : x -> A x.
+    solve : b -> an approximate solution x.
+    right : The right-hand side b, an array (n,) or a vector in parts.
+    weights : Weights W of the rows, like b; the residual is measured by |W (b - A x)| / |W b|.
 
     Returns
     -------
-    ndarray or Stacked
-        The solution x.
+    The solution x.
 
     Raises
     ------
-    InputError
-        If the accuracy is out of reach, because the solution is not unique.
+    InputError : If the accuracy is out of reach, because the solution is not unique.
     """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)
@@ -382,4 +419,6 @@ def _gmres(product: Act, right: np.ndarray, rtol: float, inverse: Act) -> np.nda
     shape = (len(right), len(right))
     A = LinearOperator(shape, matvec=lambda x: product(x.ravel()), dtype=float)
     M = LinearOperator(shape, matvec=lambda x: inverse(x.ravel()), dtype=float)
-    return np.asarray(gmres(A, right, rtol=rtol, restart=min(len(right), RESTART), maxiter=CYCLES, M=M)[0])
+    return np.asarray(
+        gmres(A, right, rtol=rtol, restart=min(len(right), RESTART), maxiter=CYCLES, M=M)[0]
+    )

@@ -1,20 +1,25 @@
 """Quantities of a solved state with their derivatives by forces, multipliers and displacements.
 
     approach, shift              of the plates along the mean normal and along t1 [length]
-    normal_force, shear_force    on the upper body of a pair, the latter along t1, with the signs of load paths [force];
-                                 of one pair of several as normal_force:PAIR
-    resultant:PAIR:COMPONENT     of the contact forces on the upper body of a pair, in the coordinates of space [force]
+    normal_force, shear_force    on the upper body of a pair, the latter along t1, with the signs of
+                                 load paths [force]; of one pair of several as normal_force:PAIR
+    resultant:PAIR:COMPONENT     of the contact forces on the upper body of a pair, in the
+                                 coordinates of space [force]
     pressure:CONTACT             at one contact, by its number [stress]
-    pressure@X,Y                 at a place, and the stresses of contactopt.readings.places: von_mises:BODY:BOUNDARY, ...
+    pressure@X,Y                 at a place, and the stresses of contactopt.readings.places:
+                                 von_mises:BODY:BOUNDARY, ...
     energy                       elastic energy of all bodies [force length]
-    pressure, width, stick       the smooth readings of contactopt.readings.quantities; of one pair of several pressure:PAIR
+    pressure, width, stick       the smooth readings of contactopt.readings.quantities; of one pair
+                                 of several pressure:PAIR
 
-ROWS has one row for each. What it makes, a Quantity, is all that is known of it: how it is read, with its uncertainty and its
-local maxima (contactopt.readings.quantities, contactopt.readings.places), and its slopes.
+ROWS has one row for each. What it makes, a Quantity, is all that is known of it: how it is read,
+with its uncertainty and its local maxima (contactopt.readings.quantities,
+contactopt.readings.places), and its slopes.
 
-A largest stress has the derivative of the stress at the place where it is largest. Pressure, width and stick are formulas over
-several forces. Their derivative by the force at each closed contact is a central difference of the reading, which solves
-nothing; what the parameters do to the forces is exact.
+A largest stress has the derivative of the stress at the place where it is largest. Pressure, width
+and stick are formulas over several forces. Their derivative by the force at each closed contact is
+a central difference of the reading, which solves nothing; what the parameters do to the forces is
+exact.
 """
 
 from __future__ import annotations
@@ -33,7 +38,15 @@ from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.problem.laws.law import Law
 from contactopt.readings.edges import contact_edge, stick_edge
-from contactopt.readings.places import PLACED, Place, map_of, place_of, pressure_weights, read_place, read_stress
+from contactopt.readings.places import (
+    PLACED,
+    Place,
+    map_of,
+    place_of,
+    pressure_weights,
+    read_place,
+    read_stress,
+)
 from contactopt.readings.quantities import (
     OF_ONE_PAIR,
     READINGS,
@@ -61,7 +74,8 @@ class Functional:
         weights = np.asarray(self.weights, dtype=float)
         if weights.shape != step.problem.q.shape:
             raise InputError(
-                f"the weights of a functional must have the shape {step.problem.q.shape}; got {weights.shape}."
+                f"the weights of a functional must have the shape {step.problem.q.shape}; got"
+                f" {weights.shape}."
             )
         return Seeds(float(np.sum(weights * step.solution.reactions)), reactions=weights)
 
@@ -72,7 +86,8 @@ class Quantity:
 
     name    as it was asked for
     slopes  step -> Seeds: its value and its derivatives by what a state holds
-    reader  (reduction, solution) -> Reading: value, uncertainty, local maxima; None: the value of the slopes
+    reader  (reduction, solution) -> Reading: value, uncertainty, local maxima; None: the value of
+            the slopes
     nodal   whether it means another thing on the next mesh
     """
 
@@ -103,20 +118,17 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
 
     Parameters
     ----------
-    name
-        A name from this module's head.
-    scene
-        The scene that is asked.
+    name : A name from this module's head.
+    scene : The scene that is asked.
 
     Returns
     -------
-    Quantity
-        What reads it.
+    What reads it.
 
     Raises
     ------
-    InputError
-        For an unknown quantity, and for a body, boundary, pair or place that the scene does not have.
+    InputError : For an unknown quantity, and for a body, boundary, pair or place that the scene
+        does not have.
     """
     if not isinstance(name, str):
         raise InputError(f"a quantity is given by its name; got {name!r}.")
@@ -127,7 +139,10 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
     row = ROWS.get(kind)
     if row is None or (rest and not row[0]):
         if row is not None and kind in READINGS:
-            raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}.")
+            raise InputError(
+                f"the {kind} belongs to the whole scene; of one pair ask for"
+                f" {', '.join(OF_ONE_PAIR)}."
+            )
         known = ", ".join((*(f"{kind}{form}" for kind, (form, _) in ROWS.items()), *PLACED))
         raise InputError(f"unknown quantity {name!r}; choose from {known}.")
     return row[1](name, rest, scene)
@@ -138,20 +153,16 @@ def seeds_of(quantity: Any, step: Step) -> Seeds:
 
     Parameters
     ----------
-    quantity
-        A name from this module's head, or a function of the state that returns Seeds.
-    step
-        The solved state.
+    quantity : A name from this module's head, or a function of the state that returns Seeds.
+    step : The solved state.
 
     Returns
     -------
-    Seeds
-        The value of the quantity, and its derivatives by forces, multipliers and displacements.
+    The value of the quantity, and its derivatives by forces, multipliers and displacements.
 
     Raises
     ------
-    InputError
-        For an unknown quantity.
+    InputError : For an unknown quantity.
     """
     if callable(quantity):
         return quantity(step)
@@ -166,11 +177,14 @@ def _surface(name: str, rest: str, scene: Scene) -> Quantity:
     names = [pair.name for pair in scene.pairs]
     if not rest and len(names) > 1:
         raise InputError(
-            f"scene '{scene.name}' has {len(names)} pairs of surfaces, each with its own pressure and half-widths; name the "
-            f"pair, as in '{kind}:{names[0]}', or ask for the energy."
+            f"scene '{scene.name}' has {len(names)} pairs of surfaces, each with its own pressure"
+            f" and half-widths; name the pair, as in '{kind}:{names[0]}', or ask for the energy."
         )
     if rest and rest not in names:
-        raise InputError(f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are {', '.join(names)}.")
+        raise InputError(
+            f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are"
+            f" {', '.join(names)}."
+        )
     number = names.index(rest) if rest else 0
     slopes = _stick if kind == "stick" else partial(_reading, kind)
     return Quantity(name, partial(slopes, pair=number), partial(_read_pair, kind, number))
@@ -180,11 +194,15 @@ def _read_pair(kind: str, number: int, reduction: Reduction, solution: Solution)
     """A reading of one pair of surfaces, with contacts numbered as in the whole scene."""
     first = reduction.problem.pairs[number].start
     found = READINGS[kind](*views(reduction, solution)[number])
-    return replace(found, peaks=tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks))
+    return replace(
+        found, peaks=tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks)
+    )
 
 
 def _plain(slopes: Callable[[Step], Seeds]) -> Callable[[str, str, Scene], Quantity]:
-    """A row whose quantity takes nothing but its name, and is read as in READINGS where it is there."""
+    """A row whose quantity takes nothing but its name, and is read as in READINGS where it is
+    there.
+    """
 
     def make(name: str, rest: str, scene: Scene) -> Quantity:
         return Quantity(name, slopes, READINGS.get(name))
@@ -221,7 +239,8 @@ def _motion(step: Step, component: int) -> Seeds:
     problem, lam = step.problem, step.solution.multipliers
     if len(lam) == 0:
         raise InputError(
-            f"scene '{step.reduction.scene.name}' has no plate, hence no approach and no shift; ask for another quantity."
+            f"scene '{step.reduction.scene.name}' has no plate, hence no approach and no shift; ask"
+            " for another quantity."
         )
     rows = problem.V.reshape(problem.contacts, problem.dim, -1)[:, component]
     weights = np.average(rows, axis=0, weights=problem.areas) * (-1.0 if component == 0 else 1.0)
@@ -236,7 +255,9 @@ def _pair(step: Step, name: str | None) -> slice:
 
 def _force(step: Step, kind: str, pair: str | None) -> Seeds:
     weights = np.zeros(step.problem.q.shape)
-    weights[_pair(step, pair), 0 if kind == "normal_force" else 1] = 1.0 if kind == "normal_force" else -1.0
+    weights[_pair(step, pair), 0 if kind == "normal_force" else 1] = (
+        1.0 if kind == "normal_force" else -1.0
+    )
     return Functional(weights)(step)
 
 
@@ -254,9 +275,14 @@ def _resultant(step: Step, pair: str, component: str) -> Seeds:
 
 def _pressure_at(step: Step, number: str) -> Seeds:
     problem = step.problem
-    if not number.isdigit() or int(number) >= problem.contacts or not problem.areas[int(number)] > 0:
+    if (
+        not number.isdigit()
+        or int(number) >= problem.contacts
+        or not problem.areas[int(number)] > 0
+    ):
         raise InputError(
-            f"pressure:CONTACT needs the number of a contact with an area, 0 to {problem.contacts - 1}; got {number}."
+            "pressure:CONTACT needs the number of a contact with an area, 0 to"
+            f" {problem.contacts - 1}; got {number}."
         )
     weights = np.zeros(problem.q.shape)
     weights[int(number), 0] = 1 / problem.areas[int(number)]
@@ -265,9 +291,15 @@ def _pressure_at(step: Step, number: str) -> Seeds:
 
 def _energy(step: Step) -> Seeds:
     by_r, by_U = np.zeros(step.problem.q.size), []
-    for body, B, U, force in zip(step.reduction.bodies, step.reduction.maps, step.displaced, step.forces):
+    for body, B, U, force in zip(
+        step.reduction.bodies, step.reduction.maps, step.displaced, step.forces
+    ):
         own, by_force = body.energy_gradient(U, force)
-        moved = body.displacement(own, np.zeros(len(body.resultants))) - body.at_rest if np.any(own) else 0 * own
+        moved = (
+            body.displacement(own, np.zeros(len(body.resultants))) - body.at_rest
+            if np.any(own)
+            else 0 * own
+        )
         by_r += B @ (moved + by_force)
         by_U.append(own)
 
@@ -275,14 +307,19 @@ def _energy(step: Step) -> Seeds:
         if which.kind not in MATERIAL:
             return 0.0
         parts = zip(step.reduction.scene.parts, step.reduction.bodies, step.displaced, step.forces)
-        return sum(body.energy_change(which.kind, U, F) for part, body, U, F in parts if which.concerns(part))
+        return sum(
+            body.energy_change(which.kind, U, F)
+            for part, body, U, F in parts
+            if which.concerns(part)
+        )
 
     value = elastic_energy(step.reduction, step.solution)
     return Seeds(value, by_r.reshape(step.problem.q.shape), bodies=tuple(by_U), explicit=explicit)
 
 
 def _stress(step: Step, place: Place) -> Seeds:
-    """A stress inside a body: a function of its displacement U, which follows the contact forces by its compliance.
+    """A stress inside a body: a function of its displacement U, which follows the contact forces by
+    its compliance.
 
     The multipliers do not enter, since the free motions that they stand for strain nothing.
     """
@@ -306,7 +343,9 @@ def _stress(step: Step, place: Place) -> Seeds:
 
 
 def _reading(name: str, step: Step, pair: int) -> Seeds:
-    """A quantity of contactopt.readings that reads the normal forces of one pair, at closed contacts."""
+    """A quantity of contactopt.readings that reads the normal forces of one pair, at closed
+    contacts.
+    """
     whole = replace(step.reduction, problem=step.problem)
     reduction, solution = views(whole, step.solution)[pair]
     read, r = partial(value_of, name), solution.reactions
@@ -330,10 +369,12 @@ def _on_all(step: Step, pair: int, own: np.ndarray) -> np.ndarray:
 
 
 def _stick(step: Step, pair: int) -> Seeds:
-    """Half-width of the stick zone over that of contact, differentiated where contacts stay open, stick or slip as they do.
+    """Half-width of the stick zone over that of contact, differentiated where contacts stay open,
+    stick or slip as they do.
 
-    It depends on the forces at closed contacts, on the slip of the step, and on the friction bound. A contact that slips
-    stays at its bound: its tangential force changes with the normal one, and may turn.
+    It depends on the forces at closed contacts, on the slip of the step, and on the friction bound.
+    A contact that slips stays at its bound: its tangential force changes with the normal one, and
+    may turn.
     """
     reduction, solution = views(replace(step.reduction, problem=step.problem), step.solution)[pair]
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions
@@ -360,7 +401,11 @@ def _stick(step: Step, pair: int) -> Seeds:
             way = np.eye(problem.dim)[c]
             if slips[i]:  # a small step along the edge of the cone
                 bound = problem.law.bound(r[:, 0] + h * (np.arange(len(r)) == i))[i]
-                way[1:] = (bound / np.linalg.norm(r[i, 1:]) - 1) * r[i, 1:] / h if np.any(r[i, 1:]) else 0.0
+                way[1:] = (
+                    (bound / np.linalg.norm(r[i, 1:]) - 1) * r[i, 1:] / h
+                    if np.any(r[i, 1:])
+                    else 0.0
+                )
             by_r[i, c] = _central(partial(along, i, way, still), h)
         if slips[i] and across is not None and np.any(across[i]):
             turn = across[i] / np.linalg.norm(across[i])
@@ -391,7 +436,10 @@ def _stick(step: Step, pair: int) -> Seeds:
 
 def _few(name: str, contacts: np.ndarray) -> np.ndarray:
     if len(contacts) > MOST:
-        raise InputError(f"'{name}' can be differentiated at {MOST} closed contacts at most; got {len(contacts)}.")
+        raise InputError(
+            f"'{name}' can be differentiated at {MOST} closed contacts at most; got"
+            f" {len(contacts)}."
+        )
     return contacts
 
 

@@ -1,14 +1,20 @@
 """The parameters of a scene by name: what a gradient is taken by, and what is fitted or designed.
 
-    E, E:BODY                                Young's modulus of all elastic bodies together, or of one [stress]
+    E, E:BODY                                Young's modulus of all elastic bodies together, or of
+                                             one [stress]
     nu, nu:BODY                              Poisson's ratio [-]
-    mu, mu:PAIR                              friction of all pairs of surfaces together, or of one, where it is a number
-    force:BODY:COMPONENT                     total force of the plate of a body, or on a rigid body or half-space [force]
-    displacement:BODY:BOUNDARY:COMPONENT     of a support [length]; of a rigid body or half-space without the boundary
+    mu, mu:PAIR                              friction of all pairs of surfaces together, or of one,
+                                             where it is a number
+    force:BODY:COMPONENT                     total force of the plate of a body, or on a rigid body
+                                             or half-space [force]
+    displacement:BODY:BOUNDARY:COMPONENT     of a support [length]; of a rigid body or half-space
+                                             without the boundary
     traction:BODY:BOUNDARY:COMPONENT         surface force per area [stress]
     weight:BODY:COMPONENT                    force per volume [force / length^3]
-    gap                                      the initial gap, one number per contact (k,) [length]; gradients only
-    friction                                 the parameter of the law, one number per contact (k,); gradients only
+    gap                                      the initial gap, one number per contact (k,) [length];
+                                             gradients only
+    friction                                 the parameter of the law, one number per contact (k,);
+                                             gradients only
 
 A body with several plates needs the boundary in force:BODY:BOUNDARY:COMPONENT as well.
 """
@@ -31,7 +37,9 @@ LOADS = ("force", "displacement", "traction", "weight")
 FIELDS = ("gap", "friction")
 FORM = {
     "force": "force:BODY:COMPONENT",
-    "displacement": "displacement:BODY:BOUNDARY:COMPONENT, or displacement:BODY:COMPONENT of a rigid body,",
+    "displacement": (
+        "displacement:BODY:BOUNDARY:COMPONENT, or displacement:BODY:COMPONENT of a rigid body,"
+    ),
     "traction": "traction:BODY:BOUNDARY:COMPONENT",
     "weight": "weight:BODY:COMPONENT",
 }
@@ -65,11 +73,15 @@ class Parameter:
         if self.kind == "mu":
             found = [self._friction(pair) for pair in self.pairs(scene)]
         if not found:
-            raise InputError(f"parameter '{self.name}' does not enter scene '{scene.name}': {self._missing(scene)}.")
+            raise InputError(
+                f"parameter '{self.name}' does not enter scene '{scene.name}':"
+                f" {self._missing(scene)}."
+            )
         if len(set(found)) > 1:
             raise InputError(
-                f"parameter '{self.name}' has different values in scene '{scene.name}': {', '.join(f'{v:g}' for v in found)}; "
-                f"name one body or pair, as in '{self.kind}:{(scene.pairs if self.kind == 'mu' else scene.parts)[0].name}'."
+                f"parameter '{self.name}' has different values in scene '{scene.name}':"
+                f" {', '.join(f'{v:g}' for v in found)}; name one body or pair, as in"
+                f" '{self.kind}:{(scene.pairs if self.kind == 'mu' else scene.parts)[0].name}'."
             )
         return found[0]
 
@@ -81,20 +93,24 @@ class Parameter:
         if scene.upper is not None:
             return replace(scene, mu=value)
         named = {pair.name for pair in self.pairs(scene)}
-        changed = (replace(pair, mu=value) if pair.name in named else pair for pair in scene.contacts)
+        changed = (
+            replace(pair, mu=value) if pair.name in named else pair for pair in scene.contacts
+        )
         return replace(scene, contacts=tuple(changed))
 
     def pairs(self, scene: Scene) -> list[Any]:
         """The pairs of surfaces whose friction it is."""
         return [
-            pair for pair in scene.pairs if self.owner in ("", pair.name) and pair.law not in ("frictionless", "tied")
+            pair
+            for pair in scene.pairs
+            if self.owner in ("", pair.name) and pair.law not in ("frictionless", "tied")
         ]
 
     def _friction(self, pair: Any) -> float:
         if np.ndim(pair.mu) or callable(pair.mu):
             raise InputError(
-                f"the friction of contact '{pair.name}' is no single number; take the parameter 'friction', which has one number "
-                "per contact."
+                f"the friction of contact '{pair.name}' is no single number; take the parameter"
+                " 'friction', which has one number per contact."
             )
         return float(pair.mu)
 
@@ -106,16 +122,28 @@ class Parameter:
         if self.kind not in LOADS or part.name != self.owner:
             return []
         if isinstance(part, (Rigid, HalfSpace)):
-            held: Mapping[str, float] = (part.force if self.kind == "force" else part.displacement) or {}
-            movable = self.kind == "displacement" and self.component not in (part.force or {}) and not self.boundary
+            held: Mapping[str, float] = (
+                part.force if self.kind == "force" else part.displacement
+            ) or {}
+            movable = (
+                self.kind == "displacement"
+                and self.component not in (part.force or {})
+                and not self.boundary
+            )
             given = self.kind == "force" and self.component in held
             return [float(held.get(self.component, 0.0))] if given or movable else []
         place = scene.components.index(self.component)
-        return [self._value_of(item, scene, place) for item in (*part.supports, *part.loads) if self._is(item)]
+        return [
+            self._value_of(item, scene, place)
+            for item in (*part.supports, *part.loads)
+            if self._is(item)
+        ]
 
     def _is(self, item: Any) -> bool:
         """Whether a support or load of the body is the one that is meant."""
-        kind = {"force": Plate, "displacement": Support, "traction": Traction, "weight": BodyForce}[self.kind]
+        kind = {"force": Plate, "displacement": Support, "traction": Traction, "weight": BodyForce}[
+            self.kind
+        ]
         if not isinstance(item, kind):
             return False
         if isinstance(item, Plate):
@@ -123,7 +151,9 @@ class Parameter:
         if isinstance(item, Support):
             known = item.displacement is None or self.component in item.displacement
             return known and item.boundary == self.boundary
-        return isinstance(item, BodyForce) or (isinstance(item, Traction) and item.boundary == self.boundary)
+        return isinstance(item, BodyForce) or (
+            isinstance(item, Traction) and item.boundary == self.boundary
+        )
 
     def _value_of(self, item: Any, scene: Scene, place: int) -> float:
         if isinstance(item, Plate):
@@ -140,7 +170,11 @@ class Parameter:
         if isinstance(part, (Rigid, HalfSpace)):
             old = (part.force if self.kind == "force" else part.displacement) or {}
             values = dict(old) | {self.component: value}
-            return replace(part, force=values) if self.kind == "force" else replace(part, displacement=values)
+            return (
+                replace(part, force=values)
+                if self.kind == "force"
+                else replace(part, displacement=values)
+            )
         place = scene.components.index(self.component)
 
         def put(item: Any) -> Any:
@@ -149,16 +183,31 @@ class Parameter:
             if isinstance(item, Plate):
                 return replace(item, force=dict(item.force) | {self.component: value})
             if isinstance(item, Support):
-                held = dict.fromkeys(scene.components, 0.0) if item.displacement is None else dict(item.displacement)
+                held = (
+                    dict.fromkeys(scene.components, 0.0)
+                    if item.displacement is None
+                    else dict(item.displacement)
+                )
                 return replace(item, displacement=held | {self.component: value})
-            return replace(item, value=tuple(value if i == place else v for i, v in enumerate(item.value)))
+            return replace(
+                item, value=tuple(value if i == place else v for i, v in enumerate(item.value))
+            )
 
-        return replace(part, supports=tuple(map(put, part.supports)), loads=tuple(map(put, part.loads)))
+        return replace(
+            part, supports=tuple(map(put, part.supports)), loads=tuple(map(put, part.loads))
+        )
 
     def _missing(self, scene: Scene) -> str:
-        names = [pair.name for pair in scene.pairs] if self.kind == "mu" else [part.name for part in scene.parts]
+        names = (
+            [pair.name for pair in scene.pairs]
+            if self.kind == "mu"
+            else [part.name for part in scene.parts]
+        )
         if self.owner and self.owner not in names:
-            return f"it has no {'contact' if self.kind == 'mu' else 'body'} '{self.owner}', only {', '.join(names)}"
+            return (
+                f"it has no {'contact' if self.kind == 'mu' else 'body'} '{self.owner}', only"
+                f" {', '.join(names)}"
+            )
         if self.kind == "mu":
             return "its contacts have no friction"
         if self.kind in MATERIAL:
@@ -171,23 +220,21 @@ def parameter(name: Any, scene: Scene) -> Parameter:
 
     Parameters
     ----------
-    name
-        A name in the form that this module's head lists.
-    scene
-        The scene that the parameter belongs to.
+    name : A name in the form that this module's head lists.
+    scene : The scene that the parameter belongs to.
 
     Returns
     -------
-    Parameter
-        The parameter.
+    The parameter.
 
     Raises
     ------
-    InputError
-        If the name is unknown or what it names does not enter the scene.
+    InputError : If the name is unknown or what it names does not enter the scene.
     """
     if not isinstance(name, str) or not name:
-        raise InputError(f"a parameter is given by its name, such as 'mu' or 'E:upper'; got {name!r}.")
+        raise InputError(
+            f"a parameter is given by its name, such as 'mu' or 'E:upper'; got {name!r}."
+        )
     kind, *rest = name.split(":")
     if kind in FIELDS and not rest:
         return Parameter(name, kind)
@@ -197,11 +244,13 @@ def parameter(name: Any, scene: Scene) -> Parameter:
         made = Parameter(name, kind, rest[0], rest[1] if len(rest) == 3 else "", rest[-1])
         if made.component not in scene.components:
             raise InputError(
-                f"parameter '{name}': there is no component {made.component!r}; write {FORM[kind]} with one of "
-                f"{', '.join(scene.components)}."
+                f"parameter '{name}': there is no component {made.component!r}; write {FORM[kind]}"
+                f" with one of {', '.join(scene.components)}."
             )
     else:
-        forms = ", ".join(("E", "nu", "mu", "gap", "friction", *(form.rstrip(",") for form in FORM.values())))
+        forms = ", ".join(
+            ("E", "nu", "mu", "gap", "friction", *(form.rstrip(",") for form in FORM.values()))
+        )
         raise InputError(f"unknown parameter {name!r}; choose from {forms}.")
     made.read(scene)
     return made
@@ -212,20 +261,16 @@ def parameters(names: Any, scene: Scene) -> tuple[Parameter, ...]:
 
     Parameters
     ----------
-    names
-        One name or several, in the form that this module's head lists.
-    scene
-        The scene that they belong to.
+    names : One name or several, in the form that this module's head lists.
+    scene : The scene that they belong to.
 
     Returns
     -------
-    tuple
-        The parameters in the order of the names.
+    The parameters in the order of the names.
 
     Raises
     ------
-    InputError
-        If a parameter is named twice or does not enter the scene, or if none is named.
+    InputError : If a parameter is named twice or does not enter the scene, or if none is named.
     """
     if isinstance(names, str):
         names = (names,)
@@ -240,15 +285,12 @@ def put_all(scene: Scene, values: Mapping[Parameter, float]) -> Scene:
 
     Parameters
     ----------
-    scene
-        The scene, which stays as it is.
-    values
-        The values by their parameters, in the units of each.
+    scene : The scene, which stays as it is.
+    values : The values by their parameters, in the units of each.
 
     Returns
     -------
-    Scene
-        The scene with these values.
+    The scene with these values.
     """
     for which, value in values.items():
         scene = which.put(scene, float(value))

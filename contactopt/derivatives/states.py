@@ -1,16 +1,18 @@
 """Derivatives through the reduction and along load paths.
 
-At fixed contact forces r and multipliers lambda a parameter of the scene moves each body by dU_b, the relative displacement by
-du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter by dmu (contactopt.coupling.reduction). A change dA of
-a stiffness acts like the load -dA U: dU = -C dA U, so that neither dC nor dQ is ever formed. What follows is the derivative of the
-interface problem by q, s and mu (contactopt.derivatives.interface).
+At fixed contact forces r and multipliers lambda a parameter of the scene moves each body by dU_b,
+the relative displacement by du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter
+by dmu (contactopt.coupling.reduction). A change dA of a stiffness acts like the load -dA U: dU = -C
+dA U, so that neither dC nor dQ is ever formed. What follows is the derivative of the interface
+problem by q, s and mu (contactopt.derivatives.interface).
 
-The adjoint takes the gradient (q*, s*, mu*) by these data back to the bodies. With G_b = B_b' q* and W_b = C_b G_b + motions_b s*
-the derivative by a constant of a material is -W_b' dA_b U_b, and that by a load f is W_b' df: one solve per body serves all
-parameters.
+The adjoint takes the gradient (q*, s*, mu*) by these data back to the bodies. With G_b = B_b' q*
+and W_b = C_b G_b + motions_b s* the derivative by a constant of a material is -W_b' dA_b U_b, and
+that by a load f is W_b' df: one solve per body serves all parameters.
 
-On a load path the slip of a state is measured from the state before, q_t = q_t(theta) - u_t before. Forward, du_t before is
-handed on from state to state; backward, the gradient by u_t before is added to that of the earlier state.
+On a load path the slip of a state is measured from the state before, q_t = q_t(theta) - u_t before.
+Forward, du_t before is handed on from state to state; backward, the gradient by u_t before is added
+to that of the earlier state.
 """
 
 from __future__ import annotations
@@ -41,8 +43,8 @@ Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
 class Seeds:
     """A function of one solved state: its value, and its derivatives by what the state holds.
 
-    reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured from the state before,
-    bodies: (n,) by U of each body at fixed forces and
+    reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured
+    from the state before, bodies: (n,) by U of each body at fixed forces and
     multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
     """
 
@@ -57,7 +59,9 @@ class Seeds:
 
 @dataclass(frozen=True, eq=False)
 class Explicit:
-    """What a direction changes at fixed forces and multipliers: u (k, dim), the balance (p,), the law (k,), U of each body."""
+    """What a direction changes at fixed forces and multipliers: u (k, dim), the balance (p,), the
+    law (k,), U of each body.
+    """
 
     u: np.ndarray
     s: np.ndarray
@@ -67,7 +71,9 @@ class Explicit:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """How one state changes: in all, in its displacements measured from the state before (k, dim), and explicitly."""
+    """How one state changes: in all, in its displacements measured from the state before (k, dim),
+    and explicitly.
+    """
 
     change: Change
     slip: np.ndarray
@@ -76,7 +82,9 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One solved state: the reduction under its loads, and the problem that its solution was certified against."""
+    """One solved state: the reduction under its loads, and the problem that its solution was
+    certified against.
+    """
 
     reduction: Reduction
     problem: InterfaceProblem
@@ -102,36 +110,35 @@ class Step:
 
         Parameters
         ----------
-        which
-            The parameter, which names the pairs.
+        which : The parameter, which names the pairs.
 
         Returns
         -------
-        ndarray
-            (k,) derivatives.
+        (k,) derivatives.
         """
         out, areas = np.zeros(self.problem.contacts), self.problem.areas
         chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
         for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
             if pair.name in chosen:
-                law = find_law(pair.law).of_place(np.ones(made.stop - made.start), areas[made.contacts])
+                law = find_law(pair.law).of_place(
+                    np.ones(made.stop - made.start), areas[made.contacts]
+                )
                 out[made.contacts] = getattr(law, law.parameters[0])
         return out
 
     def loads(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
-        """Change a load by a step. Bodies are affine in their loads, so that a step of any size gives the derivative.
+        """Change a load by a step.
+
+        Bodies are affine in their loads, so that a step of any size gives the derivative.
 
         Parameters
         ----------
-        which
-            The parameter that is a load.
-        number
-            The number of the body among the parts of the scene.
+        which : The parameter that is a load.
+        number : The number of the body among the parts of the scene.
 
         Returns
         -------
-        tuple
-            The changed scene, the part of it that stands for the body, and the step.
+        The changed scene, the part of it that stands for the body, and the step.
         """
         scene = self.reduction.scene
         value = which.read(scene)
@@ -144,15 +151,12 @@ class Step:
 
         Parameters
         ----------
-        direction
-            The parameters that change, and by how much.
-        base
-            The reduction that has the materials, whose matrices are kept there.
+        direction : The parameters that change, and by how much.
+        base : The reduction that has the materials, whose matrices are kept there.
 
         Returns
         -------
-        Explicit
-            The changes of displacement, balance, law and bodies.
+        The changes of displacement, balance, law and bodies.
         """
         problem = self.problem
         du, dmu = np.zeros(problem.q.shape), np.zeros(problem.contacts)
@@ -174,8 +178,14 @@ class Step:
                     )
                 else:
                     scene, other, step = self.loads(which, number)
-                    old, new = self.reduction.bodies[number], self.reduction.bodies[number].loaded(scene, other)
-                    moved, balance = (new.at_rest - old.at_rest) / step, (new.resultants - old.resultants) / step
+                    old, new = (
+                        self.reduction.bodies[number],
+                        self.reduction.bodies[number].loaded(scene, other),
+                    )
+                    moved, balance = (
+                        (new.at_rest - old.at_rest) / step,
+                        (new.resultants - old.resultants) / step,
+                    )
                 dU[number] = dU[number] + amount * moved
                 ds[number] += amount * balance
         for B, own in zip(self.reduction.maps, dU):
@@ -187,17 +197,13 @@ class Step:
 
         Parameters
         ----------
-        which
-            The parameter.
-        dual
-            The gradient by q, s and mu, and what it is on the bodies.
-        base
-            The reduction that has the materials, whose matrices are kept there.
+        which : The parameter.
+        dual : The gradient by q, s and mu, and what it is on the bodies.
+        base : The reduction that has the materials, whose matrices are kept there.
 
         Returns
         -------
-        float or ndarray
-            The derivative; (k,) for a parameter with one number per contact.
+        The derivative; (k,) for a parameter with one number per contact.
         """
         if which.kind == "gap":
             return dual.q[:, 0]
@@ -222,7 +228,9 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Duals:
-    """The gradient by the data of one state's problem, taken back to the bodies: G, s* and W of the module's head."""
+    """The gradient by the data of one state's problem, taken back to the bodies: G, s* and W of the
+    module's head.
+    """
 
     step: Step
     dual: Dual
@@ -261,7 +269,9 @@ class Chain:
     @property
     def weak(self) -> tuple[tuple[int, Weak], ...]:
         """The weakly active contacts of every state: (number of the state, contact)."""
-        return tuple((n, weak) for n, step in enumerate(self.steps) for weak in step.sensitivity.weak)
+        return tuple(
+            (n, weak) for n, step in enumerate(self.steps) for weak in step.sensitivity.weak
+        )
 
     def forward(self, direction: Direction) -> Iterator[Moved]:
         """State by state, how the solution changes along a direction; displacements are total ones."""
@@ -305,19 +315,18 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
     Parameters
     ----------
-    seeds
-        The derivatives of the function by the reactions, multipliers, displacements and slip of the state.
-    moved
-        The changes of the state along the direction, from `Chain.forward`.
-    direction
-        The parameters that change, and by how much.
+    seeds : The derivatives of the function by the reactions, multipliers, displacements and slip of
+        the state.
+    moved : The changes of the state along the direction, from `Chain.forward`.
+    direction : The parameters that change, and by how much.
 
     Returns
     -------
-    float
-        The directional derivative, in the unit of the function.
+    The directional derivative, in the unit of the function.
     """
-    total = sum(amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field)
+    total = sum(
+        amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field
+    )
     for weight, part in (
         (seeds.reactions, moved.change.reactions),
         (seeds.multipliers, moved.change.multipliers),
@@ -335,29 +344,26 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
 
     Parameters
     ----------
-    result
-        What contactopt.run or contactopt.follow returned, or anything else with a reduction and a solution.
-    distance
-        How near to a kink a contact counts as weakly active, over the largest force [-]; by default as in
-        `sensitivity`.
+    result : What contactopt.run or contactopt.follow returned, or anything else with a reduction
+        and a solution.
+    distance : How near to a kink a contact counts as weakly active, over the largest force [-]; by
+        default as in `sensitivity`.
 
     Returns
     -------
-    Chain
-        The states in their order.
+    The states in their order.
 
     Raises
     ------
-    InputError
-        For a result without a solved scene, and for a state that is not certified.
+    InputError : For a result without a solved scene, and for a state that is not certified.
     """
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:
         reduction, solution = getattr(result, "reduction", None), getattr(result, "solution", None)
         if not isinstance(reduction, Reduction) or not isinstance(solution, Solution):
             raise InputError(
-                "a derivative needs a solved scene: what contactopt.run or contactopt.follow returns; "
-                f"got {type(result).__name__}."
+                "a derivative needs a solved scene: what contactopt.run or contactopt.follow"
+                f" returns; got {type(result).__name__}."
             )
         return Chain((Step(reduction, reduction.problem, solution, distance),))
     steps = []
@@ -366,14 +372,19 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
         problem = replace(reduction.problem, q=state.q, s=state.s)
         steps.append(Step(reduction, problem, state.solution, distance))
         if not state.solution.solved:
-            raise InputError(f"state {number} of the path is not certified; a derivative needs all states solved.")
+            raise InputError(
+                f"state {number} of the path is not certified; a derivative needs all states"
+                " solved."
+            )
     return Chain(tuple(steps))
 
 
 def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray:
     array = real_array(f"the change of '{which.name}'", amount)
     if array.shape not in ((), (contacts,)):
-        raise InputError(f"the change of '{which.name}' must have the shape ({contacts},); got {array.shape}.")
+        raise InputError(
+            f"the change of '{which.name}' must have the shape ({contacts},); got {array.shape}."
+        )
     return np.broadcast_to(array, (contacts,))
 
 
@@ -384,31 +395,26 @@ def solved_chain(
     starts: Sequence[Solution] | None = None,
     Q: str = "auto",
 ) -> Chain:
-    """Solve the states of a load path, without their energies, and make a chain of them. A path of one scene is one
+    """Solve the states of a load path, without their energies, and make a chain of them.
+
+    A path of one scene is one
     state.
 
     Parameters
     ----------
-    scenes
-        The states in their order.
-    tol
-        Bound on the certificate of every state.
-    base
-        A reduction of the same bodies, which is then only loaded anew.
-    starts
-        A solution for every state, to start from.
-    Q
-        Form of Q, as for contactopt.reduce.
+    scenes : The states in their order.
+    tol : Bound on the certificate of every state.
+    base : A reduction of the same bodies, which is then only loaded anew.
+    starts : A solution for every state, to start from.
+    Q : Form of Q, as for contactopt.reduce.
 
     Returns
     -------
-    Chain
-        The certified states in their order.
+    The certified states in their order.
 
     Raises
     ------
-    InputError
-        Where a state has no solution or is not solved.
+    InputError : Where a state has no solution or is not solved.
     """
     steps: list[Step] = []
     before = None
@@ -421,8 +427,14 @@ def solved_chain(
         start = starts[number] if starts is not None else steps[-1].solution if steps else None
         solution = solve(problem, tol=tol, start=start)
         if not solution.solved:
-            raise InputError(f"state {number} of scene '{scene.name}' was not solved: {solution.message}.")
+            raise InputError(
+                f"state {number} of scene '{scene.name}' was not solved: {solution.message}."
+            )
         steps.append(Step(base, problem, solution))
         moved = problem.displacements(solution.reactions, solution.multipliers)
-        before = moved if before is None else moved + np.concatenate([0 * before[:, :1], before[:, 1:]], axis=1)
+        before = (
+            moved
+            if before is None
+            else moved + np.concatenate([0 * before[:, :1], before[:, 1:]], axis=1)
+        )
     return Chain(tuple(steps))

@@ -1,8 +1,8 @@
 """Problems of other codes in and out: the FCLib collection (HDF5) and the text format of Siconos.
 
-`read` takes both formats and both forms of HDF5 files; `write` writes HDF5, local form. A matrix that is mostly zeros
-stays sparse. Format of HDF5: FCLib 1.x, https://frictionalcontactlibrary.github.io, which needs h5py
-(`pip install 'contactopt[fclib]'`).
+`read` takes both formats and both forms of HDF5 files; `write` writes HDF5, local form. A matrix
+that is mostly zeros stays sparse. Format of HDF5: FCLib 1.x,
+https://frictionalcontactlibrary.github.io, which needs h5py (`pip install 'contactopt[fclib]'`).
 """
 
 from __future__ import annotations
@@ -18,26 +18,25 @@ __all__ = ["read", "write"]
 
 
 def read(path: str | Path) -> InterfaceProblem:
-    """Read a problem from a file: FCLib's HDF5, local or global form, or Siconos' text format with any of its storages.
+    """Read a problem from a file: FCLib's HDF5, local or global form, or Siconos' text format with
+    any of its storages.
 
-    Equality constraints are kept: V, s from `R, vectors/s` of the mixed form are the problem's balance. A stored
-    solution is ignored. Sizes are compared with what the file holds before memory is taken for them; links to other
-    files are not followed.
+    Equality constraints are kept: V, s from `R, vectors/s` of the mixed form are the problem's
+    balance. A stored solution is ignored. Sizes are compared with what the file holds before memory
+    is taken for them; links to other files are not followed.
 
     Parameters
     ----------
-    path
-        The file. Its first bytes tell the format, not its name.
+    path : The file. Its first bytes tell the format, not its name.
 
     Returns
     -------
-    InterfaceProblem
-        The problem in the units of the file. Its Q is sparse where the matrix of the file is mostly zeros.
+    The problem in the units of the file. Its Q is sparse where the matrix of the file is mostly
+    zeros.
 
     Raises
     ------
-    InputError
-        If the file is missing, no regular file, or malformed. The message names the file.
+    InputError : If the file is missing, no regular file, or malformed. The message names the file.
     """
     try:
         path = Path(path)
@@ -48,5 +47,16 @@ def read(path: str | Path) -> InterfaceProblem:
         with open(path, "rb") as file:
             binary = file.read(len(MAGIC)) == MAGIC
         return read_hdf5(path) if binary else read_text(path)
-    except (OSError, KeyError, ValueError, IndexError, TypeError, RuntimeError, MemoryError, OverflowError) as error:
-        raise InputError(f"'{path}' is not a usable FCLib file: {error or type(error).__name__}") from error
+    except (
+        OSError,
+        KeyError,
+        ValueError,
+        IndexError,
+        TypeError,
+        RuntimeError,
+        MemoryError,
+        OverflowError,
+    ) as error:
+        raise InputError(
+            f"'{path}' is not a usable FCLib file: {error or type(error).__name__}"
+        ) from error

@@ -1,7 +1,7 @@
 """The HDF5 files of the FCLib collection.
 
-Local form: u = W r + q. Global form: M v = H r + f, u = H' v + w, from which W = H' M^-1 H and q = H' M^-1 f + w.
-Format: FCLib 1.x.
+Local form: u = W r + q. Global form: M v = H r + f, u = H' v + w, from which W = H' M^-1 H and q =
+H' M^-1 f + w. Format: FCLib 1.x.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from contactopt.linear.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem
 
 MAGIC = b"\x89HDF\r\n\x1a\n"  # the first bytes of an HDF5 file
-SMALL, PACKED = 2**20, 2000  # bytes that need not be in the file, and how much smaller compression can make others
+# bytes that need not be in the file, and how much smaller compression can make others
+SMALL, PACKED = 2**20, 2000
 RIGID = 60  # largest block of M that is inverted on its own
 COLUMNS = 256  # of H solved for at a time
 
@@ -38,22 +39,21 @@ def _h5py() -> Any:
 def read_hdf5(path: Path) -> InterfaceProblem:
     """Read the problem in an HDF5 file, in local or in global form.
 
-    Exceptions of h5py on a malformed file are not caught here; `contactopt.fclib.read` makes an InputError of them.
+    Exceptions of h5py on a malformed file are not caught here; `contactopt.fclib.read` makes an
+    InputError of them.
 
     Parameters
     ----------
-    path
-        The file.
+    path : The file.
 
     Returns
     -------
-    InterfaceProblem
-        The problem in the units of the file.
+    The problem in the units of the file.
 
     Raises
     ------
-    InputError
-        If the file holds neither form, if its data lie in other files or are malformed, or if h5py is not installed.
+    InputError : If the file holds neither form, if its data lie in other files or are malformed, or
+        if h5py is not installed.
     """
     h5py = _h5py()
     with h5py.File(path, "r") as file:
@@ -65,7 +65,9 @@ def read_hdf5(path: Path) -> InterfaceProblem:
 
 
 def _item(group: Any, name: str) -> Any:
-    """The group or data set of that path; InputError if it lies in another file or is larger than what is stored of it."""
+    """The group or data set of that path; InputError if it lies in another file or is larger than
+    what is stored of it.
+    """
     h5py = _h5py()
     for part in name.split("/"):
         if isinstance(group.get(part, getlink=True), h5py.ExternalLink):
@@ -83,33 +85,34 @@ def _array(group: Any, name: str) -> np.ndarray:
     return np.ravel(_item(group, name)[()])
 
 
-def write(problem: InterfaceProblem, path: str | Path, title: str = "", description: str = "") -> None:
+def write(
+    problem: InterfaceProblem, path: str | Path, title: str = "", description: str = ""
+) -> None:
     """Write a problem in FCLib's local form; read() gives back the same numbers.
 
-    With a balance (V, s) it is the mixed form u = W r + V lambda + q, R u-part zero: groups V, R and vectors/s.
-    The file appears complete or not at all.
+    With a balance (V, s) it is the mixed form u = W r + V lambda + q, R u-part zero: groups V, R
+    and vectors/s. The file appears complete or not at all.
 
     Parameters
     ----------
-    problem
-        The problem, under Coulomb's law.
-    path
-        Where the file shall be.
-    title, description
-        Texts that the file keeps about the problem.
+    problem : The problem, under Coulomb's law.
+    path : Where the file shall be.
+    title, description : Texts that the file keeps about the problem.
 
     Raises
     ------
-    InputError
-        On other laws than Coulomb's, which FCLib cannot express; on a Q that is known by its products only; on a folder
-        that cannot be written to; and where h5py is not installed.
+    InputError : On other laws than Coulomb's, which FCLib cannot express; on a Q that is known by
+        its products only; on a folder that cannot be written to; and where h5py is not installed.
     """
     if not isinstance(problem, InterfaceProblem):
-        raise InputError(f"what is written must be an InterfaceProblem; got {type(problem).__name__}.")
+        raise InputError(
+            f"what is written must be an InterfaceProblem; got {type(problem).__name__}."
+        )
     law = problem.law
     if not (law.unilateral and law.proportional) or law.dilatant:
         raise InputError(
-            f"FCLib knows Coulomb's law only; this problem has {type(law).__name__} and cannot be written."
+            f"FCLib knows Coulomb's law only; this problem has {type(law).__name__} and cannot be"
+            " written."
         )
     if isinstance(problem.Q, InterfaceOperator):
         raise InputError("Q is known by its products only; write problem.explicit().")
@@ -133,7 +136,9 @@ def _read_local(group: Any) -> InterfaceProblem:
         s = _array(group, "vectors/s")
         if _read_matrix(_item(group, "R"), (len(s), len(s))).nnz:
             raise InputError("its equality block R is not zero, which is not supported")
-        return InterfaceProblem(W, q, mu, _read_matrix(_item(group, "V"), (q.size, len(s))).toarray(), s)
+        return InterfaceProblem(
+            W, q, mu, _read_matrix(_item(group, "V"), (q.size, len(s))).toarray(), s
+        )
     return InterfaceProblem(W, q, mu)
 
 
@@ -149,7 +154,9 @@ def _read_global(group: Any) -> InterfaceProblem:
 
 
 def _inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
-    """X -> M^-1 X for sparse X. Blocks of rigid bodies are inverted one by one, other matrices are factorised.
+    """X -> M^-1 X for sparse X.
+
+    Blocks of rigid bodies are inverted one by one, other matrices are factorised.
 
     RuntimeError or LinAlgError if M is singular.
     """
@@ -162,14 +169,18 @@ def _inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
 
     def solve(X: sp.csr_array) -> sp.csr_array:
         X = sp.csc_array(X)
-        parts = [factors.solve(X[:, i : i + COLUMNS].toarray()) for i in range(0, X.shape[1], COLUMNS)]
+        parts = [
+            factors.solve(X[:, i : i + COLUMNS].toarray()) for i in range(0, X.shape[1], COLUMNS)
+        ]
         return sp.csr_array(sp.hstack([sp.csc_array(part) for part in parts]))
 
     return solve
 
 
 def _block_inverse(M: sp.csr_array, body: np.ndarray, sizes: np.ndarray) -> sp.csr_array:
-    """M^-1 where the unknowns i with body[i] = b form blocks of sizes[b] that are coupled to no other."""
+    """M^-1 where the unknowns i with body[i] = b form blocks of sizes[b] that are coupled to no
+    other.
+    """
     order = np.argsort(body, kind="stable")
     first = np.cumsum(sizes) - sizes
     place = np.empty(len(body), dtype=int)
@@ -183,7 +194,11 @@ def _block_inverse(M: sp.csr_array, body: np.ndarray, sizes: np.ndarray) -> sp.c
         number[bodies] = np.arange(len(bodies))
         mine = number[body[rows]] >= 0
         blocks = np.zeros((len(bodies), size, size))
-        np.add.at(blocks, (number[body[rows[mine]]], place[rows[mine]], place[columns[mine]]), entries.data[mine])
+        np.add.at(
+            blocks,
+            (number[body[rows[mine]]], place[rows[mine]], place[columns[mine]]),
+            entries.data[mine],
+        )
         members = order[first[bodies][:, None] + np.arange(size)]
         i.append(np.repeat(members, size, axis=1).ravel())
         j.append(np.tile(members, (1, size)).ravel())
@@ -219,7 +234,12 @@ def _read_matrix(group: Any, shape: tuple[int, int]) -> sp.csr_array:
 
 
 def _write_matrix(group: Any, matrix: sp.csc_matrix) -> None:
-    for key, value in (("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", -1), ("nzmax", matrix.nnz)):
+    for key, value in (
+        ("m", matrix.shape[0]),
+        ("n", matrix.shape[1]),
+        ("nz", -1),
+        ("nzmax", matrix.nnz),
+    ):
         group[key] = np.array([value], dtype=np.int32)
     group["p"], group["i"] = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
     group["x"] = matrix.data.astype(float)

@@ -1,7 +1,7 @@
 """Siconos' text format of friction-contact problems: dense, sparse-block and sparse storage.
 
-All numbers are separated by white space: dim, contacts, storage, rows, columns, the matrix, then q (dim numbers per
-contact) and mu (one per contact). What follows is ignored.
+All numbers are separated by white space: dim, contacts, storage, rows, columns, the matrix, then q
+(dim numbers per contact) and mu (one per contact). What follows is ignored.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ class _Numbers:
 
     def floats(self, count: int) -> np.ndarray:
         if count < 0 or count > len(self.words) - self.at:
-            raise InputError(f"it announces {count} numbers where {len(self.words) - self.at} are left")
+            raise InputError(
+                f"it announces {count} numbers where {len(self.words) - self.at} are left"
+            )
         self.at += count
         return np.array(self.words[self.at - count : self.at], dtype=float)
 
@@ -48,20 +50,17 @@ def read_text(path: Path) -> InterfaceProblem:
 
     Parameters
     ----------
-    path
-        The file.
+    path : The file.
 
     Returns
     -------
-    InterfaceProblem
-        The problem in the units of the file, without a balance.
+    The problem in the units of the file, without a balance.
 
     Raises
     ------
-    InputError
-        If the sizes or the storage that the file names do not exist or do not fit.
-    ValueError
-        If what should be a number is none. `contactopt.fclib.read` makes an InputError of it.
+    InputError : If the sizes or the storage that the file names do not exist or do not fit.
+    ValueError : If what should be a number is none. `contactopt.fclib.read` makes an InputError of
+        it.
     """
     text = path.read_text(encoding="ascii", errors="replace")
     head = text.split(maxsplit=5)
@@ -70,7 +69,8 @@ def read_text(path: Path) -> InterfaceProblem:
         raise InputError(f"its dimension is {dim}, not 2 or 3")
     if contacts < 0 or rows != dim * contacts or columns != rows:
         raise InputError(
-            f"its matrix is {rows} by {columns}, which does not fit {contacts} contacts in {dim} dimensions"
+            f"its matrix is {rows} by {columns}, which does not fit {contacts} contacts in {dim}"
+            " dimensions"
         )
     rest = head[5] if len(head) > 5 else ""
     if storage == SPARSE:
@@ -85,17 +85,16 @@ def read_text(path: Path) -> InterfaceProblem:
 
 
 def compact(W: Interface) -> Interface:
-    """Choose the storage of a matrix: an array if more than a third of its entries are there, else sparse.
+    """Choose the storage of a matrix: an array if more than a third of its entries are there, else
+    sparse.
 
     Parameters
     ----------
-    W
-        The (k dim, k dim) matrix, an array or sparse.
+    W : The (k dim, k dim) matrix, an array or sparse.
 
     Returns
     -------
-    ndarray or csr_array
-        The matrix as an array, or as it was given.
+    The matrix as an array, or as it was given.
     """
     full = sp.issparse(W) and W.nnz >= MOSTLY * W.shape[0] * W.shape[1]
     return np.asarray(W.toarray()) if full else W
@@ -108,7 +107,9 @@ def _dense(numbers: _Numbers, n: int) -> np.ndarray:
 
 
 def _blocks(numbers: _Numbers, n: int) -> sp.csr_array:
-    """Blocks of compressed rows; ends of block rows and columns, pointers, indices, then number and entries of each."""
+    """Blocks of compressed rows; ends of block rows and columns, pointers, indices, then number and
+    entries of each.
+    """
     count, *shape = numbers.integers(3).tolist()
     ends = [numbers.integers(size) for size in shape]
     for end in ends:
@@ -126,7 +127,11 @@ def _blocks(numbers: _Numbers, n: int) -> sp.csr_array:
     tops, lefts = (np.concatenate([[0], end[:-1]]) for end in ends)
     heights, widths = np.diff(ends[0], prepend=0)[rows], np.diff(ends[1], prepend=0)[columns]
     sizes = heights * widths
-    starts = np.arange(count) + np.concatenate([[0], np.cumsum(sizes)[:-1]]) if count else np.zeros(0, dtype=int)
+    starts = (
+        np.arange(count) + np.concatenate([[0], np.cumsum(sizes)[:-1]])
+        if count
+        else np.zeros(0, dtype=int)
+    )
     words = numbers.floats(int(sizes.sum()) + count)
     if not np.array_equal(words[starts], np.arange(count)):
         raise InputError("its blocks are not numbered in turn")
@@ -149,7 +154,10 @@ def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
         raise InputError("its sparse matrix has no header line")
     size, count = [int(found[1]), int(found[2])], int(found[4])
     if size != [n, n] or not 0 <= count <= len(text) // 4:
-        raise InputError(f"its sparse matrix announces {size[0]} by {size[1]} with {count} entries, which does not fit")
+        raise InputError(
+            f"its sparse matrix announces {size[0]} by {size[1]} with {count} entries, which does"
+            " not fit"
+        )
     listed = "triplet" in line
     entries: list[tuple[int, int, float]] = []
     column = -1
@@ -162,9 +170,12 @@ def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
         elif not listed and len(words) == 2 and column >= 0:
             entries.append((int(words[0]), column, float(words[1])))
         elif words:
-            raise InputError("its sparse matrix has fewer entries than it announces, or a line that is none")
+            raise InputError(
+                "its sparse matrix has fewer entries than it announces, or a line that is none"
+            )
     rest = [line for line in islice(lines, None)]
-    while rest and (rest[0].lstrip().startswith("col") or not rest[0].strip()):  # empty columns at the end
+    # empty columns at the end
+    while rest and (rest[0].lstrip().startswith("col") or not rest[0].strip()):
         rest.pop(0)
     i, j, x = zip(*entries) if entries else ((), (), ())
     where = np.array(i, dtype=int), np.array(j, dtype=int)

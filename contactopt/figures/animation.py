@@ -1,4 +1,6 @@
-"""Figures of load paths: the loop of force and displacement, energies, and both in motion with the tractions."""
+"""Figures of load paths: the loop of force and displacement, energies, and both in motion with the
+tractions.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ def loop(path: PathResult, ax: Any = None) -> Any:
 
 
 def energies(path: PathResult, ax: Any = None) -> Any:
-    """Work since the first state: what did not become elastic energy, friction work, error of the steps."""
+    """Work since the first state: what did not become elastic energy, friction work, error of the
+    steps.
+    """
     ax = make_axes(ax)
     since = {key: value - value[0] for key, value in path.history.items()}
     state = np.arange(1, len(path.states) + 1)
@@ -47,13 +51,11 @@ def path_figure(path: PathResult) -> Any:
 
     Parameters
     ----------
-    path
-        The solved load path.
+    path : The solved load path.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     from matplotlib.figure import Figure
 
@@ -83,7 +85,9 @@ def animate(path: PathResult, file: str | Path) -> None:
     peak = float(np.max(bound))
     (upper,) = left.plot(x, bound[0], "--", color=GREY, lw=1, label="friction bound, +/- mu p")
     (lower,) = left.plot(x, -bound[0], "--", color=GREY, lw=1)
-    (traction,) = left.plot(x, shear[0], "o-", color=BLUE, ms=2.5, lw=1, label="traction on the lower body")
+    (traction,) = left.plot(
+        x, shear[0], "o-", color=BLUE, ms=2.5, lw=1, label="traction on the lower body"
+    )
     where = ", y = 0" if problem.dim == 3 else ""
     left.set(
         xlabel=f"{scene.components[0]} [{scene.units[0]}]{where}",

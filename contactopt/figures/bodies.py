@@ -20,21 +20,18 @@ PIXELS = 800  # of the longer side of the picture of solids, more than it takes 
 
 
 def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields]) -> float:
-    """Choose the factor by which displacements are drawn: a round number, 1 where bodies are apart at first.
+    """Choose the factor by which displacements are drawn: a round number, 1 where bodies are apart
+    at first.
 
     Parameters
     ----------
-    scene
-        The scene.
-    problem
-        Its interface problem.
-    fields
-        The displacements of its bodies.
+    scene : The scene.
+    problem : Its interface problem.
+    fields : The displacements of its bodies.
 
     Returns
     -------
-    float
-        The factor, at least 1.
+    The factor, at least 1.
     """
     displacement = max(float(np.abs(f.displacement).max()) for f in fields)
     if displacement == 0 or np.ptp(problem.q[:, 0]) > 1e-3 * displacement:
@@ -47,24 +44,22 @@ def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fiel
     return float(max(1.0, power * max(m for m in (1, 2, 5) if m * power <= target)))
 
 
-def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None) -> Any:
-    """Draw the deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2).
+def deformed(
+    scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None
+) -> Any:
+    """Draw the deformed bodies coloured by von Mises stress, mirrored to the whole section (paper,
+    figures 1 and 2).
 
     Parameters
     ----------
-    scene
-        The scene.
-    problem
-        Its interface problem.
-    fields
-        Displacements and stresses of its bodies.
-    ax
-        Axes to draw on; by default new ones.
+    scene : The scene.
+    problem : Its interface problem.
+    fields : Displacements and stresses of its bodies.
+    ax : Axes to draw on; by default new ones.
 
     Returns
     -------
-    Axes
-        The axes.
+    The axes.
     """
     scale = magnification(scene, problem, fields)
     top = float(np.quantile(np.concatenate([f.von_mises for f in fields]), 0.998)) or 1.0
@@ -80,20 +75,17 @@ def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], 
 def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
     """Find beyond which place of a plane section the bodies are mirrored.
 
-    It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact line at the origin of
-    its chart, across the line.
+    It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact
+    line at the origin of its chart, across the line.
 
     Parameters
     ----------
-    scene
-        The scene.
-    problem
-        Its interface problem.
+    scene : The scene.
+    problem : Its interface problem.
 
     Returns
     -------
-    tuple or None
-        The number of a coordinate axis and the place on it [length]; None where the bodies are whole.
+    The number of a coordinate axis and the place on it [length]; None where the bodies are whole.
     """
     if scene.kind == "axisymmetric":
         return 0, 0.0
@@ -106,7 +98,12 @@ def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] |
 
 
 def _draw_section(
-    scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any, plane: tuple[int, float] | None
+    scene: Scene,
+    fields: Sequence[Fields],
+    scale: float,
+    top: float,
+    ax: Any,
+    plane: tuple[int, float] | None,
 ) -> Any:
     from matplotlib.collections import LineCollection
 
@@ -121,7 +118,9 @@ def _draw_section(
         for image in (False, True) if plane is not None else (False,):
             x = points.copy()
             x[axis] = 2 * place - x[axis] if image else x[axis]
-            colours = ax.tripcolor(*x, cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top)
+            colours = ax.tripcolor(
+                *x, cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top
+            )
             ax.add_collection(LineCollection(x.T[rim.T], colors="black", linewidths=0.6))
     across, up = scene.components
     ax.autoscale_view()
@@ -135,7 +134,9 @@ def _draw_section(
 
 
 def _placed_axes() -> tuple[Any, Any]:
-    """Axes of a new figure and those of its colour bar, at fixed places: working out places takes as long as drawing."""
+    """Axes of a new figure and those of its colour bar, at fixed places: working out places takes
+    as long as drawing.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.8))
@@ -143,7 +144,9 @@ def _placed_axes() -> tuple[Any, Any]:
 
 
 def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
-    """How far from the centre to look at a small contact on large bodies; None: show the whole bodies."""
+    """How far from the centre to look at a small contact on large bodies; None: show the whole
+    bodies.
+    """
     half_width = scene.reference.half_width if scene.reference else scene.zone
     large = half_width is not None and max(np.ptp(f.mesh.p[0]) for f in fields) > 16 * half_width
     return 4 * half_width if half_width is not None and large and scene.dim == 2 else None
@@ -158,12 +161,15 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     shade, view = ScalarMappable(Normalize(0, top), "viridis"), View(ELEVATION, AZIMUTH)
     drawn = []
     for f in fields:
-        move = np.nan_to_num(f.displacement, posinf=0.0, neginf=0.0)  # of bodies that fly away, which are drawn at rest
+        # of bodies that fly away, which are drawn at rest
+        move = np.nan_to_num(f.displacement, posinf=0.0, neginf=0.0)
         points = (f.mesh.p + scale * move).T
         plane, faces = surface(*elements_of(f.mesh), points)
         cells = triangles(pieces(plane, faces))
         opposite = np.stack([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]], axis=1)
-        lined = np.isin(_key(opposite, len(points)), _key(segments(mesh_lines(plane, faces)), len(points)))
+        lined = np.isin(
+            _key(opposite, len(points)), _key(segments(mesh_lines(plane, faces)), len(points))
+        )
         drawn.append((points[cells], f.von_mises[cells], lined))
     corners, values, lined = (np.concatenate(parts) for parts in zip(*drawn))
     image, extent = picture(view.project(corners), values, lined, shade.to_rgba, PIXELS)
@@ -172,7 +178,14 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     draw_frame(ax, view, corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), names)
     ax.set_axis_off()
     ax.margins(0.12)
-    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.7, pad=0.04)
+    ax.figure.colorbar(
+        shade,
+        ax=ax,
+        label=f"von Mises stress [{scene.units[1]}]",
+        extend="max",
+        shrink=0.7,
+        pad=0.04,
+    )
     return ax
 
 

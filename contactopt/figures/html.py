@@ -1,7 +1,9 @@
-"""Pages that stand alone: one HTML file with its data, its program and plotly inside, which opens without a network.
+"""Pages that stand alone: one HTML file with its data, its program and plotly inside, which opens
+without a network.
 
-plotly is stored compressed, at a third of its size, and unpacked by the browser. Data are JSON; arrays are base64 of their
-bytes. Names in the data reach the page as text only, and the page may load nothing from elsewhere.
+plotly is stored compressed, at a third of its size, and unpacked by the browser. Data are JSON;
+arrays are base64 of their bytes. Names in the data reach the page as text only, and the page may
+load nothing from elsewhere.
 """
 
 from __future__ import annotations
@@ -21,7 +23,10 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.files.writing import whole_file
 
-POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:"
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline';"
+    " img-src data: blob:"
+)
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
 
 SHORT = 65535  # the largest number of two bytes
@@ -30,7 +35,9 @@ SHORT = 65535  # the largest number of two bytes
 def check_installed() -> None:
     """Raise InputError unless plotly is installed, of which the pages hold a copy."""
     if find_spec("plotly") is None:
-        raise InputError("pages to explore need plotly; install it with: pip install 'contactopt[view]'.")
+        raise InputError(
+            "pages to explore need plotly; install it with: pip install 'contactopt[view]'."
+        )
 
 
 def packed(array: Any) -> dict[str, Any]:
@@ -38,22 +45,26 @@ def packed(array: Any) -> dict[str, Any]:
 
     Parameters
     ----------
-    array
-        Numbers or truth values of any shape.
+    array : Numbers or truth values of any shape.
 
     Returns
     -------
-    dict
-        Its type, its shape, and its bytes as text.
+    Its type, its shape, and its bytes as text.
     """
     array = np.asarray(array)
     name, kind = KINDS[array.dtype.kind]
     data = np.ascontiguousarray(array.astype(kind))
-    return {"type": name, "shape": list(array.shape), "data": base64.b64encode(data.tobytes()).decode()}
+    return {
+        "type": name,
+        "shape": list(array.shape),
+        "data": base64.b64encode(data.tobytes()).decode(),
+    }
 
 
 def packed_short(array: np.ndarray) -> dict[str, Any]:
-    """An array for the data of a page: numbers of two bytes each, which divide the range of the array into 65535 steps."""
+    """An array for the data of a page: numbers of two bytes each, which divide the range of the
+    array into 65535 steps.
+    """
     low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
     step = (high - low) / SHORT if high > low else 1.0
     data = np.ascontiguousarray(np.rint((array - low) / step).astype("<u2"))
@@ -61,31 +72,27 @@ def packed_short(array: np.ndarray) -> dict[str, Any]:
     return {"type": "u2", "shape": list(array.shape), "low": low, "step": step, "data": text}
 
 
-def write_html(file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]) -> Path:
+def write_html(
+    file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]
+) -> Path:
     """Write a page that stands alone.
 
     Parameters
     ----------
-    file
-        Where to write it.
-    title
-        Of the page, plain text.
-    body
-        HTML between header and programs, with every name in it escaped.
-    data
-        What the programs read; anything that JSON can hold.
-    programs
-        Names of JavaScript files in contactopt/figures/pages, run in this order once plotly is there.
+    file : Where to write it.
+    title : Of the page, plain text.
+    body : HTML between header and programs, with every name in it escaped.
+    data : What the programs read; anything that JSON can hold.
+    programs : Names of JavaScript files in contactopt/figures/pages, run in this order once plotly
+        is there.
 
     Returns
     -------
-    Path
-        The file.
+    The file.
 
     Raises
     ------
-    InputError
-        If plotly is not installed, or the file cannot be written.
+    InputError : If plotly is not installed, or the file cannot be written.
     """
     check_installed()
     from plotly.offline import get_plotlyjs

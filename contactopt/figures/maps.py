@@ -19,15 +19,12 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
 
     Parameters
     ----------
-    reduction
-        The reduction of a scene with a half-space.
-    solution
-        A solution of its problem.
+    reduction : The reduction of a scene with a half-space.
+    solution : A solution of its problem.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
@@ -41,8 +38,22 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     ]
     if problem.law.rough.any():
         traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
-        panels.append(("traction", np.where(closed, traction, np.nan), f"tangential traction [{stress}]", "viridis"))
-        panels.append(("slip", np.where(closed, slip, np.nan), f"tangential displacement [{length}]", "cividis"))
+        panels.append(
+            (
+                "traction",
+                np.where(closed, traction, np.nan),
+                f"tangential traction [{stress}]",
+                "viridis",
+            )
+        )
+        panels.append(
+            (
+                "slip",
+                np.where(closed, slip, np.nan),
+                f"tangential displacement [{length}]",
+                "cividis",
+            )
+        )
         panels.append(
             (
                 "status",
@@ -64,7 +75,9 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
             continue
         x, y = problem.chart.places
         extent = (x.min(), x.max(), y.min(), y.max())
-        image = ax.imshow(values.T, origin="lower", extent=extent, cmap=colours, interpolation="nearest")
+        image = ax.imshow(
+            values.T, origin="lower", extent=extent, cmap=colours, interpolation="nearest"
+        )
         ax.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]")
         bar = figure.colorbar(image, ax=ax, label=label, orientation="horizontal")
         if name == "status":

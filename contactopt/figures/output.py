@@ -1,4 +1,6 @@
-"""The files of a run: its figures, fields and numbers, and which of them an earlier run left in a folder."""
+"""The files of a run: its figures, fields and numbers, and which of them an earlier run left in a
+folder.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
 STATES = "states.npz"
-MOST_NUMBERS = 3_000_000  # of the bodies at all states of a load path, above which only the last state is written
+# of the bodies at all states of a load path, above which only the last state is written
+MOST_NUMBERS = 3_000_000
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
@@ -37,13 +40,11 @@ def squeeze(t: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    t
-        (k, d) tangential components.
+    t : (k, d) tangential components.
 
     Returns
     -------
-    ndarray
-        (k,) or (k, d).
+    (k,) or (k, d).
     """
     return t[:, 0] if t.shape[1] == 1 else t
 
@@ -53,12 +54,9 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
 
     Parameters
     ----------
-    result
-        The solved scene.
-    folder
-        Where the files go.
-    formats
-        Endings of the files, each figure in every one of them.
+    result : The solved scene.
+    folder : Where the files go.
+    formats : Endings of the files, each figure in every one of them.
     """
     from contactopt.figures import plots
 
@@ -92,12 +90,10 @@ def write(result: Result, folder: Path, states: bool) -> None:
 
     Parameters
     ----------
-    result
-        The solved scene.
-    folder
-        Where the files go.
-    states
-        Whether to write the bodies at all states of the path, too, for a page on which they move.
+    result : The solved scene.
+    folder : Where the files go.
+    states : Whether to write the bodies at all states of the path, too, for a page on which they
+        move.
     """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
@@ -128,16 +124,20 @@ def write(result: Result, folder: Path, states: bool) -> None:
 
 
 def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
-    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and von_mises (n, nodes).
+    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and
+    von_mises (n, nodes).
 
-    It is empty where there would be more than MOST_NUMBERS, or where the path kept no displacements.
+    It is empty where there would be more than MOST_NUMBERS, or where the path kept no
+    displacements.
     """
     numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
     if not path.states[-1].bodies or not 0 < numbers <= MOST_NUMBERS:
         return {}
     made = {}
     for own in zip(*(path.fields(step) for step in range(len(path.states)))):
-        made[f"displacement/{own[0].name}"] = np.array([f.displacement.T for f in own], dtype=np.float32)
+        made[f"displacement/{own[0].name}"] = np.array(
+            [f.displacement.T for f in own], dtype=np.float32
+        )
         made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
     return made
 
@@ -145,26 +145,32 @@ def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
 def earlier_files(folder: Path) -> set[str]:
     """List the files that an earlier `contactopt run` wrote into a folder.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body
-    and per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary
-    names.
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for
+    a VTU file per body and per pair of surfaces, told from other people's by the fields in them,
+    and pictures of the pairs that the summary names.
 
     Parameters
     ----------
-    folder
-        The folder.
+    folder : The folder.
 
     Returns
     -------
-    set
-        Names of files; empty where none has run.
+    Names of files; empty where none has run.
     """
     with suppress(OSError, ValueError, TypeError):
         summary = json.loads(_plain_text(folder / "summary.json"))
         if "contact_nodes" in summary:
             marks = ('"von_mises"', '"contact_pressure"')
-            found = {file.name for file in folder.glob("*.vtu") if any(mark in _plain_text(file) for mark in marks)}
-            pictures = {f"pressure-{pair}.{ending}" for pair in summary.get("pairs", {}) for ending in FORMATS}
+            found = {
+                file.name
+                for file in folder.glob("*.vtu")
+                if any(mark in _plain_text(file) for mark in marks)
+            }
+            pictures = {
+                f"pressure-{pair}.{ending}"
+                for pair in summary.get("pairs", {})
+                for ending in FORMATS
+            }
             found |= {file.name for file in folder.glob("pressure-*") if file.name in pictures}
             return found | {name for name in RUN_FILES if (folder / name).exists()}
     return set()

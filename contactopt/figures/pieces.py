@@ -1,7 +1,8 @@
-"""Finite elements as what can be drawn: flat pieces and straight lines between nodes, for elements of first and second order.
+"""Finite elements as what can be drawn: flat pieces and straight lines between nodes, for elements
+of first and second order.
 
-Elements are named, and their nodes numbered, as in meshio and VTU files. A face of second order is drawn as pieces between all of
-its nodes, and its edges as lines through the nodes in their middles.
+Elements are named, and their nodes numbered, as in meshio and VTU files. A face of second order is
+drawn as pieces between all of its nodes, and its edges as lines through the nodes in their middles.
 """
 
 from __future__ import annotations
@@ -57,7 +58,8 @@ CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}
 
 
 def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, np.ndarray]:
-    """The plane elements that a body shows: itself in the plane; in space its boundary, each face numbered as seen from outside.
+    """The plane elements that a body shows: itself in the plane; in space its boundary, each face
+    numbered as seen from outside.
 
     Parameters
     ----------
@@ -82,7 +84,9 @@ def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, n
 
 
 def solids(kind: str, elements: np.ndarray) -> np.ndarray:
-    """Solid elements as tetrahedra (m, 4) or hexahedra (m, 8) with straight edges; (0, 4) for plane ones."""
+    """Solid elements as tetrahedra (m, 4) or hexahedra (m, 8) with straight edges; (0, 4) for plane
+    ones.
+    """
     if kind not in SOLIDS:
         return np.zeros((0, 4), dtype=int)
     return np.concatenate([elements[:, list(part)] for part in SOLIDS[kind]])
@@ -101,17 +105,22 @@ def triangles(flat: np.ndarray) -> np.ndarray:
 def mesh_lines(kind: str, elements: np.ndarray) -> np.ndarray:
     """The edges of plane elements, each once, as (m, 2 or 3) nodes from corner to corner."""
     edges = _edges(kind, elements)
-    return np.asarray(edges[np.unique(np.sort(edges[:, [0, -1]], axis=1), axis=0, return_index=True)[1]])
+    return np.asarray(
+        edges[np.unique(np.sort(edges[:, [0, -1]], axis=1), axis=0, return_index=True)[1]]
+    )
 
 
 def outline(kind: str, elements: np.ndarray) -> np.ndarray:
-    """The edges of plane elements that belong to one element only, as (m, 2 or 3) nodes from corner to corner."""
+    """The edges of plane elements that belong to one element only, as (m, 2 or 3) nodes from corner
+    to corner.
+    """
     edges = _edges(kind, elements)
     return np.asarray(edges[_alone(edges[:, [0, -1]])])
 
 
 def sharp_edges(kind: str, elements: np.ndarray, points: np.ndarray, cosine: float) -> np.ndarray:
-    """The edges of a closed surface of plane elements where the normals of its two faces have a smaller cosine.
+    """The edges of a closed surface of plane elements where the normals of its two faces have a
+    smaller cosine.
 
     points  (n, 3) places of the nodes
     """
@@ -143,5 +152,7 @@ def _normals(corners: np.ndarray) -> np.ndarray:
 
 def _alone(corners: np.ndarray) -> np.ndarray:
     """Rows of `corners` (m, c) that no other row repeats, in whatever order."""
-    _, first, count = np.unique(np.sort(corners, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(
+        np.sort(corners, axis=1), axis=0, return_index=True, return_counts=True
+    )
     return np.sort(first[count == 1])

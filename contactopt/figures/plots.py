@@ -1,7 +1,8 @@
 """Every figure of a solved scene: f(data, ax=None) -> ax. Draws, never solves.
 
-A contact line is drawn over the arc length from its centre. A contact surface in 3D is drawn along the row of contacts through
-its centre where its nodes lie in rows, and as a coloured map where they do not.
+A contact line is drawn over the arc length from its centre. A contact surface in 3D is drawn along
+the row of contacts through its centre where its nodes lie in rows, and as a coloured map where they
+do not.
 """
 
 from __future__ import annotations
@@ -26,24 +27,25 @@ __all__ = [
     "mirror_plane", "pressure", "stick_map", "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
-CENTRED = 0.1  # a contact zone whose centre is off the origin by less than this fraction of its half-width
+# a contact zone whose centre is off the origin by less than this fraction of its half-width
+CENTRED = 0.1
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """Choose the contacts along the first direction of the surface, in order; in 3D those of the row nearest to its
+    """Choose the contacts along the first direction of the surface, in order; in 3D those of the
+    row nearest to its
     origin.
 
-    A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period / 2.
+    A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period
+    / 2.
 
     Parameters
     ----------
-    problem
-        The interface problem of one pair of surfaces.
+    problem : The interface problem of one pair of surfaces.
 
     Returns
     -------
-    ndarray
-        (j,) numbers of contacts.
+    (j,) numbers of contacts.
     """
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
@@ -55,44 +57,51 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
 
 
 def contact_place(problem: InterfaceProblem) -> np.ndarray:
-    """Compute places along the first direction of the surface; of a closed line from its origin either way.
+    """Compute places along the first direction of the surface; of a closed line from its origin
+    either way.
 
     Parameters
     ----------
-    problem
-        The interface problem of one pair of surfaces.
+    problem : The interface problem of one pair of surfaces.
 
     Returns
     -------
-    ndarray
-        (k,) places [length].
+    (k,) places [length].
     """
     x, period = problem.chart.places[0], problem.chart.period
     return x if period is None else np.asarray((x + period / 2) % period - period / 2)
 
 
 def in_rows(problem: InterfaceProblem) -> bool:
-    """Whether a row of contacts crosses the surface, so that values can be drawn along it; always in 2D."""
+    """Whether a row of contacts crosses the surface, so that values can be drawn along it; always
+    in 2D.
+    """
     return problem.dim == 2 or len(contact_line(problem)) >= max(3.0, np.sqrt(problem.contacts) / 3)
 
 
 def _place_label(scene: Scene, problem: InterfaceProblem) -> str:
-    """What the places along the contact line are: a coordinate where the line follows an axis, otherwise arc length."""
+    """What the places along the contact line are: a coordinate where the line follows an axis,
+    otherwise arc length.
+    """
     if problem.dim == 3:
         return "x"
     return scene.components[0] if _straight(problem) else "arc length s"
 
 
 def _straight(problem: InterfaceProblem) -> bool:
-    """Whether the contact line follows the first coordinate; true of every surface in 3D, which has its own figures."""
+    """Whether the contact line follows the first coordinate; true of every surface in 3D, which has
+    its own figures.
+    """
     extent = np.ptp(problem.coordinates, axis=1)
     return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= STRAIGHT * extent[0])
 
 
 def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Contact pressure over its mean against position over half-width (paper, figure 3), with the exact curve.
+    """Contact pressure over its mean against position over half-width (paper, figure 3), with the
+    exact curve.
 
-    The position is divided by the half-width where the contact zone lies about the origin; elsewhere it is a length.
+    The position is divided by the half-width where the contact zone lies about the origin;
+    elsewhere it is a length.
     """
     if not in_rows(problem):
         values = solution.reactions[:, 0] / problem.areas
@@ -109,11 +118,22 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         fine = np.linspace(x.min(), x.max(), 801)
         with np.errstate(all="ignore"):
             exact = scene.reference.pressure(fine) / mean
-        ax.plot(fine / unit, exact, color=ORANGE, lw=1.5, label=f"exact: {scene.reference.label}", zorder=1)
+        ax.plot(
+            fine / unit,
+            exact,
+            color=ORANGE,
+            lw=1.5,
+            label=f"exact: {scene.reference.label}",
+            zorder=1,
+        )
     name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
     length = scene.units[0]
     ax.set(
-        xlabel=f"{name} / a [-]{where}, a = {a:.4g} {length}" if scaled else f"{name} [{length}]{where}",
+        xlabel=(
+            f"{name} / a [-]{where}, a = {a:.4g} {length}"
+            if scaled
+            else f"{name} [{length}]{where}"
+        ),
         ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
         ylim=(0, 5.0 if singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
@@ -121,8 +141,12 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     return ax
 
 
-def _about_origin(problem: InterfaceProblem, solution: Solution, place: np.ndarray, half_width: float) -> bool:
-    """Whether the contacts that touch are one zone about the origin, of which the half-width is the measure."""
+def _about_origin(
+    problem: InterfaceProblem, solution: Solution, place: np.ndarray, half_width: float
+) -> bool:
+    """Whether the contacts that touch are one zone about the origin, of which the half-width is the
+    measure.
+    """
     touching = contact_status(problem, solution.reactions).touching
     if half_width <= 0 or not touching.any():
         return False
@@ -135,10 +159,18 @@ def _about_origin(problem: InterfaceProblem, solution: Solution, place: np.ndarr
 
 
 def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Tangential traction against position with the friction bound; sticking and slipping nodes marked."""
+    """Tangential traction against position with the friction bound; sticking and slipping nodes
+    marked.
+    """
     if not in_rows(problem):
         values = np.linalg.norm(solution.reactions[:, 1:], axis=1) / problem.areas
-        return _map(scene, problem, values, f"size of the tangential traction [{scene.units[1]}]", make_axes(ax))
+        return _map(
+            scene,
+            problem,
+            values,
+            f"size of the tangential traction [{scene.units[1]}]",
+            make_axes(ax),
+        )
     ax = make_axes(ax)
     line, place = contact_line(problem), contact_place(problem)
     x, t = place[line], solution.reactions[line, 1] / problem.areas[line]
@@ -151,7 +183,8 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         fine = np.linspace(x.min(), x.max(), 801)
         with np.errstate(all="ignore"):
             exact = -scene.reference.shear(fine)
-        exact[np.abs(exact) > 1.1 * bound.max(initial=0.0)] = np.nan  # singular at the edge of a punch
+        # singular at the edge of a punch
+        exact[np.abs(exact) > 1.1 * bound.max(initial=0.0)] = np.nan
         ax.plot(fine, exact, color="black", lw=1, label=f"exact: {scene.reference.label}", zorder=3)
     if singular(scene) and np.any(bound):
         mean = float(np.average(bound, weights=problem.areas[line]))
@@ -178,7 +211,11 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
         drawn = ax.scatter(x, y, c=values, s=14, cmap="viridis")
     else:
         corners = cells.T
-        triangles = np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]) if corners.shape[1] == 4 else corners
+        triangles = (
+            np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]])
+            if corners.shape[1] == 4
+            else corners
+        )
         drawn = ax.tripcolor(x, y, triangles, values, shading="gouraud", cmap="viridis")
     ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", aspect="equal")
     ax.figure.colorbar(drawn, ax=ax, label=label, shrink=0.8)
@@ -186,7 +223,9 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
 
 
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction as arrows."""
+    """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction
+    as arrows.
+    """
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
@@ -216,37 +255,41 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
     """Draw pressure above tangential traction, with the map of stick and slip in 3D.
 
-    One panel stands above the other, so that all of them can be read where the figure is 400 pixels wide.
+    One panel stands above the other, so that all of them can be read where the figure is 400 pixels
+    wide.
 
     Parameters
     ----------
-    scene
-        The scene.
-    problem, solution
-        The interface problem of one pair of surfaces, and its solution.
+    scene : The scene.
+    problem, solution : The interface problem of one pair of surfaces, and its solution.
 
     Returns
     -------
-    Figure
-        The figure of matplotlib.
+    The figure of matplotlib.
     """
     from matplotlib.figure import Figure
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    figure = Figure(figsize=(5.6, 3.6 * len(panels)), layout="constrained" if problem.dim == 3 else None)
+    figure = Figure(
+        figsize=(5.6, 3.6 * len(panels)), layout="constrained" if problem.dim == 3 else None
+    )
     if problem.dim == 2:
         figure.subplots_adjust(left=0.19, right=0.97, bottom=0.07, top=0.94, hspace=0.24)
     for draw, ax in zip(panels, figure.subplots(len(panels), 1)):
         draw(scene, problem, solution, ax)
-    figure.suptitle(f"{scene.name}, {scene.friction}: {solution.status}, residual {solution.residual:.1e}")
+    figure.suptitle(
+        f"{scene.name}, {scene.friction}: {solution.status}, residual {solution.residual:.1e}"
+    )
     return figure
 
 
 def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
     """Natural-map residual against outer iterations, one line per solve."""
     ax = make_axes(ax)
-    for colour, (label, solution) in zip((BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9"), solutions.items()):
+    for colour, (label, solution) in zip(
+        (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9"), solutions.items()
+    ):
         residual = [h["residual"] for h in solution.history]
         ax.semilogy(range(1, len(residual) + 1), residual, "o-", ms=3, color=colour, label=label)
     ax.set(xlabel="outer iteration", ylabel="natural-map residual [-]")
@@ -255,19 +298,17 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
-    """Draw what the model leaves of the data, over the standard deviation of the noise, state by state.
+    """Draw what the model leaves of the data, over the standard deviation of the noise, state by
+    state.
 
     Parameters
     ----------
-    found
-        The parameters that were fitted.
-    ax
-        Axes to draw on; by default new ones.
+    found : The parameters that were fitted.
+    ax : Axes to draw on; by default new ones.
 
     Returns
     -------
-    Axes
-        The axes.
+    The axes.
     """
     ax = make_axes(ax)
     for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
@@ -286,15 +327,12 @@ def design(found: Design, ax: Any = None) -> Any:
 
     Parameters
     ----------
-    found
-        The design.
-    ax
-        Axes to draw on; by default new ones.
+    found : The design.
+    ax : Axes to draw on; by default new ones.
 
     Returns
     -------
-    Axes
-        The axes.
+    The axes.
     """
     ax = make_axes(ax)
     problem = found.reduction.problem
@@ -303,7 +341,13 @@ def design(found: Design, ax: Any = None) -> Any:
     touching = problem.law.pressed(found.solution.reactions)
     mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
     unit, stress = found.reduction.scene.units
-    ax.plot(place[order], found.pressure[order], "." if problem.dim == 3 else ".-", color=BLUE, label="pressure")
+    ax.plot(
+        place[order],
+        found.pressure[order],
+        "." if problem.dim == 3 else ".-",
+        color=BLUE,
+        label="pressure",
+    )
     ax.axhline(mean, color=GREY, lw=0.8, label="mean over the contact")
     ax.set(xlabel=f"place [{unit}]", ylabel=f"pressure [{stress}]", ylim=(0.0, 1.2 * found.peak))
     ax.set_title(f"{found.reduction.scene.name}: largest over mean pressure {found.unevenness:.4f}")

@@ -1,4 +1,6 @@
-"""The search for an accuracy as a figure: estimated error and value of the quantity against the unknowns of the meshes."""
+"""The search for an accuracy as a figure: estimated error and value of the quantity against the
+unknowns of the meshes.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ if TYPE_CHECKING:
 
 
 def refinement_figure(estimate: Estimate) -> Any:
-    """Two axes over the unknowns of each mesh: estimated errors, on logarithmic axes with the target, and the value.
+    """Two axes over the unknowns of each mesh: estimated errors, on logarithmic axes with the
+    target, and the value.
 
     The dotted line is the last value with its estimated error added.
 
@@ -33,14 +36,23 @@ def refinement_figure(estimate: Estimate) -> Any:
     if np.any(energy > 0):
         left.loglog(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
     left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
-    left.set(xlabel="unknowns [-]", ylabel="estimated relative error [-]", title=f"{len(unknowns)} meshes")
+    left.set(
+        xlabel="unknowns [-]",
+        ylabel="estimated relative error [-]",
+        title=f"{len(unknowns)} meshes",
+    )
     left.legend(frameon=False)
     values = np.array([level.value for level in estimate.levels])
     bar = np.nan_to_num(errors) * np.abs(values)
     right.errorbar(unknowns, values, bar, fmt="o-", color=BLUE, capsize=3)
     if estimate.extrapolated is not None:
         right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":")
-    right.set(xscale="log", xlabel="unknowns [-]", ylabel=estimate.quantity, title="value, with the estimated error")
+    right.set(
+        xscale="log",
+        xlabel="unknowns [-]",
+        ylabel=estimate.quantity,
+        title="value, with the estimated error",
+    )
     right.set_ylim(*_shown(values, bar))
     for axes in (left, right):
         axes.xaxis.set_minor_formatter(NullFormatter())

@@ -1,4 +1,6 @@
-"""What a scene is, as a text: sketch, bodies with their sizes and loads, arguments, source, and what is known exactly."""
+"""What a scene is, as a text: sketch, bodies with their sizes and loads, arguments, source, and
+what is known exactly.
+"""
 
 from __future__ import annotations
 
@@ -23,20 +25,16 @@ def describe(name: str, changes: dict[str, Any]) -> str:
 
     Parameters
     ----------
-    name
-        A key of contactopt.scenes.SCENES, or a file that ends in .toml.
-    changes
-        Other values of the arguments of a named scene.
+    name : A key of contactopt.scenes.SCENES, or a file that ends in .toml.
+    changes : Other values of the arguments of a named scene.
 
     Returns
     -------
-    str
-        The text.
+    The text.
 
     Raises
     ------
-    InputError
-        For an unknown scene or argument, and for a scene file with a mistake.
+    InputError : For an unknown scene or argument, and for a scene file with a mistake.
     """
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file
@@ -48,34 +46,60 @@ def describe(name: str, changes: dict[str, Any]) -> str:
         head, arguments = [f"{name}: {SCENES[name][2]}"], _argument_lines(name)
     scene = states[-1]
     length, stress = scene.units
-    lines = [*head, f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}", ""]
+    lines = [
+        *head,
+        f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}",
+        "",
+    ]
     meshes = {
-        part.name: part.build_mesh(min(scene.elements, 8), scene.zone) for part in scene.parts if isinstance(part, Part)
+        part.name: part.build_mesh(min(scene.elements, 8), scene.zone)
+        for part in scene.parts
+        if isinstance(part, Part)
     }
     if meshes:
         lines += [*sketch(list(meshes.values())), ""]
-        lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(scene)
+        lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(
+            scene
+        )
         lines.append("")
     for part in scene.parts:
         lines += _part_lines(scene, part, meshes.get(part.name))
     images = f"; {scene.copies} mirror images make the whole" if scene.copies > 1 else ""
     lines.append(
-        f"{count(len(scene.pairs), 'pair')} of surfaces: {', '.join(pair.name for pair in scene.pairs)}{images}"
+        f"{count(len(scene.pairs), 'pair')} of surfaces:"
+        f" {', '.join(pair.name for pair in scene.pairs)}{images}"
     )
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states")
-    exact = "nothing is known exactly" if scene.reference is None else f"known exactly: {scene.reference.label}"
+    exact = (
+        "nothing is known exactly"
+        if scene.reference is None
+        else f"known exactly: {scene.reference.label}"
+    )
     return "\n".join([*lines, exact, *arguments])
 
 
 def _argument_lines(name: str) -> list[str]:
-    """The docstring of the function that makes the scene, and its arguments with their values; those of its load path, too."""
+    """The docstring of the function that makes the scene, and its arguments with their values;
+    those of its load path, too.
+    """
     module = SCENES[name][0]
     fixed = SCENES[name][-1] if isinstance(SCENES[name][-1], dict) else {}
     entries = [PATHS[name], SCENES[name]] if name in PATHS else [SCENES[name]]
-    makers = [getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1]) for entry in entries]
-    lines = ["", *(getdoc(makers[-1]) or "").splitlines(), "", "arguments, to be changed by --set NAME=VALUE:"]
-    found = {argument: value for make in reversed(makers) for argument, value in signature(make).parameters.items()}
+    makers = [
+        getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1]) for entry in entries
+    ]
+    lines = [
+        "",
+        *(getdoc(makers[-1]) or "").splitlines(),
+        "",
+        "arguments, to be changed by --set NAME=VALUE:",
+    ]
+    found = {
+        argument: value
+        for make in reversed(makers)
+        for argument, value in signature(make).parameters.items()
+    }
     for argument, parameter in found.items():
         if argument not in fixed and parameter.kind is not Parameter.VAR_KEYWORD:
             value = "" if parameter.default is Parameter.empty else f" = {parameter.default!r}"
@@ -86,7 +110,11 @@ def _argument_lines(name: str) -> list[str]:
 def _section(scene: Scene) -> str:
     if scene.copies == 1 and scene.kind != "axisymmetric":
         return ""
-    return "  (one half of the section)" if scene.kind == "axisymmetric" else "  (the part that is modelled)"
+    return (
+        "  (one half of the section)"
+        if scene.kind == "axisymmetric"
+        else "  (the part that is modelled)"
+    )
 
 
 def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
@@ -113,13 +141,21 @@ def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
 
 def _load(load: Any) -> str:
     if isinstance(load, Plate):
-        return f"plate on '{load.boundary}': total force " + ", ".join(f"{c} = {v:g}" for c, v in load.force.items())
+        return f"plate on '{load.boundary}': total force " + ", ".join(
+            f"{c} = {v:g}" for c, v in load.force.items()
+        )
     value = ", ".join(f"{v:g}" for v in load.value)
-    return f"traction on '{load.boundary}': {value}" if isinstance(load, Traction) else f"force per volume: {value}"
+    return (
+        f"traction on '{load.boundary}': {value}"
+        if isinstance(load, Traction)
+        else f"force per volume: {value}"
+    )
 
 
 def sketch(meshes: list[Any]) -> list[str]:
-    """Lines of characters, one mark per body, where its elements lie; of solids the section across the second axis."""
+    """Lines of characters, one mark per body, where its elements lie; of solids the section across
+    the second axis.
+    """
     axes = [0, -1]
     low, high = _window([mesh.p[axes] for mesh in meshes])
     size = np.maximum(high - low, 1e-300)
@@ -145,7 +181,9 @@ def sketch(meshes: list[Any]) -> list[str]:
 
 
 def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest coordinates (2,) of the picture: of all bodies, or about one that would be lost among larger ones."""
+    """Least and largest coordinates (2,) of the picture: of all bodies, or about one that would be
+    lost among larger ones.
+    """
     ends = np.array([[x.min(axis=1), x.max(axis=1)] for x in places])  # (bodies, 2, 2)
     low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
     extent = (ends[:, 1] - ends[:, 0]).max(axis=1)
@@ -157,9 +195,13 @@ def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether points lie in the convex hull of the corners (2, c) of a cell, seen along the axis that is left out."""
+    """Whether points lie in the convex hull of the corners (2, c) of a cell, seen along the axis
+    that is left out.
+    """
     centre = corners.mean(axis=1, keepdims=True)
     around = corners[:, np.argsort(np.arctan2(*(corners - centre)[::-1]))]
     after = np.roll(around, -1, axis=1)
-    sides = (after[0] - around[0]) * (y[..., None] - around[1]) - (after[1] - around[1]) * (x[..., None] - around[0])
+    sides = (after[0] - around[0]) * (y[..., None] - around[1]) - (after[1] - around[1]) * (
+        x[..., None] - around[0]
+    )
     return np.asarray(np.all(sides >= -1e-9 * np.abs(sides).max(initial=0.0), axis=-1))

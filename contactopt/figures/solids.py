@@ -1,6 +1,8 @@
-"""Pictures of solid bodies in a parallel projection, with a depth buffer: what is nearer hides what is behind it, in every pixel.
+"""Pictures of solid bodies in a parallel projection, with a depth buffer: what is nearer hides what
+is behind it, in every pixel.
 
-Matplotlib has no depth buffer. It sorts whole faces, which cannot be right for large faces beside small ones.
+Matplotlib has no depth buffer. It sorts whole faces, which cannot be right for large faces beside
+small ones.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ BLOCK = 1_000_000  # pixels of triangles that are looked at together
 class View:
     """A direction from which bodies are seen, with the axes of the picture.
 
-    Angles are in degrees as in Matplotlib: of the eye above the x-y plane, and from the x axis towards the y axis.
+    Angles are in degrees as in Matplotlib: of the eye above the x-y plane, and from the x axis
+    towards the y axis.
     """
 
     elevation: float
@@ -57,7 +60,8 @@ def picture(
 
     Returns
     -------
-    The image (h, w, 4), its first row below, and its extent (left, right, bottom, top) in the units of the corners
+    The image (h, w, 4), its first row below, and its extent (left, right, bottom, top) in the units
+    of the corners
     """
     low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
     scale = (pixels - 2) / float((high - low).max())
@@ -72,7 +76,8 @@ def picture(
     shown = np.asarray(colours(np.einsum("pi,pi->p", share, values[own])))
     tall = _heights(placed[..., :2])
     near = np.where(lined & (tall.min(axis=1) > SPARSE)[:, None], tall, np.inf)
-    near = LINE / near  # share of a corner up to which a pixel is near the edge opposite to it; nothing is near no edge
+    # share of a corner up to which a pixel is near the edge opposite to it; nothing is near no edge
+    near = LINE / near
     line = np.any(share < near[own], axis=1)
     shown[:, :3] *= np.where(line, DARK, _light(placed * [1 / scale, 1 / scale, 1])[own])[:, None]
     image[rows, columns] = shown
@@ -81,20 +86,25 @@ def picture(
 
 
 def nearest(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """The number of the triangle that is nearest to the eye at the middle of every pixel, -1 where there is none.
+    """The number of the triangle that is nearest to the eye at the middle of every pixel, -1 where
+    there is none.
 
-    corners  (m, 3, 3) place in pixels and distance towards the eye;  shape  (height, width) of the image
+    corners  (m, 3, 3) place in pixels and distance towards the eye;  shape  (height, width) of the
+             image
     """
     depth = np.full(shape[0] * shape[1], -np.inf)
     owner = np.full(shape[0] * shape[1], -1)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     left = np.flatnonzero(normals[:, 2] != 0)
-    sizes = np.abs(normals[left, 2]) / 2 + np.ptp(corners[left, :, 1], axis=1) + 1  # pixels and rows, about
+    # pixels and rows, about
+    sizes = np.abs(normals[left, 2]) / 2 + np.ptp(corners[left, :, 1], axis=1) + 1
     for some in np.split(left, np.flatnonzero(np.diff(np.cumsum(sizes) // BLOCK)) + 1):
         triangle, row, column = _pixels(corners[some, :, :2], shape)
         chosen = some[triangle]
         apart = np.stack([column, row], axis=1) + 0.5 - corners[chosen, 0, :2]
-        distance = corners[chosen, 0, 2] - np.sum(normals[chosen, :2] * apart, axis=1) / normals[chosen, 2]
+        distance = (
+            corners[chosen, 0, 2] - np.sum(normals[chosen, :2] * apart, axis=1) / normals[chosen, 2]
+        )
         where = row * shape[1] + column
         np.maximum.at(depth, where, distance)
         first = distance == depth[where]
@@ -102,8 +112,12 @@ def nearest(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return owner.reshape(shape)
 
 
-def _pixels(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangle, row and column of all pixels whose middles lie in triangles (m, 3, 2), row by row of each triangle."""
+def _pixels(
+    corners: np.ndarray, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangle, row and column of all pixels whose middles lie in triangles (m, 3, 2), row by row
+    of each triangle.
+    """
     first = np.maximum(np.ceil(corners[..., 1].min(axis=1) - 0.5 - EDGE).astype(int), 0)
     last = np.minimum(np.floor(corners[..., 1].max(axis=1) - 0.5 + EDGE).astype(int), shape[0] - 1)
     triangle, row = _ranges(first, last)
@@ -112,7 +126,9 @@ def _pixels(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np
         (x, y), (other_x, other_y) = corners[triangle, i].T, corners[triangle, i - 1].T
         with np.errstate(all="ignore"):
             share = (height - y) / (other_y - y)
-            ends.append(np.where((share >= -EDGE) & (share <= 1 + EDGE), x + share * (other_x - x), np.nan))
+            ends.append(
+                np.where((share >= -EDGE) & (share <= 1 + EDGE), x + share * (other_x - x), np.nan)
+            )
     left = np.fmin(np.fmin(ends[0], ends[1]), ends[2])
     right = np.fmax(np.fmax(ends[0], ends[1]), ends[2])
     met = np.isfinite(left)
@@ -124,18 +140,23 @@ def _pixels(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np
 
 
 def _ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The whole numbers from first to last, for each pair of them, and before them the number of the pair."""
+    """The whole numbers from first to last, for each pair of them, and before them the number of
+    the pair.
+    """
     count = np.maximum(last - first + 1, 0)
     pair = np.repeat(np.arange(len(first)), count)
     return pair, first[pair] + np.arange(len(pair)) - (np.cumsum(count) - count)[pair]
 
 
 def _shares(corners: np.ndarray, own: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (p, 3) of the places (x, y) in the triangles `own` (p,) of (m, 3, 2), each place in one of them."""
+    """Barycentric coordinates (p, 3) of the places (x, y) in the triangles `own` (p,) of (m, 3, 2),
+    each place in one of them.
+    """
     after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
     with np.errstate(all="ignore"):  # triangles seen from the side own no pixel
         slopes = (
-            np.stack([after[..., 1] - before[..., 1], before[..., 0] - after[..., 0]]) / _twice_area(corners)[:, None]
+            np.stack([after[..., 1] - before[..., 1], before[..., 0] - after[..., 0]])
+            / _twice_area(corners)[:, None]
         )
     across, up = slopes[:, own]
     foot = after[own]  # on the edge opposite to each corner
@@ -163,8 +184,12 @@ def _light(corners: np.ndarray) -> np.ndarray:
     return np.asarray(DIM + (1 - DIM) * np.abs(normals[:, 2]) / size)
 
 
-def draw_frame(ax: Any, view: View, low: np.ndarray, high: np.ndarray, labels: Sequence[str]) -> None:
-    """Three edges of the box between `low` and `high` (3,) as axes with ticks and labels, those that stand free of the bodies."""
+def draw_frame(
+    ax: Any, view: View, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
+) -> None:
+    """Three edges of the box between `low` and `high` (3,) as axes with ticks and labels, those
+    that stand free of the bodies.
+    """
     from matplotlib.ticker import MaxNLocator
 
     left = np.array([low[0], high[1], low[2]])  # the foot of the upright edge furthest to the left
@@ -181,7 +206,15 @@ def draw_frame(ax: Any, view: View, low: np.ndarray, high: np.ndarray, labels: S
                 place = foot.copy()
                 place[axis] = value
                 x, y, _ = view.project(place)
-                ax.plot([x], [y], marker="_" if axis == 2 else "|", color="black", ms=5, mew=0.8, zorder=3)
+                ax.plot(
+                    [x],
+                    [y],
+                    marker="_" if axis == 2 else "|",
+                    color="black",
+                    ms=5,
+                    mew=0.8,
+                    zorder=3,
+                )
                 ax.annotate(f"{value:.6g}", (x, y), shift, fontsize=8, **options)
         middle = ends[:, :2].mean(axis=0)
         ax.annotate(labels[axis], middle, (5 * shift[0], 3 * shift[1]), fontsize=10, **options)

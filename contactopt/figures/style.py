@@ -1,4 +1,7 @@
-"""Colours, axes and saving that all figures of results share. Colours are those of Okabe and Ito, legible to all."""
+"""Colours, axes and saving that all figures of results share.
+
+Colours are those of Okabe and Ito, legible to all.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,12 @@ def make_axes(ax: Any, **options: Any) -> Any:
 
     Parameters
     ----------
-    ax
-        Axes, or None.
-    options
-        Of the new axes, as for `add_subplot`.
+    ax : Axes, or None.
+    options : Of the new axes, as for `add_subplot`.
 
     Returns
     -------
-    Axes
-        The axes.
+    The axes.
     """
     if ax is not None:
         return ax
@@ -42,10 +42,8 @@ def save_figure(figure: Any, path: Path) -> None:
 
     Parameters
     ----------
-    figure
-        The figure.
-    path
-        The file.
+    figure : The figure.
+    path : The file.
     """
     if path.suffix != ".png":
         figure.savefig(path, dpi=DPI)
@@ -58,16 +56,15 @@ def save_figure(figure: Any, path: Path) -> None:
 
 
 def singular(scene: Scene) -> bool:
-    """Say whether tractions are known to be infinite somewhere, so that the largest nodal value means nothing.
+    """Say whether tractions are known to be infinite somewhere, so that the largest nodal value
+    means nothing.
 
     Parameters
     ----------
-    scene
-        The scene, with its exact solution if one is known.
+    scene : The scene, with its exact solution if one is known.
 
     Returns
     -------
-    bool
-        True where the exact solution has no largest value.
+    True where the exact solution has no largest value.
     """
     return scene.reference is not None and scene.reference.peak is None

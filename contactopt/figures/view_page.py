@@ -1,10 +1,11 @@
 """The result of a run as one page to explore, made from the files of the run.
 
-The page shows the bodies, which can be turned, enlarged, cut and coloured by stress or displacement; their deformation follows a
-slider. Half and quarter models are shown whole. On the contact surface it shows pressure, traction, gap, slip, and which contacts
-stick, slip or are open. A click on a place shows its values with their units. A load path has a slider over its states and the
-loop of force and displacement. The bodies move with it where the run wrote all of their states, which it does for a page if they are
-small enough (MOST_NUMBERS in contactopt.figures.output).
+The page shows the bodies, which can be turned, enlarged, cut and coloured by stress or
+displacement; their deformation follows a slider. Half and quarter models are shown whole. On the
+contact surface it shows pressure, traction, gap, slip, and which contacts stick, slip or are open.
+A click on a place shows its values with their units. A load path has a slider over its states and
+the loop of force and displacement. The bodies move with it where the run wrote all of their states,
+which it does for a page if they are small enough (MOST_NUMBERS in contactopt.figures.output).
 """
 
 from __future__ import annotations
@@ -25,17 +26,31 @@ from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import check_installed, packed, packed_short, write_html
 from contactopt.figures.output import STATES
-from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, sharp_edges, solids, surface, triangles
+from contactopt.figures.pieces import (
+    mesh_lines,
+    outline,
+    pieces,
+    segments,
+    sharp_edges,
+    solids,
+    surface,
+    triangles,
+)
 from contactopt.readings.resultants import resultant_words
 
 __all__ = ["check_installed", "write_page"]
 SHARE = 0.08  # of the bodies' size that the largest displacement is drawn as, at first
-APART = 1e-3  # a gap above this fraction of the largest displacement: bodies that were apart would seem to overlap if magnified
+# a gap above this fraction of the largest displacement: bodies that were apart would seem to
+# overlap if magnified
+APART = 1e-3
 REACH = 4.0  # sizes of a small contact surface that the first picture of large bodies shows
-TOP = 0.998  # quantile of the von Mises stress where the colours end: singular corners would take them all
-SHARP = np.cos(np.deg2rad(30))  # cosine of the angle between two faces from which on their edge is drawn
+# quantile of the von Mises stress where the colours end: singular corners would take them all
+TOP = 0.998
+# cosine of the angle between two faces from which on their edge is drawn
+SHARP = np.cos(np.deg2rad(30))
 ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
-MOST_INSIDE = 40_000  # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
+# nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
+MOST_INSIDE = 40_000
 WORDS = {
     "approach": "approach of the bodies",
     "contact_half_width": "half-width of the contact",
@@ -48,7 +63,8 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
 
     Parameters
     ----------
-    folder : what `contactopt run` wrote: summary.json, interface.npz, VTU files, and path.npz with history.csv of a load path
+    folder : what `contactopt run` wrote: summary.json, interface.npz, VTU files, and path.npz with
+        history.csv of a load path
     file : where to write the page, ends in .html
 
     Returns
@@ -63,15 +79,21 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
     folder = Path(folder)
     try:
         silent = io.StringIO()
-        with warnings.catch_warnings(action="ignore"), redirect_stderr(silent), redirect_stdout(silent):
+        with (
+            warnings.catch_warnings(action="ignore"),
+            redirect_stderr(silent),
+            redirect_stdout(silent),
+        ):
             summary = json.loads((folder / "summary.json").read_text())
             data = page_data(folder, summary)
             title, body = f"contactopt: {summary['scene']}", _body(summary, data)
             json.dumps(data, allow_nan=False)
-    except (Exception, SystemExit) as error:  # a damaged file breaks its reader in any way; that of meshio exits
+    # a damaged file breaks its reader in any way; that of meshio exits
+    except (Exception, SystemExit) as error:
         how = short(" ".join(str(error).split()) or type(error).__name__, 200).strip("'\"")
         raise InputError(
-            f"'{folder}' is not the folder of a finished run ({how}); make one with: contactopt run SCENE --out {folder}"
+            f"'{folder}' is not the folder of a finished run ({how}); make one with: contactopt run"
+            f" SCENE --out {folder}"
         ) from error
     return write_html(file, title, body, data, ["view.js"])
 
@@ -86,13 +108,18 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     path = _arrays(folder / "path.npz") if (folder / "path.npz").exists() else None
     moving = _arrays(folder / STATES) if path is not None and (folder / STATES).exists() else None
     pairs = {name: meshes[f"contact-{name}"] for name in summary["pairs"]}
-    axes = {"axisymmetric": ["r", "z"], "plane-strain": ["x", "y"]}.get(summary["kind"], ["x", "y", "z"])
+    axes = {"axisymmetric": ["r", "z"], "plane-strain": ["x", "y"]}.get(
+        summary["kind"], ["x", "y", "z"]
+    )
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
     fields = {name: _body_values(name, mesh, len(axes), moving) for name, mesh in bodies.items()}
     box = _whole(_box([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
     near = _near_contact(_whole(_box([mesh.points for mesh in pairs.values()]), mirrors), box)
     largest = max((float(np.abs(values["move"]).max()) for values in fields.values()), default=0.0)
-    apart = max(float(mesh.point_data["contact_gap"].max()) for mesh in pairs.values()) > APART * largest
+    apart = (
+        max(float(mesh.point_data["contact_gap"].max()) for mesh in pairs.values())
+        > APART * largest
+    )
     reach = float(np.ptp(near, axis=0).max())
     visible = _round(SHARE * reach / largest) if largest > 0 else 1.0
     inside = len(axes) == 3 and sum(len(mesh.points) for mesh in bodies.values()) <= MOST_INSIDE
@@ -114,7 +141,10 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "scale": 1.0 if apart else max(1.0, visible),
         "most_scale": 2.0 * max(1.0, visible),
         "top": float(np.quantile(np.concatenate(stresses), TOP)) if stresses else 1.0,
-        "bodies": [{"name": name} | _body_arrays(mesh, fields[name], mirrors, inside) for name, mesh in bodies.items()],
+        "bodies": [
+            {"name": name} | _body_arrays(mesh, fields[name], mirrors, inside)
+            for name, mesh in bodies.items()
+        ],
         "contacts": contacts,
         "states": 1 if path is None else len(path["reactions"]),
         "moving": moving is not None,
@@ -123,7 +153,10 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of a file by name. NumPy leaves a damaged file open that it was given by its path."""
+    """The arrays of a file by name.
+
+    NumPy leaves a damaged file open that it was given by its path.
+    """
     with path.open("rb") as file:
         return dict(np.load(file))
 
@@ -144,7 +177,9 @@ def _whole(box: np.ndarray, mirrors: list[list[Any]]) -> np.ndarray:
 
 
 def _near_contact(contact: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """The box (2, 3) of the first picture: that of all bodies, or about the contact if it is small on them."""
+    """The box (2, 3) of the first picture: that of all bodies, or about the contact if it is small
+    on them.
+    """
     half = REACH * float(np.ptp(contact, axis=0).max()) / 2
     if half <= 0 or half > float(np.ptp(box, axis=0).max()) / 4:
         return box
@@ -158,25 +193,40 @@ def _round(value: float) -> float:
     return float(power * max(m for m in (1, 2, 5) if m * power <= value * (1 + 1e-12)))
 
 
-def _body_values(name: str, mesh: Any, dim: int, moving: dict[str, np.ndarray] | None) -> dict[str, np.ndarray]:
-    """Displacement `move` (s, n, dim), von Mises stress (s, n) and stresses (1, n) of a body, at the last or at all s states."""
+def _body_values(
+    name: str, mesh: Any, dim: int, moving: dict[str, np.ndarray] | None
+) -> dict[str, np.ndarray]:
+    """Displacement `move` (s, n, dim), von Mises stress (s, n) and stresses (1, n) of a body, at
+    the last or at all s states.
+    """
     data = mesh.point_data
-    values = {key: data[key][None] for key in data if key == "von_mises" or key.startswith("stress_")}
+    values = {
+        key: data[key][None] for key in data if key == "von_mises" or key.startswith("stress_")
+    }
     if moving is None:
         return {"move": data["displacement"][None, :, :dim]} | values
-    return values | {"move": moving[f"displacement/{name}"], "von_mises": moving[f"von_mises/{name}"]}
+    return values | {
+        "move": moving[f"displacement/{name}"],
+        "von_mises": moving[f"von_mises/{name}"],
+    }
 
 
-def _body_arrays(mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool) -> dict[str, Any]:
-    """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values at their nodes.
+def _body_arrays(
+    mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool
+) -> dict[str, Any]:
+    """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values
+    at their nodes.
 
-    What lies in a plane of symmetry is apart, because it belongs to no surface and no edge of the whole body.
+    What lies in a plane of symmetry is apart, because it belongs to no surface and no edge of the
+    whole body.
     """
     (block,) = mesh.cells
     kind, faces = surface(block.type, block.data, mesh.points)
     sharp = outline(kind, faces) if block.dim == 2 else sharp_edges(kind, faces, mesh.points, SHARP)
     drawn = {"lines": segments(mesh_lines(kind, faces))}
-    drawn["cells"], drawn["cut_cells"] = _apart(triangles(pieces(kind, faces)), mesh.points, mirrors)
+    drawn["cells"], drawn["cut_cells"] = _apart(
+        triangles(pieces(kind, faces)), mesh.points, mirrors
+    )
     drawn["edges"], drawn["cut_edges"] = _apart(segments(sharp), mesh.points, mirrors)
     drawn["inside"] = solids(block.type, block.data) if inside else np.zeros((0, 4), dtype=int)
     nodes = np.arange(len(mesh.points)) if inside else np.unique(faces)
@@ -184,7 +234,9 @@ def _body_arrays(mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[An
     place[nodes] = np.arange(len(nodes))
     return {
         "points": packed(mesh.points[nodes]),
-        "values": {name: _packed(value[:, nodes]) for name, value in values.items() if name != "move"},
+        "values": {
+            name: _packed(value[:, nodes]) for name, value in values.items() if name != "move"
+        },
         "move": _packed(values["move"][:, nodes]),
         **{name: packed(place[numbers]) for name, numbers in drawn.items()},
     }
@@ -195,7 +247,9 @@ def _packed(values: np.ndarray) -> dict[str, Any]:
     return packed(values) if len(values) == 1 else packed_short(values)
 
 
-def _apart(items: np.ndarray, points: np.ndarray, mirrors: list[list[Any]]) -> tuple[np.ndarray, np.ndarray]:
+def _apart(
+    items: np.ndarray, points: np.ndarray, mirrors: list[list[Any]]
+) -> tuple[np.ndarray, np.ndarray]:
     """The items (m, c) of nodes outside all planes of symmetry, and those within one."""
     size = float(np.ptp(points, axis=0).max())
     within = np.zeros(len(items), dtype=bool)
@@ -207,7 +261,9 @@ def _apart(items: np.ndarray, points: np.ndarray, mirrors: list[list[Any]]) -> t
 def _motion(
     bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
 ) -> np.ndarray:
-    """Displacements (s, k, dim) of places (k, 3): those of the nearest node of a body, none without bodies."""
+    """Displacements (s, k, dim) of places (k, 3): those of the nearest node of a body, none without
+    bodies.
+    """
     if not bodies:
         return np.zeros((1, len(points), dim))
     nearest = KDTree(np.concatenate([mesh.points for mesh in bodies.values()])).query(points)[1]
@@ -215,14 +271,20 @@ def _motion(
 
 
 def _contact(
-    mesh: Any, move: np.ndarray, interface: dict[str, np.ndarray], path: dict[str, np.ndarray] | None, own: slice
+    mesh: Any,
+    move: np.ndarray,
+    interface: dict[str, np.ndarray],
+    path: dict[str, np.ndarray] | None,
+    own: slice,
 ) -> dict[str, Any]:
     """One pair of surfaces: places, displacements (s, k, dim), and values of every state."""
     (block,) = mesh.cells
     return {
         "points": packed(mesh.points),
         "move": _packed(move),
-        "cells": packed(triangles(block.data) if block.type != "line" else np.zeros((0, 3), dtype=int)),
+        "cells": packed(
+            triangles(block.data) if block.type != "line" else np.zeros((0, 3), dtype=int)
+        ),
         "place": packed(interface["x"][own].T),
         "states": {
             name: packed(np.nan_to_num(value))
@@ -249,7 +311,9 @@ def _last_state(mesh: Any, interface: dict[str, np.ndarray], own: slice) -> dict
 
 
 def _contact_states(path: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
-    """As _last_state, for the n states of a load path (n, k); the slip is that since the state before."""
+    """As _last_state, for the n states of a load path (n, k); the slip is that since the state
+    before.
+    """
     areas, r, u = path["areas"][own], path["reactions"][:, own], path["displacements"][:, own]
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
     vector = np.einsum("kad,ska->skd", path["frames"][own], r) * share[:, None]
@@ -276,25 +340,36 @@ def certificate_words(summary: dict[str, Any]) -> str:
     """What the certificate says, for people who meet it for the first time."""
     residual = summary["residual"]
     if summary["status"] == "infeasible":
-        return "No forces solve this problem: a proof of that was found. What is shown is the last iterate."
+        return (
+            "No forces solve this problem: a proof of that was found. What is shown is the last"
+            " iterate."
+        )
     size = "" if residual is None or not np.isfinite(residual) else f"{residual:.1e}"
     said = (
-        f"The certificate is {size}. It was recomputed from the problem alone, and says how well the forces fulfil the laws of "
-        "contact and friction: penetration, tension, friction beyond its bound and the direction of slip are each at most about "
-        "this fraction of a typical force or length of the problem."
+        f"The certificate is {size}. It was recomputed from the problem alone, and says how well"
+        " the forces fulfil the laws of contact and friction: penetration, tension, friction"
+        " beyond its bound and the direction of slip are each at most about this fraction of a"
+        " typical force or length of the problem."
     )
     if summary["status"] == "solved":
         return f"These forces are a solution. {said}"
-    return f"This is not a solution, only the last iterate ({summary.get('message') or summary['status']}). {said}"
+    return (
+        "This is not a solution, only the last iterate"
+        f" ({summary.get('message') or summary['status']}). {said}"
+    )
 
 
 def _followers(data: dict[str, Any]) -> str:
     """Which parts of the page follow the slider over the states."""
     if data["moving"] or not data["bodies"]:
-        return "The page follows the slider; single stresses inside the bodies are those of the last state. The slip is that since the state before."
+        return (
+            "The page follows the slider; single stresses inside the bodies are those of the last"
+            " state. The slip is that since the state before."
+        )
     return (
-        "The contact follows the slider: pressure, traction, status, gap, slip since the state before, and arrows. The bodies are "
-        "those of the last state: the run kept no others, because it made no page, or because they are too large for one."
+        "The contact follows the slider: pressure, traction, status, gap, slip since the state"
+        " before, and arrows. The bodies are those of the last state: the run kept no others,"
+        " because it made no page, or because they are too large for one."
     )
 
 
@@ -312,17 +387,30 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
     }
     for name, force in resultant_words(summary).items():
         rows[f"force on the upper body of {name}"] = f"{force} {stress} {length}^2"
-    rows |= {words: f"{summary[key]:.5g} {length}" for key, words in WORDS.items() if summary.get(key) is not None}
+    rows |= {
+        words: f"{summary[key]:.5g} {length}"
+        for key, words in WORDS.items()
+        if summary.get(key) is not None
+    }
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
-        rows[f"accuracy of the {found['quantity']}"] = f"{error}, asked for {found['target']:g}: {found['message']}"
-        rows["unknowns of the meshes"] = ", ".join(str(level["unknowns"]) for level in found["levels"])
+        rows[f"accuracy of the {found['quantity']}"] = (
+            f"{error}, asked for {found['target']:g}: {found['message']}"
+        )
+        rows["unknowns of the meshes"] = ", ".join(
+            str(level["unknowns"]) for level in found["levels"]
+        )
     cells = "".join(
         f'<tr><th scope="row">{html.escape(str(name))}</th><td>{html.escape(str(value))}</td></tr>'
         for name, value in rows.items()
     )
-    remarks = "".join(f"<p><strong>{html.escape(text)}</strong></p>" for text in summary.get("remarks", ()))
-    turn = "Use the mouse, a finger, the buttons, or the arrow keys and + and - when the picture has the focus."
+    remarks = "".join(
+        f"<p><strong>{html.escape(text)}</strong></p>" for text in summary.get("remarks", ())
+    )
+    turn = (
+        "Use the mouse, a finger, the buttons, or the arrow keys and + and - when the picture has"
+        " the focus."
+    )
     what = "move" if data["dim"] == 2 else "turn"
     buttons = "".join(
         f'<button id="{name}" type="button" aria-label="{words}">{sign}</button>'

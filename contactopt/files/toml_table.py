@@ -1,4 +1,6 @@
-"""Tables of a TOML file that know where they stand, so that every message about them names the line."""
+"""Tables of a TOML file that know where they stand, so that every message about them names the
+line.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ Place = tuple[str | int, ...]
 
 
 class Table:
-    """A table of the file. Each entry is taken once, by name and type; close() then refuses those that are left.
+    """A table of the file.
+
+    Each entry is taken once, by name and type; close() then refuses those that are left.
 
     file   name of the file, for messages
     lines  place of every entry -> line
@@ -39,15 +43,12 @@ class Table:
 
         Parameters
         ----------
-        message
-            One sentence.
-        *below
-            The place of the entry below this table.
+        message : One sentence.
+        *below : The place of the entry below this table.
 
         Returns
         -------
-        InputError
-            The sentence after the name of the file and the line.
+        The sentence after the name of the file and the line.
         """
         place: Place = (*self.place, *below)
         while place and place not in self.lines:
@@ -89,25 +90,25 @@ class Table:
         return key in self.data
 
     def take(
-        self, key: str, kind: type | tuple[type, ...], what: str, default: Any = None, needed: bool = False
+        self,
+        key: str,
+        kind: type | tuple[type, ...],
+        what: str,
+        default: Any = None,
+        needed: bool = False,
     ) -> Any:
         """Take an entry, which must be of one type.
 
         Parameters
         ----------
-        key
-            The name of the entry.
-        kind, what
-            Its type, and how a message names that.
-        default
-            What is returned where there is no entry.
-        needed
-            Whether that is an error instead.
+        key : The name of the entry.
+        kind, what : Its type, and how a message names that.
+        default : What is returned where there is no entry.
+        needed : Whether that is an error instead.
 
         Returns
         -------
-        object
-            The value.
+        The value.
         """
         if not self.has(key):
             if needed:
@@ -123,30 +124,27 @@ class Table:
 
         Parameters
         ----------
-        key, default, needed
-            As for `take`.
+        key, default, needed : As for `take`.
 
         Returns
         -------
-        str or None
-            The text.
+        The text.
         """
         return self.take(key, str, "a text in quotation marks", default, needed)
 
-    def number(self, key: str, default: float | None = None, needed: bool = False, **limits: Any) -> Any:
+    def number(
+        self, key: str, default: float | None = None, needed: bool = False, **limits: Any
+    ) -> Any:
         """Take a finite number.
 
         Parameters
         ----------
-        key, default, needed
-            As for `take`.
-        **limits
-            As for contactopt.checks.check_number.
+        key, default, needed : As for `take`.
+        **limits : As for contactopt.checks.check_number.
 
         Returns
         -------
-        float, int or None
-            The number.
+        The number.
         """
         value = self.take(key, (int, float), "a number", default, needed)
         if key in self.data:
@@ -180,13 +178,11 @@ class Table:
 
         Parameters
         ----------
-        key
-            The name of the entry.
+        key : The name of the entry.
 
         Returns
         -------
-        Table or None
-            None if there is no such entry.
+        None if there is no such entry.
         """
         data = self.take(key, dict, "a table, { name = value, ... }")
         return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
@@ -206,9 +202,15 @@ class Table:
         for i, data in enumerate(found):
             if not isinstance(data, dict):
                 raise self.fail(
-                    f"every entry of {key!r} must be a table, {{ name = value, ... }}; got {short(data)}.", key, i
+                    f"every entry of {key!r} must be a table, {{ name = value, ... }}; got"
+                    f" {short(data)}.",
+                    key,
+                    i,
                 )
-        return [Table(self.file, self.lines, data, (*self.place, key, i)) for i, data in enumerate(found)]
+        return [
+            Table(self.file, self.lines, data, (*self.place, key, i))
+            for i, data in enumerate(found)
+        ]
 
     def close(self) -> None:
         """Refuse entries that nothing has asked for."""
@@ -227,26 +229,25 @@ def read_table(path: Path, what: str = "scene file") -> Table:
 
     Parameters
     ----------
-    path
-        The file.
-    what
-        What it is, in the words of a message.
+    path : The file.
+    what : What it is, in the words of a message.
 
     Returns
     -------
-    Table
-        Its table, in which every entry knows its line.
+    Its table, in which every entry knows its line.
 
     Raises
     ------
-    InputError
-        If there is no such file, if it is too long, or, with the line, if it is not TOML.
+    InputError : If there is no such file, if it is too long, or, with the line, if it is not TOML.
     """
     if not os.path.isfile(path):  # unlike Path.is_file, it answers for names that no file can have
         why = "does not exist" if not os.path.exists(path) else "is no file that can be read"
         raise InputError(f"{what} '{path}' {'is a folder' if os.path.isdir(path) else why}.")
     if path.stat().st_size > MOST_BYTES:
-        raise InputError(f"{what} '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their own.")
+        raise InputError(
+            f"{what} '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their"
+            " own."
+        )
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")
         return Table(path.name, lines_of(text) if tomllib.loads(text) else {}, tomllib.loads(text))
@@ -266,13 +267,11 @@ def lines_of(text: str) -> dict[Place, int]:
 
     Parameters
     ----------
-    text
-        A valid text.
+    text : A valid text.
 
     Returns
     -------
-    dict
-        For the place of every entry its line, from 1.
+    For the place of every entry its line, from 1.
     """
     tokens, line = [], 1
     for match in TOKEN.finditer(text):
@@ -317,7 +316,9 @@ class _Lines:
         while self.tokens[self.at][1] != "mark":
             token, kind, _ = self.tokens[self.at]
             parts += (
-                [tomllib.loads(f"x = {token}")["x"]] if kind == "text" else [part for part in token.split(".") if part]
+                [tomllib.loads(f"x = {token}")["x"]]
+                if kind == "text"
+                else [part for part in token.split(".") if part]
             )
             self.at += 1
         return parts

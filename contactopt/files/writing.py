@@ -1,4 +1,5 @@
-"""Files that appear complete or not at all, and one sentence for the user where they cannot be written.
+"""Files that appear complete or not at all, and one sentence for the user where they cannot be
+written.
 
 Also pipes to other processes, which may be dead when one writes to them.
 """
@@ -30,13 +31,11 @@ def check_folder(out: Path) -> None:
 
     Parameters
     ----------
-    out
-        The folder.
+    out : The folder.
 
     Raises
     ------
-    InputError
-        If the folder cannot be made or written to.
+    InputError : If the folder cannot be made or written to.
     """
     existing = out
     try:
@@ -52,27 +51,24 @@ def check_folder(out: Path) -> None:
 
 @contextmanager
 def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
-    """Give an empty folder to write files into, which move to the folder `out` together when the block ends without an
+    """Give an empty folder to write files into, which move to the folder `out` together when the
+    block ends without an
     error.
 
     After an error `out` holds what it held before, and a folder that was made for it is gone.
 
     Parameters
     ----------
-    out
-        The folder where the files shall be in the end. It is made if it does not exist.
-    stale
-        Names of files that are removed from `out` unless the block wrote them anew.
+    out : The folder where the files shall be in the end. It is made if it does not exist.
+    stale : Names of files that are removed from `out` unless the block wrote them anew.
 
     Yields
     ------
-    Path
-        The empty folder, inside `out`.
+    The empty folder, inside `out`.
 
     Raises
     ------
-    InputError
-        Where the operating system refuses to write.
+    InputError : Where the operating system refuses to write.
     """
     out = Path(out)
     made: list[Path] = []
@@ -96,18 +92,16 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
     Parameters
     ----------
-    path
-        Where the file shall be in the end.
+    path : Where the file shall be in the end.
 
     Yields
     ------
-    Path
-        The path to write to. It has the name of `path`, from whose ending many writers take their format.
+    The path to write to. It has the name of `path`, from whose ending many writers take their
+    format.
 
     Raises
     ------
-    InputError
-        Where the operating system refuses to write.
+    InputError : Where the operating system refuses to write.
     """
     path = Path(path)
     with whole_folder(path.parent) as staging:
@@ -115,18 +109,17 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` fill a temporary file in a hidden folder beside `path`, then give it the name `path`.
+    """Let `write` fill a temporary file in a hidden folder beside `path`, then give it the name
+    `path`.
 
-    A symbolic link at `path` is replaced, not followed. When writing fails, the error goes on and nothing is left
-    behind.
+    A symbolic link at `path` is replaced, not followed. When writing fails, the error goes on and
+    nothing is left behind.
 
     Parameters
     ----------
-    path
-        Where the file shall be in the end. Its folder is made if it does not exist.
-    write
-        A function of a path that writes the file there. The path has the ending of `path`, from which many writers take
-        their format.
+    path : Where the file shall be in the end. Its folder is made if it does not exist.
+    write : A function of a path that writes the file there. The path has the ending of `path`, from
+        which many writers take their format.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with _staging(path.parent) as staging:
@@ -136,17 +129,24 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def _staging(folder: Path) -> Iterator[Path]:
-    """A hidden folder for files to come, locked while it is in use. Those of programs that were killed are removed."""
+    """A hidden folder for files to come, locked while it is in use.
+
+    Those of programs that were killed are removed.
+    """
     for old in folder.glob(".contactopt-*"):
         with suppress(OSError), _locked(old, fresh=FRESH):
             shutil.rmtree(old)
-    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=folder) as staging, _locked(Path(staging)):
+    with (
+        tempfile.TemporaryDirectory(prefix=".contactopt-", dir=folder) as staging,
+        _locked(Path(staging)),
+    ):
         yield Path(staging)
 
 
 @contextmanager
 def _locked(folder: Path, fresh: float = -1.0) -> Iterator[None]:
-    """Lock a folder; OSError if another program has it, or if it is so fresh [s] that its maker may not have locked it yet.
+    """Lock a folder; OSError if another program has it, or if it is so fresh [s] that its maker may
+    not have locked it yet.
 
     Without locks of files, as on Windows, nothing is locked, and no folder counts as old.
     """
@@ -166,11 +166,15 @@ def _locked(folder: Path, fresh: float = -1.0) -> Iterator[None]:
 
 
 def _unwritable(out: Path, error: OSError) -> InputError:
-    return InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.")
+    return InputError(
+        f"cannot write into '{out}': {error.strerror or error}; choose another output directory."
+    )
 
 
 def _make_folder(folder: Path) -> list[Path]:
-    """Make the folder and those above it; the ones that were missing, innermost first, for remove_empty."""
+    """Make the folder and those above it; the ones that were missing, innermost first, for
+    remove_empty.
+    """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
@@ -186,19 +190,17 @@ def _remove_empty(folders: Iterable[Path]) -> None:
 def remove_files(folder: Path, names: Iterable[str]) -> None:
     """Remove the files of these names from a folder. All other files stay.
 
-    A symbolic link is removed itself, and what it leads to stays. Names of files that do not exist are passed over.
+    A symbolic link is removed itself, and what it leads to stays. Names of files that do not exist
+    are passed over.
 
     Parameters
     ----------
-    folder
-        The folder.
-    names
-        The names of the files, without any folder.
+    folder : The folder.
+    names : The names of the files, without any folder.
 
     Raises
     ------
-    InputError
-        On a name that could lead to another folder.
+    InputError : On a name that could lead to another folder.
     """
     for name in names:
         check_name("the file", name)
@@ -208,14 +210,15 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def broken_pipe_is_an_error() -> Iterator[None]:
-    """Let writing to a dead process raise an exception, as Python has it, also where a library changed that.
+    """Let writing to a dead process raise an exception, as Python has it, also where a library
+    changed that.
 
-    Gmsh, for one, sets the signal of a broken pipe back to its default, which ends the whole process without a word.
+    Gmsh, for one, sets the signal of a broken pipe back to its default, which ends the whole
+    process without a word.
 
     Returns
     -------
-    context manager
-        Within it, a broken pipe raises BrokenPipeError.
+    Within it, a broken pipe raises BrokenPipeError.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield

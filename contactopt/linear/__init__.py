@@ -1,1 +1,3 @@
-"""Linear algebra that knows no mechanics: operators known by their products, convolutions, stacked vectors, threads."""
+"""Linear algebra that knows no mechanics: operators known by their products, convolutions, stacked
+vectors, threads.
+"""

@@ -1,4 +1,6 @@
-"""The one place where threads share work: bodies beside each other, and the pieces of one large product."""
+"""The one place where threads share work: bodies beside each other, and the pieces of one large
+product.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +25,14 @@ def each(
 
     Parameters
     ----------
-    act
-        The function of an item.
-    items
-        The items.
-    parallel
-        A mark for every item: those marked are worked on at the same time, each in its own thread. By default all are.
+    act : The function of an item.
+    items : The items.
+    parallel : A mark for every item: those marked are worked on at the same time, each in its own
+        thread. By default all are.
 
     Returns
     -------
-    tuple
-        What the function returned, in the order of the items.
+    What the function returned, in the order of the items.
     """
     listed = list(items)
     marked = [True] * len(listed) if parallel is None else list(parallel)
@@ -42,11 +41,16 @@ def each(
     with ThreadPoolExecutor(sum(marked)) as pool:
         running = [pool.submit(act, item) if mark else None for item, mark in zip(listed, marked)]
         here = [act(item) if future is None else None for item, future in zip(listed, running)]
-        return tuple(done if future is None else future.result() for future, done in zip(running, here))  # type: ignore[misc]
+        for place, future in enumerate(running):
+            if future is not None:
+                here[place] = future.result()
+        return tuple(here)  # type: ignore[arg-type]
 
 
 class Crew:
-    """Threads that help with pieces of one caller's work, one for each core but the caller's own. They sleep in between.
+    """Threads that help with pieces of one caller's work, one for each core but the caller's own.
+
+    They sleep in between.
 
     The threads start with the first piece and end with the object. A forked process makes its own.
     """
@@ -57,7 +61,9 @@ class Crew:
         self._process = os.getpid()
 
     def each(self, acts: Sequence[Callable[[], None]]) -> None:
-        """Do all of them, in any order. Whoever is free takes the next one, so that a busy machine costs no waiting.
+        """Do all of them, in any order.
+
+        Whoever is free takes the next one, so that a busy machine costs no waiting.
 
         Parameters
         ----------
@@ -74,7 +80,10 @@ class Crew:
                 act()
 
         if self._pool is None or self._process != os.getpid():
-            self._process, self._pool = os.getpid(), ThreadPoolExecutor(max(self.size - 1, 1), "crew")
+            self._process, self._pool = (
+                os.getpid(),
+                ThreadPoolExecutor(max(self.size - 1, 1), "crew"),
+            )
         helping = [self._pool.submit(work) for _ in range(min(self.size, len(acts)) - 1)]
         work()
         for future in helping:

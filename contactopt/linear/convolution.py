@@ -1,12 +1,15 @@
-"""Interface operators that are convolutions over a regular grid of contacts, with products by fast Fourier transforms.
+"""Interface operators that are convolutions over a regular grid of contacts, with products by fast
+Fourier transforms.
 
-The displacement of a contact then depends on the forces through the distances between contacts alone, as on a half-space:
+The displacement of a contact then depends on the forces through the distances between contacts
+alone, as on a half-space:
 
     u_a(x) = sum_b sum_y K_ab(x - y) r_b(y),        a, b the components n, t1[, t2],
 
-where t1 lies along the first axis of the grid and t2 along the second. K_ab is even in the distance along an axis, or odd if
-exactly one of a and b lies along it. On a grid that does not repeat itself the forces are padded by zeros to at least twice
-its size. Only the Fourier transforms of K are kept: real numbers times 1 or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
+where t1 lies along the first axis of the grid and t2 along the second. K_ab is even in the distance
+along an axis, or odd if exactly one of a and b lies along it. On a grid that does not repeat itself
+the forces are padded by zeros to at least twice its size. Only the Fourier transforms of K are
+kept: real numbers times 1 or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
 """
 
 from __future__ import annotations
@@ -31,21 +34,22 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
     """Choose the size of the padded grid on which a convolution is transformed.
 
-    Each of its sizes is twice a number that is at least that of the contacts and easy to halve and to transform.
+    Each of its sizes is twice a number that is at least that of the contacts and easy to halve and
+    to transform.
 
     Parameters
     ----------
-    grid
-        Number of contacts along each of the one or two axes.
+    grid : Number of contacts along each of the one or two axes.
 
     Returns
     -------
-    tuple
-        Number of points M along each axis.
+    Number of points M along each axis.
     """
     from scipy.fft import next_fast_len
 
-    return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
+    return tuple(
+        2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid
+    )
 
 
 def _odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
@@ -57,10 +61,13 @@ def _odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
 class Kernel:
     """The kernel K of a convolution by its Fourier transform.
 
-    grid      number of contacts along each axis of the grid; contacts are numbered as in C arrays of that shape
-    padded    number of points along each axis of the transform; the grid's own where it repeats itself periodically
-    symbols   for each pair of components (a, b), a <= b, the transform (M0, M1 / 2 + 1) over 1 or, where K_ab is odd along one
-              axis, over i [length / force]; pairs that are left out are zero
+    grid      number of contacts along each axis of the grid; contacts are numbered as in C arrays
+              of that shape
+    padded    number of points along each axis of the transform; the grid's own where it repeats
+              itself periodically
+    symbols   for each pair of components (a, b), a <= b, the transform (M0, M1 / 2 + 1) over 1 or,
+              where K_ab is odd along one axis, over i [length / force]; pairs that are left out are
+              zero
     """
 
     grid: tuple[int, ...]
@@ -73,16 +80,13 @@ class Kernel:
 
         Parameters
         ----------
-        grid
-            Number of contacts along each axis.
-        coefficients
-            For each pair of components (a, b) with a <= b the coefficients K_ab at distances 0 to M / 2 along each
-            axis, with M as `embedding` gives it [length / force].
+        grid : Number of contacts along each axis.
+        coefficients : For each pair of components (a, b) with a <= b the coefficients K_ab at
+            distances 0 to M / 2 along each axis, with M as `embedding` gives it [length / force].
 
         Returns
         -------
-        Kernel
-            The kernel.
+        The kernel.
         """
         from scipy.fft import rfftn
 
@@ -97,7 +101,9 @@ class Kernel:
                     whole, mirrored = np.moveaxis(middle, 0, axis), -mirrored
                 whole = np.concatenate([whole, mirrored], axis)
             transform = rfftn(whole)
-            symbols[a, b] = np.ascontiguousarray(transform.imag if sum(odd) == 1 else transform.real)
+            symbols[a, b] = np.ascontiguousarray(
+                transform.imag if sum(odd) == 1 else transform.real
+            )
         return cls(grid, padded, symbols)
 
     @property
@@ -105,16 +111,27 @@ class Kernel:
         return len(self.grid) + 1
 
     def __add__(self, other: Kernel) -> Kernel:
-        """The sum of two kernels on the same grid; pairs of components that cancel but for rounding are left out."""
+        """The sum of two kernels on the same grid; pairs of components that cancel but for rounding
+        are left out.
+        """
         symbols = dict(self.symbols)
         for pair, symbol in other.symbols.items():
             symbols[pair] = symbols[pair] + symbol if pair in symbols else symbol
-        largest = max(float(np.abs(symbol).max()) for symbol in (*self.symbols.values(), *other.symbols.values()))
-        kept = {pair: symbol for pair, symbol in symbols.items() if np.abs(symbol).max() > 1e-14 * largest}
+        largest = max(
+            float(np.abs(symbol).max())
+            for symbol in (*self.symbols.values(), *other.symbols.values())
+        )
+        kept = {
+            pair: symbol
+            for pair, symbol in symbols.items()
+            if np.abs(symbol).max() > 1e-14 * largest
+        }
         return Kernel(self.grid, self.padded, kept)
 
     def scaled(self, factor: float) -> Kernel:
-        return Kernel(self.grid, self.padded, {pair: factor * symbol for pair, symbol in self.symbols.items()})
+        return Kernel(
+            self.grid, self.padded, {pair: factor * symbol for pair, symbol in self.symbols.items()}
+        )
 
     @cached_property
     def diagonal(self) -> np.ndarray:
@@ -134,7 +151,9 @@ class Kernel:
 
     @property
     def halves(self) -> bool:
-        """Whether there is a grid of half as many contacts along each axis for which `coarse` works."""
+        """Whether there is a grid of half as many contacts along each axis for which `coarse`
+        works.
+        """
         doubled = all(m % 4 == 0 and m >= 2 * n for m, n in zip(self.padded, self.grid))
         periodic = all(m == n and n % 4 == 0 for m, n in zip(self.padded, self.grid))
         return doubled or periodic
@@ -143,13 +162,12 @@ class Kernel:
         """Make the kernel between pairs (in 2D) or squares of four contacts.
 
         A force is spread evenly over them, and displacements are means. Along each axis
-        K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum over
-        the two frequencies that fall on one.
+        K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by
+        the sum over the two frequencies that fall on one.
 
         Returns
         -------
-        Kernel
-            The kernel on the grid of half as many contacts along each axis.
+        The kernel on the grid of half as many contacts along each axis.
         """
         symbols = {}
         for pair, symbol in self.symbols.items():
@@ -170,28 +188,28 @@ class Kernel:
         halved = tuple(m // 2 for m in self.padded)
         return Kernel(tuple(-(-n // 2) for n in self.grid), halved, symbols)
 
-    def act(self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False) -> np.ndarray:
+    def act(
+        self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False
+    ) -> np.ndarray:
         """Compute displacements under forces.
 
         Parameters
         ----------
-        x
-            (columns, n0[, n1]) forces on the grid [force].
-        rows, columns
-            The components of the displacements and of the forces.
-        single
-            Whether single precision is enough.
+        x : (columns, n0[, n1]) forces on the grid [force].
+        rows, columns : The components of the displacements and of the forces.
+        single : Whether single precision is enough.
 
         Returns
         -------
-        ndarray
-            (rows, n0[, n1]) displacements [length].
+        (rows, n0[, n1]) displacements [length].
         """
         symbols = self.single if single else self.symbols
         spectra = {}
         for b, part in zip(columns, x):
             if np.any(part):
-                spectra[b] = forward(part.astype(np.float32 if single else np.float64, copy=False), self.padded)
+                spectra[b] = forward(
+                    part.astype(np.float32 if single else np.float64, copy=False), self.padded
+                )
         out = np.zeros((len(rows), *self.grid), np.float32 if single else np.float64)
         for place, a in enumerate(rows):
             total: Any = None
@@ -212,13 +230,11 @@ class Kernel:
 
         Returns
         -------
-        ndarray
-            (k dim, k dim) [length / force].
+        (k dim, k dim) [length / force].
 
         Raises
         ------
-        InputError
-            If it would be too large.
+        InputError : If it would be too large.
         """
         k, dim = int(np.prod(self.grid)), self.dim
         check_dense(k * dim)
@@ -243,15 +259,12 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
 
     Parameters
     ----------
-    x
-        (n0[, n1]) real values, in single or double precision.
-    padded
-        Sizes (M0[, M1]) of the padded grid.
+    x : (n0[, n1]) real values, in single or double precision.
+    padded : Sizes (M0[, M1]) of the padded grid.
 
     Returns
     -------
-    ndarray
-        The transform, (M0 / 2 + 1,) in 2D and (M0, M1 / 2 + 1) in 3D, in the precision of x.
+    The transform, (M0 / 2 + 1,) in 2D and (M0, M1 / 2 + 1) in 3D, in the precision of x.
     """
     from scipy.fft import fft, rfft
 
@@ -267,17 +280,13 @@ def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...
 
     Parameters
     ----------
-    spectrum
-        The transform as `forward` gives it. It is overwritten.
-    padded
-        Sizes (M0[, M1]) of the padded grid.
-    grid
-        Number of contacts along each axis.
+    spectrum : The transform as `forward` gives it. It is overwritten.
+    padded : Sizes (M0[, M1]) of the padded grid.
+    grid : Number of contacts along each axis.
 
     Returns
     -------
-    ndarray
-        (n0[, n1]) real values.
+    (n0[, n1]) real values.
     """
     from scipy.fft import ifft, irfft
 
@@ -297,9 +306,13 @@ def _workers_for(padded: tuple[int, ...]) -> int:
 
 
 class Convolution(InterfaceOperator):
-    """The interface operator of a kernel, in double precision, or in single precision where that is accurate enough."""
+    """The interface operator of a kernel, in double precision, or in single precision where that is
+    accurate enough.
+    """
 
-    def __init__(self, kernel: Kernel, accuracy: float | None = None, counter: Counter | None = None):
+    def __init__(
+        self, kernel: Kernel, accuracy: float | None = None, counter: Counter | None = None
+    ):
         self.kernel = kernel
         diagonal = np.tile(kernel.diagonal, int(np.prod(kernel.grid)))
         super().__init__(self._product, diagonal, kernel.entries, accuracy, counter=counter)
@@ -314,7 +327,9 @@ class Convolution(InterfaceOperator):
             out[:, column] = np.moveaxis(moved, 0, -1).ravel()
         return out
 
-    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
+    def scaled(
+        self, factor: float, added: np.ndarray, counter: Counter | None = None
+    ) -> InterfaceOperator:
         if np.any(added):
             return super().scaled(factor, added, counter)
         return Convolution(self.kernel.scaled(factor), self.accuracy, counter)

@@ -6,8 +6,9 @@ from __future__ import annotations
 class Counter:
     """Counts products with Q, or applications of a preconditioner.
 
-    An operator and the operators made from it, such as its normal block or one with less accurate products, are handed the
-    same counter. The work that a solve costs is then known wherever it was asked for.
+    An operator and the operators made from it, such as its normal block or one with less accurate
+    products, are handed the same counter. The work that a solve costs is then known wherever it was
+    asked for.
     """
 
     def __init__(self) -> None:
@@ -23,7 +24,6 @@ class Counter:
 
         Parameters
         ----------
-        number
-            How many.
+        number : How many.
         """
         self._total += number

@@ -1,7 +1,9 @@
-"""The moment at which the step of a method that runs must give up, for inner iterations of thousands of steps.
+"""The moment at which the step of a method that runs must give up, for inner iterations of
+thousands of steps.
 
-The driver looks at its clock after each outer iteration. An inner loop that can last longer than a user's patience calls
-`check_time`, which ends the step; the solve then ends with status `time_limit` and the last outer iterate.
+The driver looks at its clock after each outer iteration. An inner loop that can last longer than a
+user's patience calls `check_time`, which ends the step; the solve then ends with status
+`time_limit` and the last outer iterate.
 """
 
 from __future__ import annotations
@@ -29,8 +31,7 @@ def time_left() -> float:
 
     Returns
     -------
-    float
-        Seconds until its time limit, at least 0; infinite without a limit.
+    Seconds until its time limit, at least 0; infinite without a limit.
     """
     return max(_deadline.get() - time.perf_counter(), 0.0)
 
@@ -41,13 +42,11 @@ def until(moment: float) -> Iterator[None]:
 
     Parameters
     ----------
-    moment
-        The deadline, a value of time.perf_counter() [s].
+    moment : The deadline, a value of time.perf_counter() [s].
 
     Yields
     ------
-    None
-        Nothing.
+    Nothing.
     """
     token = _deadline.set(min(moment, _deadline.get()))
     try:

@@ -1,8 +1,9 @@
-"""The interface operator Q known by its products: what every method needs that never looks at an entry of Q.
+"""The interface operator Q known by its products: what every method needs that never looks at an
+entry of Q.
 
-A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that need them ask for
-`dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse matrix in compressed rows (csr_array),
-and an InterfaceOperator.
+A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that
+need them ask for `dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse
+matrix in compressed rows (csr_array), and an InterfaceOperator.
 """
 
 from __future__ import annotations
@@ -26,10 +27,13 @@ FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
-NOTABLE_BYTES = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
-MOST_BYTES = 8_000_000_000  # of an array Q; those who factorise it need another one or two of its size
+# bytes of an array Q from which on its size is logged: a quarter of a gigabyte
+NOTABLE_BYTES = 2**28
+# of an array Q; those who factorise it need another one or two of its size
+MOST_BYTES = 8_000_000_000
 
-# (X (n,) or (n, j), relative accuracy or None for the best there is) -> the product with X, of its shape
+# (X (n,) or (n, j), relative accuracy or None for the best there is) -> the product with X, of its
+# shape
 Product = Callable[[np.ndarray, float | None], np.ndarray]
 
 
@@ -41,8 +45,10 @@ class InterfaceOperator(LinearOperator):
     entries    () -> Q (n, n) where there is a cheaper way to it than n products
     accuracy   relative, of the products; None: the best there is
     inexact    whether a lower accuracy makes a product cheaper
-    coupled    the same Q before condensation, where the bodies are solved by iteration; None elsewhere
-    counter    counts the columns multiplied; by default one of its own. Operators made from another one share its counter
+    coupled    the same Q before condensation, where the bodies are solved by iteration; None
+               elsewhere
+    counter    counts the columns multiplied; by default one of its own. Operators made from another
+               one share its counter
     held       (n,) mask of the components that cannot move; by default those whose diagonal is 0
     """
 
@@ -86,13 +92,11 @@ class InterfaceOperator(LinearOperator):
 
         Returns
         -------
-        ndarray
-            (n, n), symmetric to the last digit [length / force].
+        (n, n), symmetric to the last digit [length / force].
 
         Raises
         ------
-        InputError
-            If it would be too large.
+        InputError : If it would be too large.
         """
         n = self.shape[0]
         check_dense(n)
@@ -105,22 +109,20 @@ class InterfaceOperator(LinearOperator):
             Q[:, first : first + unit.shape[1]] = self @ unit
         return np.asarray((Q + Q.T) / 2)
 
-    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
+    def scaled(
+        self, factor: float, added: np.ndarray, counter: Counter | None = None
+    ) -> InterfaceOperator:
         """Make the operator factor Q + diag(added).
 
         Parameters
         ----------
-        factor
-            What Q is multiplied with.
-        added
-            (n,) what is added to its diagonal.
-        counter
-            Counts its products; by default one of its own.
+        factor : What Q is multiplied with.
+        added : (n,) what is added to its diagonal.
+        counter : Counts its products; by default one of its own.
 
         Returns
         -------
-        InterfaceOperator
-            The operator.
+        The operator.
         """
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
@@ -130,37 +132,44 @@ class InterfaceOperator(LinearOperator):
         exact = None if entries is None else lambda: factor * entries() + np.diag(added)
         coupled = None if self.coupled is None else self.coupled.scaled(factor, added)
         diagonal = factor * self.diagonal + added
-        return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, coupled, counter, self.held)
+        return InterfaceOperator(
+            product, diagonal, exact, self.accuracy, self.inexact, coupled, counter, self.held
+        )
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
         """Make the same operator with less accurate products. Both count together.
 
         Parameters
         ----------
-        accuracy
-            Relative accuracy of a product that is good enough.
+        accuracy : Relative accuracy of a product that is good enough.
 
         Returns
         -------
-        InterfaceOperator
-            The operator.
+        The operator.
         """
         return InterfaceOperator(
-            self.product, self.diagonal, self.entries, accuracy, self.inexact, self.coupled, self.counter, self.held
+            self.product,
+            self.diagonal,
+            self.entries,
+            accuracy,
+            self.inexact,
+            self.coupled,
+            self.counter,
+            self.held,
         )
 
     def block(self, unknowns: np.ndarray) -> InterfaceOperator:
-        """Take Q on some unknowns alone, e.g. its normal block (every dim-th) or an active set. Both count together.
+        """Take Q on some unknowns alone, e.g.
+
+        its normal block (every dim-th) or an active set. Both count together.
 
         Parameters
         ----------
-        unknowns
-            (m,) their numbers.
+        unknowns : (m,) their numbers.
 
         Returns
         -------
-        InterfaceOperator
-            The operator (m, m).
+        The operator (m, m).
         """
         unknowns = np.asarray(unknowns)
 
@@ -172,7 +181,9 @@ class InterfaceOperator(LinearOperator):
         entries = self.entries
         exact = None if entries is None else lambda: entries()[np.ix_(unknowns, unknowns)]
         diagonal, held = self.diagonal[unknowns], self.held[unknowns]
-        return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, None, self.counter, held)
+        return InterfaceOperator(
+            product, diagonal, exact, self.accuracy, self.inexact, None, self.counter, held
+        )
 
 
 Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
@@ -183,13 +194,11 @@ def sparse(Q: object) -> sp.csr_array:
 
     Parameters
     ----------
-    Q
-        A scipy sparse matrix in any format.
+    Q : A scipy sparse matrix in any format.
 
     Returns
     -------
-    csr_array
-        With sorted columns, duplicates summed and zeros left out.
+    With sorted columns, duplicates summed and zeros left out.
     """
     rows = sp.csr_array(Q, dtype=float, copy=True)
     rows.sum_duplicates()
@@ -198,24 +207,24 @@ def sparse(Q: object) -> sp.csr_array:
 
 
 def check_dense(n: int) -> None:
-    """Before Q is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse it beyond
+    """Before Q is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse
+    it beyond
     MOST_BYTES.
 
     Parameters
     ----------
-    n
-        Number of rows of Q.
+    n : Number of rows of Q.
 
     Raises
     ------
-    InputError
-        With the size in bytes, if the array would take more than MOST_BYTES.
+    InputError : With the size in bytes, if the array would take more than MOST_BYTES.
     """
     size = 8 * n**2
     if size > MOST_BYTES:
         raise InputError(
-            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST_BYTES:,}; take Q = 'implicit' and a "
-            "method that uses products with Q, such as newton, or fewer elements."
+            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than"
+            f" {MOST_BYTES:,}; take Q = 'implicit' and a method that uses products with Q, such as"
+            " newton, or fewer elements."
         )
     level = logging.WARNING if size >= NOTABLE_BYTES else logging.INFO
     log.log(level, "forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
@@ -226,18 +235,15 @@ def dense(Q: Interface) -> np.ndarray:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
 
     Returns
     -------
-    array (n, n)
-        Q itself if it is an array.
+    array (n, n) : Q itself if it is an array.
 
     Raises
     ------
-    InputError
-        If it would be larger than MOST_BYTES.
+    InputError : If it would be larger than MOST_BYTES.
     """
     if isinstance(Q, InterfaceOperator):
         return Q.to_dense()
@@ -252,13 +258,11 @@ def diagonal(Q: Interface) -> np.ndarray:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
 
     Returns
     -------
-    array (n,)
-        [length / force].
+    array (n,) : [length / force].
     """
     if isinstance(Q, InterfaceOperator):
         return Q.diagonal
@@ -270,13 +274,11 @@ def row_sizes(Q: np.ndarray | sp.csr_array) -> np.ndarray:
 
     Parameters
     ----------
-    Q
-        An array or sparse rows.
+    Q : An array or sparse rows.
 
     Returns
     -------
-    array (n,)
-        [length / force].
+    array (n,) : [length / force].
     """
     if sp.issparse(Q):
         return np.asarray(abs(Q).max(axis=1).toarray()).ravel() if Q.shape[0] else np.zeros(0)
@@ -288,13 +290,11 @@ def asymmetry(Q: Interface) -> float:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
 
     Returns
     -------
-    float
-        0 for an operator, which is symmetric by definition.
+    0 for an operator, which is symmetric by definition.
     """
     if isinstance(Q, InterfaceOperator):
         return 0.0
@@ -310,13 +310,11 @@ def held(Q: Interface) -> np.ndarray:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
 
     Returns
     -------
-    array (n,) of bool
-        A mask.
+    array (n,) of bool : A mask.
     """
     if isinstance(Q, InterfaceOperator):
         return Q.held
@@ -330,15 +328,12 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
-    added
-        (n,) what is added to the diagonal [length / force].
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    added : (n,) what is added to the diagonal [length / force].
 
     Returns
     -------
-    array, sparse rows or InterfaceOperator
-        Products with it count with those of Q.
+    Products with it count with those of Q.
     """
     if sp.issparse(Q):
         return sp.csr_array(Q + sp.diags_array(added))
@@ -352,15 +347,12 @@ def block(Q: Interface, unknowns: np.ndarray) -> Interface:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
-    unknowns
-        (m,) their numbers.
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    unknowns : (m,) their numbers.
 
     Returns
     -------
-    array, sparse rows or InterfaceOperator
-        (m, m); products with it count with those of Q.
+    (m, m); products with it count with those of Q.
     """
     if sp.issparse(Q):
         return sp.csr_array(Q[unknowns][:, unknowns])
@@ -372,40 +364,35 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
 
     Parameters
     ----------
-    Q
-        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
-    accuracy
-        Relative error of a product that is good enough.
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    accuracy : Relative error of a product that is good enough.
 
     Returns
     -------
-    array, sparse rows or InterfaceOperator
-        Q itself where a lower accuracy makes nothing cheaper.
+    Q itself where a lower accuracy makes nothing cheaper.
     """
     accuracy = max(accuracy, FINEST)
     return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
 
 
-def estimate_diagonal(product: Product, weights: Sequence[np.ndarray], moves: np.ndarray) -> np.ndarray:
+def estimate_diagonal(
+    product: Product, weights: Sequence[np.ndarray], moves: np.ndarray
+) -> np.ndarray:
     """The diagonal of Q from one product with a column for each pair of surfaces.
 
-    The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared out by the weights. Each pair
-    has signs of its own: a thin body between two pairs moves one of them by forces on the other as far as by its own, and such
-    a share may be negative.
+    The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared
+    out by the weights. Each pair has signs of its own: a thin body between two pairs moves one of
+    them by forces on the other as far as by its own, and such a share may be negative.
 
     Parameters
     ----------
-    product
-        The product with Q.
-    weights
-        (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
-    moves
-        (k dim,) mask of the components that can move.
+    product : The product with Q.
+    weights : (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
+    moves : (k dim,) mask of the components that can move.
 
     Returns
     -------
-    array (k dim,)
-        The estimate [length / force], 0 where a component cannot move.
+    array (k dim,) : The estimate [length / force], 0 where a component cannot move.
     """
     dim = len(moves) // max(sum(len(own) for own in weights), 1)
     ends = np.cumsum([0, *(dim * len(own) for own in weights)])

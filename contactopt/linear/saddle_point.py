@@ -1,4 +1,6 @@
-"""Q before condensation: the equilibrium of the bodies beside the contact forces, for methods that iterate on both at once."""
+"""Q before condensation: the equilibrium of the bodies beside the contact forces, for methods that
+iterate on both at once.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ Act = Callable[[np.ndarray], np.ndarray]
 
 
 class BodyTerm(Protocol):
-    """What one body with N displacement unknowns X adds to the coupled form. X is an array, or a vector elsewhere.
+    """What one body with N displacement unknowns X adds to the coupled form.
+
+    X is an array, or a vector elsewhere.
 
     With A its stiffness and T (n, N) the map from X to u, the body's part of Q is T A^-1 T' + L R'.
 
@@ -39,8 +43,7 @@ class BodyTerm(Protocol):
 
         Returns
         -------
-        ndarray
-            (N,) [force / length], or a vector elsewhere.
+        (N,) [force / length], or a vector elsewhere.
         """
 
     def stiffness(self, X: Any) -> Any:
@@ -48,27 +51,25 @@ class BodyTerm(Protocol):
 
         Parameters
         ----------
-        X
-            (N,) displacement [length].
+        X : (N,) displacement [length].
 
         Returns
         -------
-        ndarray
-            A X (N,) [force], or a vector elsewhere.
+        A X (N,) [force], or a vector elsewhere.
         """
 
     def cycle(self, F: Any) -> Any:
-        """Multiply with B, which is symmetric positive definite and close to A^-1, e.g. one V-cycle of multigrid.
+        """Multiply with B, which is symmetric positive definite and close to A^-1, e.g.
+
+        one V-cycle of multigrid.
 
         Parameters
         ----------
-        F
-            (N,) forces [force].
+        F : (N,) forces [force].
 
         Returns
         -------
-        ndarray
-            B F (N,) [length], or a vector elsewhere.
+        B F (N,) [length], or a vector elsewhere.
         """
 
     def pulled(self, r: np.ndarray) -> Any:
@@ -76,13 +77,11 @@ class BodyTerm(Protocol):
 
         Parameters
         ----------
-        r
-            (n,) contact forces [force].
+        r : (n,) contact forces [force].
 
         Returns
         -------
-        ndarray
-            T' r (N,) [force], or a vector elsewhere.
+        T' r (N,) [force], or a vector elsewhere.
         """
 
     def started_trace(self, X: Any) -> Callable[[], np.ndarray]:
@@ -90,13 +89,11 @@ class BodyTerm(Protocol):
 
         Parameters
         ----------
-        X
-            (N,) displacement [length].
+        X : (N,) displacement [length].
 
         Returns
         -------
-        callable
-            A function without arguments that returns T X (n,) [length].
+        A function without arguments that returns T X (n,) [length].
         """
 
 
@@ -128,14 +125,16 @@ class LocalTerm:
 
 @dataclass(frozen=True, eq=False)
 class CoupledForm:
-    """Q = factor sum T A^-1 T' + rest over the bodies that are solved by iteration, without a solve with any A.
+    """Q = factor sum T A^-1 T' + rest over the bodies that are solved by iteration, without a solve
+    with any A.
 
-    The unknowns X are the free displacements of these bodies, one part for each. They are in equilibrium with the contact
-    forces r (n,) where A X = factor T' r in every body, and then Q r = sum T X + rest r. In the methods below, A stands for
-    A / factor and B for factor B.
+    The unknowns X are the free displacements of these bodies, one part for each. They are in
+    equilibrium with the contact forces r (n,) where A X = factor T' r in every body, and then Q r =
+    sum T X + rest r. In the methods below, A stands for A / factor and B for factor B.
 
     terms   of the bodies
-    rest    r (n,) -> the part of Q r that needs no iteration: plates on supports, bodies with factors [length]
+    rest    r (n,) -> the part of Q r that needs no iteration: plates on supports, bodies with
+            factors [length]
     factor  of the units of Q
     counter counts the applications of B; scaled forms share it
     """
@@ -160,38 +159,38 @@ class CoupledForm:
 
     def stiffness(self, X: Stacked) -> Stacked:
         """Multiply displacements X of the bodies with A."""
-        return Stacked(tuple(in_turn(lambda term, own: term.stiffness(own) / self.factor, self.terms, X.parts)))
+        return Stacked(
+            tuple(in_turn(lambda term, own: term.stiffness(own) / self.factor, self.terms, X.parts))
+        )
 
     def approximate(self, F: Stacked) -> Stacked:
         """Multiply forces on the bodies with B, and count it.
 
         Parameters
         ----------
-        F
-            The forces in parts, one for each body [force].
+        F : The forces in parts, one for each body [force].
 
         Returns
         -------
-        Stacked
-            B F [length].
+        B F [length].
         """
         self.counter.add()
-        return Stacked(tuple(in_turn(lambda term, own: term.cycle(own) * self.factor, self.terms, F.parts)))
+        return Stacked(
+            tuple(in_turn(lambda term, own: term.cycle(own) * self.factor, self.terms, F.parts))
+        )
 
     def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:
-        """Compute the displacement at the contacts from displacements of the bodies and contact forces.
+        """Compute the displacement at the contacts from displacements of the bodies and contact
+        forces.
 
         Parameters
         ----------
-        X
-            Displacements of the bodies in parts [length].
-        r
-            (n,) contact forces [force].
+        X : Displacements of the bodies in parts [length].
+        r : (n,) contact forces [force].
 
         Returns
         -------
-        ndarray
-            T X + rest r (n,) [length], which is Q r in equilibrium.
+        T X + rest r (n,) [length], which is Q r in equilibrium.
         """
         started = in_turn(lambda term, own: term.started_trace(own), self.terms, X.parts)
         total = self.rest(r)
@@ -204,15 +203,12 @@ class CoupledForm:
 
         Parameters
         ----------
-        X
-            Displacements of the bodies in parts [length].
-        r
-            (n,) contact forces [force].
+        X : Displacements of the bodies in parts [length].
+        r : (n,) contact forces [force].
 
         Returns
         -------
-        Stacked
-            T' r - A X [force].
+        T' r - A X [force].
         """
         return self.pulled(r) - self.stiffness(X)
 
@@ -221,15 +217,14 @@ class CoupledForm:
 
         Parameters
         ----------
-        factor
-            What Q is multiplied with.
-        added
-            (n,) what is added to its diagonal.
+        factor : What Q is multiplied with.
+        added : (n,) what is added to its diagonal.
 
         Returns
         -------
-        CoupledForm
-            The form, whose displacements X are in units in which A is A / factor.
+        The form, whose displacements X are in units in which A is A / factor.
         """
         rest = self.rest
-        return replace(self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor)
+        return replace(
+            self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor
+        )

@@ -1,8 +1,9 @@
 """Vectors in parts: one array for each body, some of which may lie in other processes.
 
-A part is an array, or an object with the same operators that is `elsewhere` (contactopt.bodies.remote.Field). What is done
-with a part elsewhere is only ordered here; so the orders go out first, and all processes work at the same time. Sums are made
-part by part, wherever the parts are, so that the result does not depend on it.
+A part is an array, or an object with the same operators that is `elsewhere`
+(contactopt.bodies.remote.Field). What is done with a part elsewhere is only ordered here; so the
+orders go out first, and all processes work at the same time. Sums are made part by part, wherever
+the parts are, so that the result does not depend on it.
 """
 
 from __future__ import annotations
@@ -18,22 +19,25 @@ Act = Callable[..., Any]
 
 
 def in_turn(act: Act, *columns: Iterable[Any]) -> list[Any]:
-    """Apply a function to the entries of columns row by row, first where the entry of the first column is elsewhere.
+    """Apply a function to the entries of columns row by row, first where the entry of the first
+    column is elsewhere.
 
     Parameters
     ----------
-    act
-        A function of as many arguments as there are columns.
-    columns
-        Columns of equal length.
+    act : A function of as many arguments as there are columns.
+    columns : Columns of equal length.
 
     Returns
     -------
-    list
-        What the function returned, in the order of the rows.
+    What the function returned, in the order of the rows.
     """
     rows = list(zip(*columns))
-    made = {i: act(*rows[i]) for here in (False, True) for i, row in enumerate(rows) if _here(row[0]) is here}
+    made = {
+        i: act(*rows[i])
+        for here in (False, True)
+        for i, row in enumerate(rows)
+        if _here(row[0]) is here
+    }
     return [made[i] for i in range(len(rows))]
 
 
@@ -78,13 +82,11 @@ class Stacked:
 
         Parameters
         ----------
-        kind
-            The type of its entries.
+        kind : The type of its entries.
 
         Returns
         -------
-        Stacked
-            The vector in the same parts.
+        The vector in the same parts.
         """
         return self._each(lambda part, kind: part.astype(kind), kind)
 
@@ -93,13 +95,11 @@ class Stacked:
 
         Parameters
         ----------
-        other
-            A vector in the same parts.
+        other : A vector in the same parts.
 
         Returns
         -------
-        float
-            The sum over all parts.
+        The sum over all parts.
         """
         sums = in_turn(_started_dot, self.parts, other.parts)
         return sum(own() for own in sums)
@@ -122,13 +122,11 @@ def dot(x: Vector, y: Vector) -> float:
 
     Parameters
     ----------
-    x, y
-        Two arrays (n,), or two vectors in the same parts.
+    x, y : Two arrays (n,), or two vectors in the same parts.
 
     Returns
     -------
-    float
-        The sum. It does not depend on where the parts are.
+    The sum. It does not depend on where the parts are.
     """
     return float(x.dot(y)) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
 
@@ -138,12 +136,10 @@ def norm(x: Vector) -> float:
 
     Parameters
     ----------
-    x
-        An array (n,), or a vector in parts.
+    x : An array (n,), or a vector in parts.
 
     Returns
     -------
-    float
-        The square root of x' x.
+    The square root of x' x.
     """
     return float(np.sqrt(dot(x, x)))

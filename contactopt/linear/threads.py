@@ -16,8 +16,7 @@ def cores() -> int:
 
     Returns
     -------
-    int
-        The number of cores, at least 1.
+    The number of cores, at least 1.
     """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -26,13 +25,12 @@ def cores() -> int:
 def one_blas_thread() -> Iterator[None]:
     """Let BLAS use one thread inside the block.
 
-    It is for work with many small dense products, between which further threads would only spin. The limit holds for
-    the whole process, so that one thread alone may set it at a time.
+    It is for work with many small dense products, between which further threads would only spin.
+    The limit holds for the whole process, so that one thread alone may set it at a time.
 
     Yields
     ------
-    None
-        Nothing; the block runs under the limit.
+    Nothing; the block runs under the limit.
     """
     with threadpool_limits(1, user_api="blas"):
         yield

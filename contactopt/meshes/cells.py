@@ -13,7 +13,12 @@ SHAPES = {
 }
 
 
-CURVED = {"RefTri": skfem.MeshTri2, "RefQuad": skfem.MeshQuad2, "RefTet": skfem.MeshTet2, "RefHex": skfem.MeshHex2}
+CURVED = {
+    "RefTri": skfem.MeshTri2,
+    "RefQuad": skfem.MeshQuad2,
+    "RefTet": skfem.MeshTet2,
+    "RefHex": skfem.MeshHex2,
+}
 
 
 CELLS = {  # what meshio and VTK call the elements, by whether they are of second order
@@ -37,13 +42,11 @@ def is_curved(mesh: skfem.Mesh) -> bool:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh.
+    mesh : A scikit-fem mesh.
 
     Returns
     -------
-    bool
-        False for meshes whose nodes are their vertices.
+    False for meshes whose nodes are their vertices.
     """
     return int(mesh.p.shape[1]) != int(mesh.nvertices)
 
@@ -53,22 +56,23 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh.
+    mesh : A scikit-fem mesh.
 
     Returns
     -------
-    Mesh
-        The mesh itself if it is straight.
+    The mesh itself if it is straight.
     """
     if not is_curved(mesh):
         return mesh
-    plain = SHAPES[mesh.refdom.__name__][0](np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t)
+    plain = SHAPES[mesh.refdom.__name__][0](
+        np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t
+    )
     return plain.with_boundaries(mesh.boundaries) if mesh.boundaries else plain
 
 
 def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
-    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices first; boundaries keep their names.
+    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices
+    first; boundaries keep their names.
 
     Parameters
     ----------
@@ -92,13 +96,11 @@ def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
 
     Parameters
     ----------
-    mesh
-        A mesh of first or second order.
+    mesh : A mesh of first or second order.
 
     Returns
     -------
-    tuple
-        The name of the elements, a value of CELLS, and their nodes (e, v).
+    The name of the elements, a value of CELLS, and their nodes (e, v).
     """
     nodes = np.array(mesh.dofs.element_dofs)
     if mesh.refdom.__name__ == "RefHex":
@@ -111,19 +113,17 @@ def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
 
 
 def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
-    """Find all nodes of a mesh on some of its facets, those in the middle of edges and faces included.
+    """Find all nodes of a mesh on some of its facets, those in the middle of edges and faces
+    included.
 
     Parameters
     ----------
-    mesh
-        A mesh of first or second order.
-    facets : (f,)
-        Indices of facets.
+    mesh : A mesh of first or second order.
+    facets : (f,) Indices of facets.
 
     Returns
     -------
-    (n,) array
-        Indices of nodes, without repetition.
+    (n,) array : Indices of nodes, without repetition.
     """
     if not is_curved(mesh):
         return np.unique(mesh.facets[:, facets])

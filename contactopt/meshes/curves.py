@@ -32,7 +32,8 @@ from contactopt.meshes.given_curves import Curve
 
 # a polygon that turns by more between two edges has a corner there; three chords make a fillet
 CORNER = np.deg2rad(35)
-LARGEST = np.deg2rad(75)  # unless it is an arc that is tangent to the edges beside it, and turns by less
+# unless it is an arc that is tangent to the edges beside it, and turns by less
+LARGEST = np.deg2rad(75)
 ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
 KINK = (
     np.deg2rad(5),
@@ -52,15 +53,12 @@ def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
 
     Parameters
     ----------
-    mesh
-        A plane scikit-fem mesh.
-    arcs
-        Whether only arcs count as curved, where the mesh is a polygon.
+    mesh : A plane scikit-fem mesh.
+    arcs : Whether only arcs count as curved, where the mesh is a polygon.
 
     Returns
     -------
-    dict
-        By name the curve, or None where the boundary is straight.
+    By name the curve, or None where the boundary is straight.
     """
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
@@ -72,7 +70,11 @@ def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
     found: dict[str, Curve | None] = {}
     for name, label, mine in shares(mesh, owner):
         curved = np.any(ends[:, mine] != 0)
-        found[name] = Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, label) if curved else None
+        found[name] = (
+            Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, label)
+            if curved
+            else None
+        )
     return found
 
 
@@ -81,16 +83,13 @@ def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh.
-    owner
-        (t,) the facet of each piece.
+    mesh : A scikit-fem mesh.
+    owner : (t,) the facet of each piece.
 
     Yields
     ------
-    tuple
-        The name of a boundary, or '' for what has no name; what messages call its curve; and
-        whether each piece is its own.
+    The name of a boundary, or '' for what has no name; what messages call its curve; and whether
+    each piece is its own.
     """
     left = np.ones(len(owner), dtype=bool)
     for name, facets in (mesh.boundaries or {}).items():
@@ -166,7 +165,9 @@ def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
         first = int(np.argmax(jump))
         if first:
             order = np.roll(np.arange(len(length)), -first)
-            return np.asarray(np.roll(_bends(x[:, np.append(order, first)], near, arcs), first, axis=1))
+            return np.asarray(
+                np.roll(_bends(x[:, np.append(order, first)], near, arcs), first, axis=1)
+            )
     runs = np.full(len(length), np.nan)  # the curvature of the run that an edge belongs to
     cuts = np.unique([0, *np.flatnonzero(corner), len(length)])
     for first, last in pairwise(cuts.tolist()):
@@ -202,7 +203,8 @@ def _on_fillet(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
 
     A chord of an arc of curvature k turns by twice asin(k c / 2), half of it at each end.
     """
-    count = len(turn) - 1 if turn[0] == turn[-1] else len(turn)  # a closed chain ends where it begins
+    # a closed chain ends where it begins
+    count = len(turn) - 1 if turn[0] == turn[-1] else len(turn)
     after = np.resize(np.append(length, [np.nan] * (count - len(length))), count)
     before = np.roll(after, 1)
     across = before**2 + after**2 + 2 * before * after * np.cos(turn[:count])
@@ -271,7 +273,9 @@ def _reach(x: np.ndarray, start: int, fits: Callable[[np.ndarray], bool]) -> int
 def _on_line(nodes: np.ndarray, near: float) -> bool:
     """Whether nodes lie on the line through the first and the last one."""
     along, offset = nodes[:, -1] - nodes[:, 0], nodes - nodes[:, :1]
-    return bool(np.all(np.abs(along[0] * offset[1] - along[1] * offset[0]) <= near * np.hypot(*along)))
+    return bool(
+        np.all(np.abs(along[0] * offset[1] - along[1] * offset[0]) <= near * np.hypot(*along))
+    )
 
 
 def _circle(nodes: np.ndarray, near: float) -> float | None:
@@ -290,7 +294,12 @@ def _circle(nodes: np.ndarray, near: float) -> float | None:
 
 
 def _ends(
-    turn: np.ndarray, length: np.ndarray, corner: np.ndarray, runs: np.ndarray, closed: bool, arcs: bool
+    turn: np.ndarray,
+    length: np.ndarray,
+    corner: np.ndarray,
+    runs: np.ndarray,
+    closed: bool,
+    arcs: bool,
 ) -> np.ndarray:
     """Curvatures (2, n) at both ends of edges, of their runs or of circles through three nodes."""
     n = len(length)
@@ -301,7 +310,9 @@ def _ends(
     found = np.empty((2, n))
     for side, node, beside in ((0, edge, edge - 1), (1, edge + 1, (edge + 1) % n)):
         # the chord between the two neighbours of the node
-        across = np.sqrt(length**2 + length[beside] ** 2 + 2 * length * length[beside] * np.cos(turn[node]))
+        across = np.sqrt(
+            length**2 + length[beside] ** 2 + 2 * length * length[beside] * np.cos(turn[node])
+        )
         three = 2 * np.sin(turn[node]) / across
         away = turn[node] - np.arcsin(np.clip(runs[beside] * length[beside] / 2, -STEEP, STEEP))
         found[side] = np.where(free[beside], three, 2 * np.sin(away) / length)
@@ -344,7 +355,9 @@ class _Blends:
     def _nearest(self, points: np.ndarray) -> np.ndarray:
         """The number (m,) of the nearest edge."""
         count = min(NEAREST, len(self.length))
-        far, near = (each.reshape(points.shape[1], count) for each in self.tree.query(points.T, k=count))
+        far, near = (
+            each.reshape(points.shape[1], count) for each in self.tree.query(points.T, k=count)
+        )
         distance = self._foot(points[:, :, None], near)[1]
         best = np.argmin(distance, axis=1)
         rows = np.arange(len(best))

@@ -1,4 +1,6 @@
-"""Meshes of half discs and of bodies that rise from them: rings of any radii around a core of squares."""
+"""Meshes of half discs and of bodies that rise from them: rings of any radii around a core of
+squares.
+"""
 
 from __future__ import annotations
 
@@ -11,41 +13,57 @@ from skfem import MeshHex
 def half_disc(radii: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray]:
     """Make nodes and quadrilaterals of the half disc y >= 0.
 
-    The innermost rings of nodes are squares. Those from number 2 sectors on are circles, with a gradual change between.
+    The innermost rings of nodes are squares. Those from number 2 sectors on are circles, with a
+    gradual change between.
 
     Parameters
     ----------
-    radii
-        Radii of the rings of nodes, from 0 up [length]; at least 2 sectors + 1, the first so many evenly spaced.
-    sectors
-        Number of elements along an eighth of the circle.
+    radii : Radii of the rings of nodes, from 0 up [length]; at least 2 sectors + 1, the first so
+        many evenly spaced.
+    sectors : Number of elements along an eighth of the circle.
 
     Returns
     -------
-    tuple
-        The nodes (2, n) [length], and the numbers (4, m) of the nodes of each quadrilateral.
+    The nodes (2, n) [length], and the numbers (4, m) of the nodes of each quadrilateral.
     """
-    i, j = (x.ravel() for x in np.meshgrid(np.arange(-sectors, sectors + 1), np.arange(sectors + 1), indexing="ij"))
+    i, j = (
+        x.ravel()
+        for x in np.meshgrid(
+            np.arange(-sectors, sectors + 1), np.arange(sectors + 1), indexing="ij"
+        )
+    )
     ring = np.maximum(np.abs(i), j)
-    place = np.where(i == ring, j, np.where(j == ring, 2 * ring - i, 4 * ring - j))  # along the ring, from y = 0
-    core = _on_ring(ring, place, np.stack([i, j]) / np.maximum(ring, 1), np.maximum(ring, 1), radii, sectors)
+    # along the ring, from y = 0
+    place = np.where(i == ring, j, np.where(j == ring, 2 * ring - i, 4 * ring - j))
+    core = _on_ring(
+        ring, place, np.stack([i, j]) / np.maximum(ring, 1), np.maximum(ring, 1), radii, sectors
+    )
     rim = np.flatnonzero(ring == sectors)
     rim = rim[np.argsort(place[rim])]
     square = np.stack([i, j])[:, rim] / sectors
     outer = [
-        _on_ring(np.full(len(rim), k), place[rim], square, np.full(len(rim), sectors), radii, sectors)
+        _on_ring(
+            np.full(len(rim), k), place[rim], square, np.full(len(rim), sectors), radii, sectors
+        )
         for k in range(sectors + 1, len(radii))
     ]
     p = np.concatenate([core, *outer], axis=1)
     index = np.arange(len(i)).reshape(2 * sectors + 1, sectors + 1)
-    cells = [np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]).reshape(4, -1)]
+    cells = [
+        np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]).reshape(4, -1)
+    ]
     rings = [rim, *(len(i) + len(rim) * np.arange(len(outer))[:, None] + np.arange(len(rim)))]
     cells += [np.stack([a[:-1], b[:-1], b[1:], a[1:]]) for a, b in pairwise(rings)]
     return p, np.concatenate(cells, axis=1)
 
 
 def _on_ring(
-    ring: np.ndarray, place: np.ndarray, square: np.ndarray, count: np.ndarray, radii: np.ndarray, sectors: int
+    ring: np.ndarray,
+    place: np.ndarray,
+    square: np.ndarray,
+    count: np.ndarray,
+    radii: np.ndarray,
+    sectors: int,
 ) -> np.ndarray:
     """Points of rings divided into 4 count parts, between the square and the circle."""
     angle = np.pi * place / (4 * count)
@@ -60,17 +78,13 @@ def extrude(p: np.ndarray, t: np.ndarray, z: np.ndarray) -> MeshHex:
 
     Parameters
     ----------
-    p
-        (2, n) plane nodes [length].
-    t
-        (4, m) numbers of the nodes of each quadrilateral.
-    z
-        (j,) heights of the layers of nodes, ascending [length].
+    p : (2, n) plane nodes [length].
+    t : (4, m) numbers of the nodes of each quadrilateral.
+    z : (j,) heights of the layers of nodes, ascending [length].
 
     Returns
     -------
-    MeshHex
-        The mesh of (j - 1) m bricks.
+    The mesh of (j - 1) m bricks.
     """
     n, levels = p.shape[1], len(z)
     points = np.concatenate([np.tile(p, levels), np.repeat(z, n)[None]])

@@ -12,7 +12,8 @@ quadratic fits to the nodes around a vertex, or which are those of a flat facet 
 plane of a flat facet at an edge of the body stay in it.
 
 Source: Nagata (2005), Simple local interpolation of surfaces using normal vectors, Computer Aided
-Geometric Design 22."""
+Geometric Design 22.
+"""
 
 from __future__ import annotations
 
@@ -45,19 +46,21 @@ def space_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh in space.
-    arcs
-        Whether only spheres and cylinders count as curved, where the edges of the mesh are straight.
+    mesh : A scikit-fem mesh in space.
+    arcs : Whether only spheres and cylinders count as curved, where the edges of the mesh are
+        straight.
 
     Returns
     -------
-    dict
-        By name the surface, or None where the boundary is flat.
+    By name the surface, or None where the boundary is flat.
     """
     skin = _Skin(mesh, arcs)
     return {
-        name: Curve(_Patches(skin, mine), skin.known, label) if np.any(skin.region[mine] >= 0) else None
+        name: (
+            Curve(_Patches(skin, mine), skin.known, label)
+            if np.any(skin.region[mine] >= 0)
+            else None
+        )
         for name, label, mine in shares(mesh, skin.owner)
     }
 
@@ -82,10 +85,14 @@ class _Skin:
         length = np.linalg.norm(np.roll(self.corners, -1, axis=1) - self.corners, axis=0)
         self.known = bool(np.any(np.linalg.norm(self.off, axis=0) > STRAIGHT * length))
         self.near = rounding(self.corners.reshape(3, -1))
-        cross = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0], axis=0)
+        cross = np.cross(
+            self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0], axis=0
+        )
         self.normals = cross / np.linalg.norm(cross, axis=0)
         pairs, sides = _neighbours(self.nodes)
-        turn = np.arccos(np.clip(np.sum(self.normals[:, pairs[0]] * self.normals[:, pairs[1]], axis=0), -1, 1))
+        turn = np.arccos(
+            np.clip(np.sum(self.normals[:, pairs[0]] * self.normals[:, pairs[1]], axis=0), -1, 1)
+        )
         smooth = turn < (EDGE if self.known else CORNER)
         flat = self._flat(pairs, sides, smooth)
         self.planes = np.full_like(self.off, np.nan)
@@ -107,10 +114,14 @@ class _Skin:
         level = smooth.copy()
         for here, there in ((0, 1), (1, 0)):
             opposite = self.corners[:, (sides[there] + 2) % 3, pairs[there]]
-            height = np.sum((opposite - self.corners[:, 0, pairs[here]]) * self.normals[:, pairs[here]], axis=0)
+            height = np.sum(
+                (opposite - self.corners[:, 0, pairs[here]]) * self.normals[:, pairs[here]], axis=0
+            )
             level &= np.abs(height) < 2 * self.near
         count = len(self.owner)
-        straight = np.all(np.abs(np.sum(self.off * self.normals[:, None], axis=0)) < 2 * self.near, axis=0)
+        straight = np.all(
+            np.abs(np.sum(self.off * self.normals[:, None], axis=0)) < 2 * self.near, axis=0
+        )
         piece = _components(pairs[:, smooth], count)
         bent = np.zeros(count, dtype=bool)
         bent[piece[pairs[0, smooth & ~level]]] = True
@@ -156,7 +167,10 @@ def _triangles(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     middles = mesh.p[:, ends].mean(axis=1)
     if is_curved(mesh):
         size = mesh.nvertices
-        keys, wanted = (np.minimum(*each) * size + np.maximum(*each) for each in (mesh.edges.astype(np.int64), ends))
+        keys, wanted = (
+            np.minimum(*each) * size + np.maximum(*each)
+            for each in (mesh.edges.astype(np.int64), ends)
+        )
         order = np.argsort(keys)
         place = order[np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)]
         there = keys[place] == wanted  # diagonals of quadrilaterals are no edges
@@ -183,8 +197,12 @@ def _components(pairs: np.ndarray, count: int) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def _vertex_normals(places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """Normals (3, n) at the nodes of a region: those given, or of quadratics through the nodes around."""
+def _vertex_normals(
+    places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, given: np.ndarray
+) -> np.ndarray:
+    """Normals (3, n) at the nodes of a region: those given, or of quadratics through the nodes
+    around.
+    """
     size = places.shape[1]
     found = np.zeros((3, size))
     for row in nodes:
@@ -203,7 +221,8 @@ def _vertex_normals(places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, 
         if not np.isnan(given[0, node]):
             found[:, node] = given[:, node]
         elif len(others) >= 5:
-            axes = np.linalg.svd(found[:, [node]])[0]  # the normal and two directions along the surface
+            # the normal and two directions along the surface
+            axes = np.linalg.svd(found[:, [node]])[0]
             z, x, y = axes.T @ (places[:, others] - places[:, [node]])
             weight = 1 / (x**2 + y**2)
             terms = np.stack([x, y, x**2, x * y, y**2], axis=1)
@@ -216,7 +235,9 @@ def _vertex_normals(places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, 
 def _sphere(places: np.ndarray, near: float) -> Shape | None:
     """The projection on the sphere on which places (3, m) lie."""
     centre, radius = _round(places)
-    if places.shape[1] <= FEWEST or np.any(np.abs(np.linalg.norm(places - centre, axis=0) - radius) > near):
+    if places.shape[1] <= FEWEST or np.any(
+        np.abs(np.linalg.norm(places - centre, axis=0) - radius) > near
+    ):
         return None
 
     def project(points: np.ndarray) -> np.ndarray:
@@ -242,7 +263,9 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
         return np.asarray(np.linalg.norm(flat - centre, axis=0) - radius)
 
     size = np.ptp(places, axis=1).max()
-    best = least_squares(lambda tilt: off(tilt) / size, np.zeros(2), x_scale=0.1, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    best = least_squares(
+        lambda tilt: off(tilt) / size, np.zeros(2), x_scale=0.1, xtol=1e-15, ftol=1e-15, gtol=1e-15
+    ).x
     if places.shape[1] <= FEWEST or np.any(np.abs(off(best, places)) > near):
         return None
     across = section(best)
@@ -271,7 +294,11 @@ class _Patches:
     """The surface of some of the triangles."""
 
     def __init__(self, skin: _Skin, mine: np.ndarray) -> None:
-        self.corners, self.off, self.planes = skin.corners[:, :, mine], skin.off[:, :, mine], skin.planes[:, :, mine]
+        self.corners, self.off, self.planes = (
+            skin.corners[:, :, mine],
+            skin.off[:, :, mine],
+            skin.planes[:, :, mine],
+        )
         self.region, self.shapes, self.near = skin.region[mine], skin.shapes, skin.near
         self.tree = cKDTree(self.corners.mean(axis=1).T)
 
@@ -291,12 +318,16 @@ class _Patches:
                 found[:, some] = self._on(region, points[:, some], chosen[some], share[:, some])
         return found
 
-    def _on(self, region: int, points: np.ndarray, chosen: np.ndarray, share: np.ndarray) -> np.ndarray:
+    def _on(
+        self, region: int, points: np.ndarray, chosen: np.ndarray, share: np.ndarray
+    ) -> np.ndarray:
         """Points on triangles of a region; those in a plane beyond an edge of the body stay in it."""
         shape = self.shapes[region]
         if shape is None:
             found = np.einsum("ict,ct->it", self.corners[:, :, chosen], share)
-            found = found + 4 * np.einsum("iet,et->it", self.off[:, :, chosen], share * np.roll(share, -1, axis=0))
+            found = found + 4 * np.einsum(
+                "iet,et->it", self.off[:, :, chosen], share * np.roll(share, -1, axis=0)
+            )
         else:
             found = shape(points)
         for edge in range(3):
@@ -308,13 +339,18 @@ class _Patches:
         return found
 
 
-def _in_plane(found: np.ndarray, points: np.ndarray, normal: np.ndarray, shape: Shape | None) -> np.ndarray:
+def _in_plane(
+    found: np.ndarray, points: np.ndarray, normal: np.ndarray, shape: Shape | None
+) -> np.ndarray:
     """Places (3, m) moved into the planes of the points, and along them to the surface."""
     if shape is None:
         off = found - points
         inside = off - normal * np.sum(off * normal, axis=0)
         size = np.sum(inside**2, axis=0)
-        return np.asarray(points + inside * np.where(size > 0, np.sum(off**2, axis=0) / np.where(size > 0, size, 1), 0))
+        return np.asarray(
+            points
+            + inside * np.where(size > 0, np.sum(off**2, axis=0) / np.where(size > 0, size, 1), 0)
+        )
     for _ in range(ALTERNATE):
         found = found - normal * np.sum((found - points) * normal, axis=0)
         found = shape(found)
@@ -326,16 +362,13 @@ def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np
 
     Parameters
     ----------
-    corners
-        (dim, dim, m, c) corners of c edges or triangles for each point [length].
-    points
-        (dim, m) points [length].
+    corners : (dim, dim, m, c) corners of c edges or triangles for each point [length].
+    points : (dim, m) points [length].
 
     Returns
     -------
-    tuple
-        Coordinates (m, c, dim) of the nearest points of the lines or planes, and distances (m, c)
-        over the sizes of the facets.
+    Coordinates (m, c, dim) of the nearest points of the lines or planes, and distances (m, c) over
+    the sizes of the facets.
     """
     origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
     offset = points[:, :, None] - origin
@@ -343,4 +376,6 @@ def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np
     weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
     every = np.concatenate([1 - weights.sum(axis=-1, keepdims=True), weights], axis=-1)
     height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
-    return every, np.maximum(-every, 0).max(axis=-1) + height / np.sqrt(np.trace(gram, axis1=2, axis2=3))
+    return every, np.maximum(-every, 0).max(axis=-1) + height / np.sqrt(
+        np.trace(gram, axis1=2, axis2=3)
+    )

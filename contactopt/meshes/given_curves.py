@@ -19,16 +19,15 @@ class Curve:
 
     Parameters
     ----------
-    place
-        Function of points (dim, m) [length] that returns their places (dim, m) [length].
-    known
-        Whether the user gave the curve, or the mesh has curved edges that define it. False: it was guessed from
-        the nodes of a polygon.
-    name
-        What messages call it.
+    place : Function of points (dim, m) [length] that returns their places (dim, m) [length].
+    known : Whether the user gave the curve, or the mesh has curved edges that define it. False: it
+        was guessed from the nodes of a polygon.
+    name : What messages call it.
     """
 
-    def __init__(self, place: Callable[[np.ndarray], Any], known: bool, name: str = "the curve") -> None:
+    def __init__(
+        self, place: Callable[[np.ndarray], Any], known: bool, name: str = "the curve"
+    ) -> None:
         self.place, self.known, self.name = place, known, name
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -40,7 +39,8 @@ class Curve:
             raise InputError(f"{self.name} failed: {type(error).__name__}: {error}.") from error
         if found.shape != np.shape(points):
             raise InputError(
-                f"{self.name} must return an array of the shape of its points, {np.shape(points)}; got {found.shape}."
+                f"{self.name} must return an array of the shape of its points, {np.shape(points)};"
+                f" got {found.shape}."
             )
         lost = np.flatnonzero(~np.isfinite(found).all(axis=0))
         if len(lost):
@@ -54,18 +54,14 @@ def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
 
     Parameters
     ----------
-    curve
-        The curve of the boundary.
-    mesh
-        A scikit-fem mesh.
-    boundary
-        The name of the boundary.
+    curve : The curve of the boundary.
+    mesh : A scikit-fem mesh.
+    boundary : The name of the boundary.
 
     Raises
     ------
-    InputError
-        Where the nodes of many facets are further from the curve than OFF of the facet, or those of
-        one than FAR.
+    InputError : Where the nodes of many facets are further from the curve than OFF of the facet, or
+        those of one than FAR.
     """
     corners = mesh.facets[:, mesh.boundaries[boundary]]
     places = mesh.p[:, corners]
@@ -76,6 +72,7 @@ def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
         worst = int(np.argmax(off / size))
         at = ", ".join(f"{x:.6g}" for x in places[:, :, worst].mean(axis=1))
         raise InputError(
-            f"{curve.name} is not that of the mesh: near ({at}) it is {off[worst]:.3g} away from the nodes, where a "
-            f"facet has the size {size[worst]:.3g}; mend its radius, its centre or the unit of the mesh."
+            f"{curve.name} is not that of the mesh: near ({at}) it is {off[worst]:.3g} away from"
+            f" the nodes, where a facet has the size {size[worst]:.3g}; mend its radius, its centre"
+            " or the unit of the mesh."
         )

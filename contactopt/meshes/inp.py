@@ -6,7 +6,8 @@ A keyword line `*NAME, KEY=VALUE` is followed by lines of data. Elements without
 masses, couplings) are passed over.
 
 Source: CalculiX CrunchiX user's manual, version 2.20, chapters "Element types" and "Input deck
-format"."""
+format".
+"""
 
 from __future__ import annotations
 
@@ -17,9 +18,20 @@ from typing import Any
 
 import numpy as np
 
-PLANE = {"3": ("triangle", 3), "6": ("triangle6", 6), "4": ("quad", 4), "8": ("quad8", 8), "9": ("quad9", 9)}
+PLANE = {
+    "3": ("triangle", 3),
+    "6": ("triangle6", 6),
+    "4": ("quad", 4),
+    "8": ("quad8", 8),
+    "9": ("quad9", 9),
+}
 SOLID = {
-    **{"4": ("tetra", 4), "10": ("tetra10", 10), "8": ("hexahedron", 8), "20": ("hexahedron20", 20)},
+    **{
+        "4": ("tetra", 4),
+        "10": ("tetra10", 10),
+        "8": ("hexahedron", 8),
+        "20": ("hexahedron20", 20),
+    },
     **{"27": ("hexahedron27", 27), "6": ("wedge", 6), "15": ("wedge15", 15), "5": ("pyramid", 5)},
 }
 LINE = {"2": ("line", 2), "1": ("line", 2), "3": ("line3", 3)}
@@ -34,7 +46,14 @@ FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3),
+        (4, 7, 6, 5),
+        (0, 4, 5, 1),
+        (1, 5, 6, 2),
+        (2, 6, 7, 3),
+        (3, 7, 4, 0),
+    ),
 }
 FACET = {2: "line", 3: "triangle", 4: "quad"}
 DEEPEST = 10  # files that include each other
@@ -45,18 +64,15 @@ def read_inp(path: Path) -> Any:
 
     Parameters
     ----------
-    path
-        The file.
+    path : The file.
 
     Returns
     -------
-    meshio.Mesh
-        The mesh, with sets of elements and of nodes by name. A surface is a set of facets.
+    The mesh, with sets of elements and of nodes by name. A surface is a set of facets.
 
     Raises
     ------
-    ValueError, KeyError, IndexError, OSError
-        Where the file does not keep to the format.
+    ValueError, KeyError, IndexError, OSError : Where the file does not keep to the format.
     """
     import meshio
 
@@ -69,9 +85,13 @@ def read_inp(path: Path) -> Any:
     return meshio.Mesh(
         np.array([read.nodes[tag] for tag in tags]).reshape(-1, 3),
         [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in blocks],
-        cell_sets={name: [_places(ids, found) for _, _, ids in blocks] for name, found in read.element_sets.items()},
+        cell_sets={
+            name: [_places(ids, found) for _, _, ids in blocks]
+            for name, found in read.element_sets.items()
+        },
         point_sets={
-            name: np.searchsorted(tags, sorted(found & read.nodes.keys())) for name, found in read.node_sets.items()
+            name: np.searchsorted(tags, sorted(found & read.nodes.keys()))
+            for name, found in read.node_sets.items()
         },
     )
 
@@ -81,7 +101,9 @@ def _places(ids: np.ndarray, found: set[int]) -> np.ndarray:
 
 
 def _blocks(path: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Keyword in lower case, options, and the rows of data of each block; included files in their place."""
+    """Keyword in lower case, options, and the rows of data of each block; included files in their
+    place.
+    """
     keyword, rows = "", list[list[str]]()
     options: dict[str, str] = {}
     if depth > DEEPEST:
@@ -96,7 +118,10 @@ def _blocks(path: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[
             yield keyword, options, rows
             first, *words = line[1:].split(",")
             keyword, rows = first.strip().lower(), []
-            options = {k.strip().lower(): v.strip().strip('"') for k, _, v in (word.partition("=") for word in words)}
+            options = {
+                k.strip().lower(): v.strip().strip('"')
+                for k, _, v in (word.partition("=") for word in words)
+            }
             if keyword == "include":
                 yield from _blocks(path.parent / options["input"], depth + 1)
     yield keyword, options, rows
@@ -107,7 +132,8 @@ class _Reader:
 
     def __init__(self) -> None:
         self.nodes: dict[int, list[float]] = {}
-        self.blocks: list[tuple[str, np.ndarray, np.ndarray]] = []  # kind, numbers of nodes, numbers of elements
+        # kind, numbers of nodes, numbers of elements
+        self.blocks: list[tuple[str, np.ndarray, np.ndarray]] = []
         self.node_sets: dict[str, set[int]] = {}
         self.element_sets: dict[str, set[int]] = {}
         self.surfaces: dict[str, list[list[str]]] = {}
@@ -116,7 +142,9 @@ class _Reader:
     def part(self, options: dict[str, str], rows: list[list[str]]) -> None:
         self.parts += 1
         if self.parts > 1:
-            raise ValueError("it has several parts, each with its own numbers of nodes; write it without parts")
+            raise ValueError(
+                "it has several parts, each with its own numbers of nodes; write it without parts"
+            )
 
     def node(self, options: dict[str, str], rows: list[list[str]]) -> None:
         for row in rows:
@@ -129,7 +157,9 @@ class _Reader:
         for pattern, kinds in FAMILIES:
             if found := pattern.match(options["type"].upper()):
                 kind, count = kinds[found[1]]
-                words = np.array([word for row in rows for word in row], dtype=np.int64).reshape(-1, 1 + count)
+                words = np.array([word for row in rows for word in row], dtype=np.int64).reshape(
+                    -1, 1 + count
+                )
                 self.blocks.append((kind, words[:, 1:], words[:, 0]))
                 if not set(words[:, 1:].ravel().tolist()) <= self.nodes.keys():
                     raise ValueError(f"an element {options['type']} names a node that is not there")
@@ -151,7 +181,10 @@ class _Reader:
 
     def facets(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
         """Blocks of facets that stand for the surfaces, whose numbers are new."""
-        new, made = 1 + max((int(ids.max()) for _, _, ids in self.blocks if len(ids)), default=0), []
+        new, made = (
+            1 + max((int(ids.max()) for _, _, ids in self.blocks if len(ids)), default=0),
+            [],
+        )
         for name, rows in self.surfaces.items():
             for what, face in rows:
                 members = {int(what)} if what.isdigit() else _set(self.element_sets, what)
@@ -173,7 +206,9 @@ def _set(sets: dict[str, set[int]], name: str) -> set[int]:
     return sets.setdefault(known, set())
 
 
-def _extend(sets: dict[str, set[int]], name: str, options: dict[str, str], rows: list[list[str]]) -> None:
+def _extend(
+    sets: dict[str, set[int]], name: str, options: dict[str, str], rows: list[list[str]]
+) -> None:
     """Add to a set what rows name: numbers, ranges or other sets."""
     mine = _set(sets, name)
     for row in rows:

@@ -3,7 +3,8 @@
 scikit-fem divides the elements: all of them into halves, or marked ones, by red, green and blue
 patterns in the plane and by bisection in space. It forgets the named boundaries. Every new boundary
 facet lies in one old boundary facet, which gives it its names. New nodes then move to the surface
-that the mesh stands for, which `boundary_curves` finds."""
+that the mesh stands for, which `boundary_curves` finds.
+"""
 
 from __future__ import annotations
 
@@ -43,16 +44,14 @@ def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh in the plane or in space.
-    arcs
-        Whether only arcs, spheres and cylinders count as curved, where the mesh has straight edges.
+    mesh : A scikit-fem mesh in the plane or in space.
+    arcs : Whether only arcs, spheres and cylinders count as curved, where the mesh has straight
+        edges.
 
     Returns
     -------
-    dict
-        By the name of the boundary its curve, or None where it is flat. The name '' stands for what
-        has no name.
+    By the name of the boundary its curve, or None where it is flat. The name '' stands for what has
+    no name.
     """
     return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
 
@@ -62,15 +61,12 @@ def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
 
     Parameters
     ----------
-    mesh, arcs
-        As there.
-    name
-        One of its boundaries, or ''.
+    mesh, arcs : As there.
+    name : One of its boundaries, or ''.
 
     Returns
     -------
-    Curve or None
-        Its curve; None where it is flat.
+    Its curve; None where it is flat.
     """
     return boundary_curves(mesh, arcs)[name]
 
@@ -80,13 +76,12 @@ def simplices(mesh: Any) -> Any:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh. Its quadrilaterals and hexahedra are cut, its curved edges become straight.
+    mesh : A scikit-fem mesh. Its quadrilaterals and hexahedra are cut, its curved edges become
+        straight.
 
     Returns
     -------
-    Mesh
-        The mesh of simplices, with the names of the boundaries.
+    The mesh of simplices, with the names of the boundaries.
     """
     if is_curved(mesh):
         mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
@@ -100,28 +95,23 @@ def simplices(mesh: Any) -> Any:
 def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     """Divide the marked elements of a mesh, and others as far as it takes to stay conforming.
 
-    Elements that are as small as rounding allows stay whole. A new node stays on its edge where it would turn an element
-    inside out on the curve.
+    Elements that are as small as rounding allows stay whole. A new node stays on its edge where it
+    would turn an element inside out on the curve.
 
     Parameters
     ----------
-    mesh
-        A mesh of straight triangles or tetrahedra, with named boundaries.
-    marked
-        Numbers of the elements to divide.
-    curves
-        For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on
-        the true surface. The name '' stands for the boundary that has no name.
+    mesh : A mesh of straight triangles or tetrahedra, with named boundaries.
+    marked : Numbers of the elements to divide.
+    curves : For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes
+        on the true surface. The name '' stands for the boundary that has no name.
 
     Returns
     -------
-    Mesh
-        A mesh of the same kind with the same named boundaries.
+    A mesh of the same kind with the same named boundaries.
 
     Raises
     ------
-    TooSmall
-        If none of the marked elements can be divided.
+    TooSmall : If none of the marked elements can be divided.
     """
     marked = np.asarray(marked)
     corners = mesh.p[:, mesh.t[:, marked]]
@@ -130,7 +120,10 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     large = size > SMALLEST * scale
     if len(marked) and not large.any():
         place = ", ".join(f"{x:.6g}" for x in corners[:, :, 0].mean(axis=1))
-        raise TooSmall(f"the elements near ({place}) cannot be divided further: they are as small as rounding allows.")
+        raise TooSmall(
+            f"the elements near ({place}) cannot be divided further: they are as small as rounding"
+            " allows."
+        )
     return _refined(mesh, marked[large], curves)
 
 
@@ -139,22 +132,22 @@ def split(mesh: Any, curves: Curves) -> Any:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh of any kind; of second order, its nodes on edges and faces become corners.
-    curves
-        The curves of its boundaries, as for `divide`.
+    mesh : A scikit-fem mesh of any kind; of second order, its nodes on edges and faces become
+        corners.
+    curves : The curves of its boundaries, as for `divide`.
 
     Returns
     -------
-    Mesh
-        A mesh of the same kind and order of half the element size, with the same named boundaries.
+    A mesh of the same kind and order of half the element size, with the same named boundaries.
     """
     fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
     return bent(fine, curves) if is_curved(mesh) else fine
 
 
 def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
-    """The mesh divided as scikit-fem is told, its new nodes at `places`, if given, and on the curves."""
+    """The mesh divided as scikit-fem is told, its new nodes at `places`, if given, and on the
+    curves.
+    """
     with _no_word_of_copies():
         fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
@@ -180,12 +173,18 @@ def facets_of(mesh: Any, name: str) -> np.ndarray:
     """
     if name:
         return np.asarray(mesh.boundaries[name])
-    return np.setdiff1d(mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()]))
+    return np.setdiff1d(
+        mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()])
+    )
 
 
 def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
     """The curves of boundaries that have facets."""
-    return {name: curve for name, curve in curves.items() if curve is not None and len(facets_of(mesh, name))}
+    return {
+        name: curve
+        for name, curve in curves.items()
+        if curve is not None and len(facets_of(mesh, name))
+    }
 
 
 def _unfolded(mesh: Any, points: np.ndarray) -> Any:
@@ -200,36 +199,39 @@ def _unfolded(mesh: Any, points: np.ndarray) -> Any:
             break
         points[:, back], kept = mesh.doflocs[:, back], kept + len(back)
     if kept:
-        log.warning("%d nodes stay off the curved boundary, where they would turn elements inside out", kept)
+        log.warning(
+            "%d nodes stay off the curved boundary, where they would turn elements inside out", kept
+        )
     return replace(mesh, doflocs=points)
 
 
 def bent(mesh: Any, curves: Curves) -> Any:
     """Bend the edges and faces of a mesh of straight elements along its curved boundaries.
 
-    Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length,
-    or fold an element, stays straight.
+    Elements and named boundaries keep their numbers. An edge that would leave its chord by more
+    than BENT of its length, or fold an element, stays straight.
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh.
-    curves
-        By the name of a boundary the curve that moves points (dim, m) onto it [length].
+    mesh : A scikit-fem mesh.
+    curves : By the name of a boundary the curve that moves points (dim, m) onto it [length].
 
     Returns
     -------
-    mesh
-        A mesh of second order, or the same mesh where there is no curve.
+    A mesh of second order, or the same mesh where there is no curve.
     """
     known = _present(mesh, curves)
     if not known:
         return mesh
     with _no_word_of_copies():
-        made = CURVED[mesh.refdom.__name__].from_mesh(replace(mesh, _boundaries=None, _subdomains=None))
+        made = CURVED[mesh.refdom.__name__].from_mesh(
+            replace(mesh, _boundaries=None, _subdomains=None)
+        )
     shift = np.zeros_like(made.doflocs)
     plane = len(mesh.p) == 2
-    edges, middle = (mesh.facets, made.dofs.facet_dofs[0]) if plane else (mesh.edges, made.dofs.edge_dofs[0])
+    edges, middle = (
+        (mesh.facets, made.dofs.facet_dofs[0]) if plane else (mesh.edges, made.dofs.edge_dofs[0])
+    )
     for name, curve in known.items():
         facets = facets_of(mesh, name)
         mine = facets if plane else np.unique(mesh.f2e[:, facets])
@@ -241,16 +243,22 @@ def bent(mesh: Any, curves: Curves) -> Any:
         for name, curve in known.items():
             own = facets_of(mesh, name)
             corners = mesh.p[:, mesh.facets[:, own]]
-            _shift(shift, faces[own], corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=0), curve)
+            _shift(
+                shift, faces[own], corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=0), curve
+            )
     local = shift[:, made.dofs.element_dofs]  # the node within follows those around it
     if isinstance(mesh, skfem.MeshQuad):
         shift[:, made.dofs.element_dofs[8]] = local[:, 4:8].sum(axis=1) / 2
     elif isinstance(mesh, skfem.MeshHex):
-        shift[:, made.dofs.element_dofs[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
+        shift[:, made.dofs.element_dofs[26]] = (
+            local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
+        )
     return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
 
 
-def _shift(shift: np.ndarray, nodes: np.ndarray, places: np.ndarray, size: np.ndarray, curve: Function) -> None:
+def _shift(
+    shift: np.ndarray, nodes: np.ndarray, places: np.ndarray, size: np.ndarray, curve: Function
+) -> None:
     """Write down how nodes at these places move to a curve, where it is near beside their size."""
     off = curve(places) - places
     near = np.linalg.norm(off, axis=0) <= BENT * size
@@ -277,21 +285,21 @@ def named_like(old: Any, new: Any) -> Any:
 
     Parameters
     ----------
-    old
-        A scikit-fem mesh with named boundaries.
-    new
-        A mesh of simplices of the same body, or of a part of it.
+    old : A scikit-fem mesh with named boundaries.
+    new : A mesh of simplices of the same body, or of a part of it.
 
     Returns
     -------
-    mesh
-        `new` with the boundaries of `old`.
+    `new` with the boundaries of `old`.
     """
     if not old.boundaries:
         return new
     dim, facets, outer = len(old.p), old.boundary_facets(), new.boundary_facets()
-    choices = list(combinations(range(len(old.facets)), dim))  # of quadrilaterals all triangles between their corners
-    corners = np.concatenate([old.p[:, old.facets[list(choice)][:, facets]] for choice in choices], axis=2)
+    # of quadrilaterals all triangles between their corners
+    choices = list(combinations(range(len(old.facets)), dim))
+    corners = np.concatenate(
+        [old.p[:, old.facets[list(choice)][:, facets]] for choice in choices], axis=2
+    )
     facets = np.tile(facets, len(choices))
     centres = new.p[:, new.facets[:, outer]].mean(axis=1)
     middle = corners.mean(axis=1)
@@ -306,4 +314,7 @@ def named_like(old: Any, new: Any) -> Any:
     parent = np.full(len(outer), -1)
     parent[found] = facets[of[order[first]]]
     names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
-    return replace(new, _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()})
+    return replace(
+        new,
+        _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()},
+    )

@@ -1,8 +1,9 @@
-"""Meshes from files: everything that meshio reads, with the groups of the file as bodies and as named boundaries.
+"""Meshes from files: everything that meshio reads, with the groups of the file as bodies and as
+named boundaries.
 
-A boundary is found by its corners on the surface of the body. So its normal is the outward one of the body, whichever way round
-the file writes the facets, and a face between two parts of a file is a boundary of each. contactopt.meshes.mesh_repair holds what is
-repaired and what is refused.
+A boundary is found by its corners on the surface of the body. So its normal is the outward one of
+the body, whichever way round the file writes the facets, and a face between two parts of a file is
+a boundary of each. contactopt.meshes.mesh_repair holds what is repaired and what is refused.
 """
 
 from __future__ import annotations
@@ -32,7 +33,15 @@ from contactopt.meshes.mesh_repair import (
 
 PLANE = 1e-9  # a mesh is plane if it is thinner than this fraction of its size
 FAR = 1e100  # larger coordinates have no volume in floating-point numbers
-FACET_CORNERS = {"line": 2, "line3": 2, "triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+FACET_CORNERS = {
+    "line": 2,
+    "line3": 2,
+    "triangle": 3,
+    "triangle6": 3,
+    "quad": 4,
+    "quad8": 4,
+    "quad9": 4,
+}
 
 log = logging.getLogger(__name__)
 
@@ -42,24 +51,23 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
 
     Parameters
     ----------
-    path
-        File in any format that meshio reads: Gmsh (.msh), VTK (.vtu, .vtk), Abaqus and CalculiX (.inp), XDMF, Nastran, ...
-        A plane mesh may lie across any axis.
-    group
-        Name of the group of elements that is the body, or the number of a group without a name. None: all elements.
-    scale
-        Unit of length of the file in that of the scene: 1000 for a file in metres and a scene in millimetres.
+    path : File in any format that meshio reads: Gmsh (.msh), VTK (.vtu, .vtk), Abaqus and CalculiX
+        (.inp), XDMF, Nastran, ... A plane mesh may lie across any axis.
+    group : Name of the group of elements that is the body, or the number of a group without a name.
+        None: all elements.
+    scale : Unit of length of the file in that of the scene: 1000 for a file in metres and a scene
+        in millimetres.
 
     Returns
     -------
-    skfem.Mesh
-        Triangles, quadrilaterals, tetrahedra or hexahedra, curved where the file holds elements of second order. Its
-        boundaries are the groups of facets on its surface, and the groups of nodes that hold all corners of such facets.
+    Triangles, quadrilaterals, tetrahedra or hexahedra, curved where the file holds elements of
+    second order. Its boundaries are the groups of facets on its surface, and the groups of nodes
+    that hold all corners of such facets.
 
     Raises
     ------
-    InputError
-        If the file cannot be read, if there is no such group, or if the mesh has a fault that cannot be repaired.
+    InputError : If the file cannot be read, if there is no such group, or if the mesh has a fault
+        that cannot be repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
     path = Path(path)
@@ -67,22 +75,28 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     dim, points = _place(path, groups)
     cells = _elements(path, groups, dim, points * scale, group)
     bodies = groups.names(dim)
-    hint = f"choose the body by its group, one of {', '.join(bodies)}" if len(bodies) > 1 else "mesh it in one piece"
+    hint = (
+        f"choose the body by its group, one of {', '.join(bodies)}"
+        if len(bodies) > 1
+        else "mesh it in one piece"
+    )
     merged = np.arange(cells.points.shape[1])
     if group is not None or len(bodies) < 2:  # nodes of different bodies stay apart
         merged = representatives(cells)
     cells = repaired(cells, merged)
     count = pieces(cells)
     if count > 1:
-        raise InputError(f"mesh file '{path}': the body falls into {count} pieces that share no node; {hint}.")
+        raise InputError(
+            f"mesh file '{path}': the body falls into {count} pieces that share no node; {hint}."
+        )
     corners = np.unique(cells.corners)
     inner = np.unique(cells.nodes[len(cells.corners) :])
     both = np.intersect1d(corners, inner)
     if len(both):
         element = int(np.argmax(np.any(cells.nodes == both[0], axis=0)))
         raise InputError(
-            f"mesh file '{path}': a node of {cells.name(element)} is a corner of one element and within an edge of another; "
-            "mesh this place anew."
+            f"mesh file '{path}': a node of {cells.name(element)} is a corner of one element and"
+            " within an edge of another; mesh this place anew."
         )
     kept = np.concatenate([corners, inner])
     number = np.full(cells.points.shape[1], -1)
@@ -91,7 +105,8 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
         mesh = _mesh(cells.kind, cells.points[:, kept], number[cells.nodes])
     except (IndexError, ValueError) as error:  # there are not as many nodes as edges
         raise InputError(
-            f"mesh file '{path}': neighbouring elements do not share the nodes within their edges; mesh it anew."
+            f"mesh file '{path}': neighbouring elements do not share the nodes within their edges;"
+            " mesh it anew."
         ) from error
     check_elements(cells, mesh)
     check_surface(path, mesh)
@@ -106,26 +121,24 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     return mesh
 
 
-def name_boundaries(mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[float, float]]]) -> skfem.Mesh:
+def name_boundaries(
+    mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[float, float]]]
+) -> skfem.Mesh:
     """Add boundaries to a mesh that are named by where they are.
 
     Parameters
     ----------
-    mesh
-        Any mesh.
-    places
-        Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners all lie within these
-        limits, to a millionth of the size of the body.
+    mesh : Any mesh.
+    places : Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners
+        all lie within these limits, to a millionth of the size of the body.
 
     Returns
     -------
-    Mesh
-        The mesh with these boundaries beside its own.
+    The mesh with these boundaries beside its own.
 
     Raises
     ------
-    InputError
-        If no facet lies there.
+    InputError : If no facet lies there.
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:, mesh.facets[:, facets]]
@@ -138,7 +151,8 @@ def name_boundaries(mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[fl
         if not inside.any():
             first, last = text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1))
             raise InputError(
-                f"no facet of the surface lies at boundary {name!r}; the body reaches from ({first}) to ({last})."
+                f"no facet of the surface lies at boundary {name!r}; the body reaches from"
+                f" ({first}) to ({last})."
             )
         found[name] = facets[inside]
     return mesh.with_boundaries(found) if found else mesh
@@ -148,48 +162,76 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
     """Dimension of the bodies, 2 or 3, and the nodes (dim, n) in as many coordinates."""
     dim = max(dims for _, nodes, dims in groups.blocks if len(nodes))
     if dim < 2:
-        raise InputError(f"mesh file '{path}': it holds no elements of a body, neither in a plane nor in space.")
+        raise InputError(
+            f"mesh file '{path}': it holds no elements of a body, neither in a plane nor in space."
+        )
     points = np.asarray(groups.points, dtype=float)
-    cells = np.unique(np.concatenate([nodes.ravel() for _, nodes, dims in groups.blocks if dims == dim]))
+    cells = np.unique(
+        np.concatenate([nodes.ravel() for _, nodes, dims in groups.blocks if dims == dim])
+    )
     lost = cells[~np.all(np.abs(points[cells]) < FAR, axis=1)]
     if len(lost):
-        raise InputError(f"mesh file '{path}': the coordinates of node {lost[0] + 1} are no numbers below {FAR:g}.")
+        raise InputError(
+            f"mesh file '{path}': the coordinates of node {lost[0] + 1} are no numbers below"
+            f" {FAR:g}."
+        )
     if dim == points.shape[1]:
         return dim, points.T
     spread = np.ptp(points[cells], axis=0)
     if spread.min() > PLANE * spread.max():
-        raise InputError(f"mesh file '{path}': it holds a surface in space only; mesh the volume inside it, too.")
+        raise InputError(
+            f"mesh file '{path}': it holds a surface in space only; mesh the volume inside it, too."
+        )
     across = 2 if spread[2] <= PLANE * spread.max() else int(np.argmin(spread))
     if across != 2:
-        log.info("%s: the mesh lies across the %s axis; the other coordinates keep their order", path, "xyz"[across])
+        log.info(
+            "%s: the mesh lies across the %s axis; the other coordinates keep their order",
+            path,
+            "xyz"[across],
+        )
     return 2, np.delete(points, across, axis=1).T
 
 
-def _elements(path: Path, groups: FileGroups, dim: int, points: np.ndarray, group: str | None) -> Cells:
+def _elements(
+    path: Path, groups: FileGroups, dim: int, points: np.ndarray, group: str | None
+) -> Cells:
     """The elements of a group, all of one type, serendipity elements completed."""
     bodies = ", ".join(groups.names(dim)) or "none"
     if group is not None and group not in groups.names(dim):
         facets = group in groups.names(dim - 1)
-        note = f"{group!r} is a group of facets, a boundary" if facets else f"there is no group {group!r}"
+        note = (
+            f"{group!r} is a group of facets, a boundary"
+            if facets
+            else f"there is no group {group!r}"
+        )
         raise InputError(f"mesh file '{path}': {note}; its groups of elements are {bodies}.")
     found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     before: dict[str, int] = {}
     for i, (kind, nodes, dims) in enumerate(groups.blocks):
         if dims == dim:
-            chosen = np.arange(len(nodes)) if group is None else groups.members[group, dim].get(i, np.zeros(0, int))
+            chosen = (
+                np.arange(len(nodes))
+                if group is None
+                else groups.members[group, dim].get(i, np.zeros(0, int))
+            )
             if len(chosen):
                 found.setdefault(kind, []).append((nodes[chosen], chosen + before.get(kind, 0)))
             before[kind] = before.get(kind, 0) + len(nodes)
     for kind in found:
         if kind not in CORNERS:
             raise InputError(
-                f"mesh file '{path}': elements of type {kind!r} cannot be used; make triangles, quadrilaterals, tetrahedra "
-                "or hexahedra of first or second order."
+                f"mesh file '{path}': elements of type {kind!r} cannot be used; make triangles,"
+                " quadrilaterals, tetrahedra or hexahedra of first or second order."
             )
     if len(found) != 1:
         raise InputError(
-            f"mesh file '{path}': the body mixes elements of type {' and '.join(found)}; make all of one type"
-            + ("." if group is not None or bodies == "none" else f", or choose one of its groups: {bodies}.")
+            f"mesh file '{path}': the body mixes elements of type {' and '.join(found)}; make all"
+            " of one type"
+            + (
+                "."
+                if group is not None or bodies == "none"
+                else f", or choose one of its groups: {bodies}."
+            )
         )
     ((kind, parts),) = found.items()
     nodes, numbers = (np.concatenate(each) for each in zip(*parts))
@@ -204,8 +246,12 @@ def _mesh(kind: str, points: np.ndarray, nodes: np.ndarray) -> skfem.Mesh:
     return from_meshio(meshio.Mesh(points.T, [(kind, nodes.T)]), force_meshio_type=kind)
 
 
-def _boundaries(mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarray) -> dict[str, np.ndarray]:
-    """Name -> facets on the surface of the mesh; `number` is the node of the mesh for every node of the file, or -1."""
+def _boundaries(
+    mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Name -> facets on the surface of the mesh; `number` is the node of the mesh for every node of
+    the file, or -1.
+    """
     outer = mesh.boundary_facets()
     corners = np.sort(mesh.facets[:, outer], axis=0)
     place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}
@@ -214,7 +260,9 @@ def _boundaries(mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarr
         hits = []
         for i, elements in groups.members[name, dim - 1].items():
             kind, nodes, _ = groups.blocks[i]
-            facets = np.sort(number[nodes[elements][:, : FACET_CORNERS.get(kind, nodes.shape[1])]], axis=1)
+            facets = np.sort(
+                number[nodes[elements][:, : FACET_CORNERS.get(kind, nodes.shape[1])]], axis=1
+            )
             hits += [place[key] for key in map(tuple, facets.tolist()) if key in place]
         if hits:
             found[name] = outer[np.unique(hits)]

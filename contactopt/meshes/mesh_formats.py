@@ -1,8 +1,8 @@
 """What a mesh file holds: nodes, elements, and the names of their groups, whatever its format.
 
-meshio reads the file. Formats keep groups in different ways: names of physical groups with a number for every element
-(Gmsh), sets of elements and of nodes by name (Abaqus), numbers alone (VTK, Medit, SU2, Nastran). Here all are names; a group
-without a name has its number as name.
+meshio reads the file. Formats keep groups in different ways: names of physical groups with a number
+for every element (Gmsh), sets of elements and of nodes by name (Abaqus), numbers alone (VTK, Medit,
+SU2, Nastran). Here all are names; a group without a name has its number as name.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class FileGroups:
 
     points      (n, 2 or 3) coordinates in the unit of the file
     blocks      (type in meshio, nodes (e, v), dimension) of each block of elements
-    members     (name, dimension) -> for each block the numbers of those elements that belong to the group
+    members     (name, dimension) -> for each block the numbers of those elements that belong to the
+                group
     point_sets  name -> nodes
     """
 
@@ -73,18 +74,15 @@ def read_groups(path: Path) -> FileGroups:
 
     Parameters
     ----------
-    path
-        A file in any format that meshio reads.
+    path : A file in any format that meshio reads.
 
     Returns
     -------
-    FileGroups
-        Nodes, elements by their kind, and the groups of elements and of nodes by their names.
+    Nodes, elements by their kind, and the groups of elements and of nodes by their names.
 
     Raises
     ------
-    InputError
-        In one sentence, whatever is wrong with the file.
+    InputError : In one sentence, whatever is wrong with the file.
     """
     mesh = _read(path)
     blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
@@ -104,7 +102,9 @@ def read_groups(path: Path) -> FileGroups:
             for i, found in enumerate(sets):
                 if found is not None and len(found):
                     found = np.asarray(found)
-                    add(name, i, np.flatnonzero(found) if found.dtype == bool else found.astype(int))
+                    add(
+                        name, i, np.flatnonzero(found) if found.dtype == bool else found.astype(int)
+                    )
     named = {(int(tag), int(dim)): name for name, (tag, dim) in _numbered(mesh.field_data)}
     for key, arrays in mesh.cell_data.items():
         for i, values in enumerate(np.asarray(array) for array in arrays):
@@ -112,7 +112,11 @@ def read_groups(path: Path) -> FileGroups:
                 continue
             for tag in np.unique(values):
                 number = f"{tag}" if key in TAGS else f"{key}={tag}"
-                name = named.get((int(tag), blocks[i][2]), number) if key == "gmsh:physical" else number
+                name = (
+                    named.get((int(tag), blocks[i][2]), number)
+                    if key == "gmsh:physical"
+                    else number
+                )
                 if tag != 0 or key not in TAGS:
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
@@ -120,7 +124,9 @@ def read_groups(path: Path) -> FileGroups:
 
 
 def _numbered(field_data: Mapping) -> list[tuple[str, tuple[int, int]]]:
-    """Names of physical groups with their numbers and dimensions; other data of the file are passed over."""
+    """Names of physical groups with their numbers and dimensions; other data of the file are passed
+    over.
+    """
     return [(name, tuple(value)) for name, value in field_data.items() if np.shape(value) == (2,)]
 
 
@@ -128,21 +134,34 @@ def _read(path: Path) -> Any:
     import meshio
 
     if not path.is_file():
-        what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
+        what = (
+            "is a folder"
+            if path.is_dir()
+            else "is no file that can be read"
+            if path.exists()
+            else "does not exist"
+        )
         raise InputError(f"mesh file '{path}' {what}.")
     size = path.stat().st_size
     if not 0 < size < MOST_BYTES:
-        raise InputError(f"mesh file '{path}' has {size} bytes; a mesh that can be solved has 1 to {MOST_BYTES:.0e}.")
+        raise InputError(
+            f"mesh file '{path}' has {size} bytes; a mesh that can be solved has 1 to"
+            f" {MOST_BYTES:.0e}."
+        )
     endings = ["".join(path.suffixes[-n:]).lower() for n in range(len(path.suffixes), 0, -1)]
     formats = [name for ending in endings for name in meshio.extension_to_filetypes.get(ending, ())]
     if not formats:
         raise InputError(
-            f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus, CalculiX), ..."
+            f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp"
+            " (Abaqus, CalculiX), ..."
         )
     said = ""
     stated, binary = version(path) if "gmsh" in formats else (None, False)
     if stated is not None and stated.partition(".")[0] not in ("2", "4"):
-        raise InputError(f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or 2.2.")
+        raise InputError(
+            f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or"
+            " 2.2."
+        )
     if binary:  # meshio trusts the counts of damaged files
         formats = ["gmsh"]
     for newer in (False, True):  # "4" stands for either
@@ -156,14 +175,23 @@ def _read(path: Path) -> Any:
                 if name == "abaqus":
                     return read_inp(path)
                 if binary:
-                    return read_msh2(path) if str(stated)[0] == "2" else read_msh4(path, stated != "4.0")
-                return meshio.read(path, file_format=name) if name in SAFE else _read_apart(path, name, size)
+                    return (
+                        read_msh2(path)
+                        if str(stated)[0] == "2"
+                        else read_msh4(path, stated != "4.0")
+                    )
+                return (
+                    meshio.read(path, file_format=name)
+                    if name in SAFE
+                    else _read_apart(path, name, size)
+                )
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
             said = said or " ".join(text.split())[:200] or type(error).__name__
     raise InputError(
-        f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of another "
-        "format" + ("; save Gmsh files as text in version 4.1 or 2.2." if "gmsh" in formats else ".")
+        f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of"
+        " another format"
+        + ("; save Gmsh files as text in version 4.1 or 2.2." if "gmsh" in formats else ".")
     )
 
 

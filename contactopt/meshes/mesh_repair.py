@@ -1,4 +1,6 @@
-"""Faults of meshes from files: each is repaired, with a line in the log, or refused in a sentence that names the element."""
+"""Faults of meshes from files: each is repaired, with a line in the log, or refused in a sentence
+that names the element.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ CORNERS = {
     **{"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "tetra": 4, "tetra10": 4},
     **{"hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8},
 }
-# places in an element of the same element numbered the other way round; the order of nodes is that of meshio
+# places in an element of the same element numbered the other way round; the order of nodes is that
+# of meshio
 _HEXAHEDRON = (4, 5, 6, 7, 0, 1, 2, 3)
 MIRRORED = {
     "triangle": (0, 2, 1),
@@ -36,9 +39,31 @@ MIRRORED = {
     "tetra": (0, 2, 1, 3),
     "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
     "hexahedron": _HEXAHEDRON,
-    "hexahedron27": (*_HEXAHEDRON, 12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19, 20, 21, 22, 23, 25, 24, 26),
+    "hexahedron27": (
+        *_HEXAHEDRON,
+        12,
+        13,
+        14,
+        15,
+        8,
+        9,
+        10,
+        11,
+        16,
+        17,
+        18,
+        19,
+        20,
+        21,
+        22,
+        23,
+        25,
+        24,
+        26,
+    ),
 }
-# the sides of serendipity elements that have no node in the middle: their corners and the nodes of their edges
+# the sides of serendipity elements that have no node in the middle: their corners and the nodes of
+# their edges
 _SIDES = {
     "quad8": (((0, 1, 2, 3), (4, 5, 6, 7)),),
     "hexahedron20": (
@@ -88,28 +113,34 @@ def text(x: np.ndarray) -> str:
 
 
 def complete(cells: Cells) -> Cells:
-    """Give serendipity elements the nodes that they lack, at the places that their own shape functions give.
+    """Give serendipity elements the nodes that they lack, at the places that their own shape
+    functions give.
 
     Parameters
     ----------
-    cells
-        The elements of a file.
+    cells : The elements of a file.
 
     Returns
     -------
-    Cells
-        Quadrilaterals of nine and hexahedra of 27 nodes in place of those of eight and twenty; others as they are.
+    Quadrilaterals of nine and hexahedra of 27 nodes in place of those of eight and twenty; others
+    as they are.
     """
     if cells.kind not in COMPLETE:
         return cells
     c = cells.points[:, cells.nodes]
-    new = [c[:, list(b)].sum(axis=1) / 2 - c[:, list(a)].sum(axis=1) / 4 for a, b in _SIDES[cells.kind]]
+    new = [
+        c[:, list(b)].sum(axis=1) / 2 - c[:, list(a)].sum(axis=1) / 4 for a, b in _SIDES[cells.kind]
+    ]
     if cells.kind == "hexahedron20":
         new.append(c[:, 8:].sum(axis=1) / 4 - c[:, :8].sum(axis=1) / 4)
     extra = cells.points.shape[1] + np.arange(len(new) * c.shape[2]).reshape(len(new), -1)
-    points, nodes = np.concatenate([cells.points, *new], axis=1), np.concatenate([cells.nodes, extra])
+    points, nodes = (
+        np.concatenate([cells.points, *new], axis=1),
+        np.concatenate([cells.nodes, extra]),
+    )
     made = replace(cells, kind=COMPLETE[cells.kind], points=points, nodes=nodes)
-    return replace(made, nodes=representatives(made, repair=False)[nodes])  # neighbours share the middle of their side
+    # neighbours share the middle of their side
+    return replace(made, nodes=representatives(made, repair=False)[nodes])
 
 
 def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
@@ -117,20 +148,16 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
 
     Parameters
     ----------
-    cells
-        The elements of a file, with n nodes.
-    repair
-        Whether nodes at one place are a fault of the file, which is told in a line of the log.
+    cells : The elements of a file, with n nodes.
+    repair : Whether nodes at one place are a fault of the file, which is told in a line of the log.
 
     Returns
     -------
-    ndarray
-        (n,) numbers of nodes: of each group at one place the first.
+    (n,) numbers of nodes: of each group at one place the first.
 
     Raises
     ------
-    InputError
-        If two nodes are so near each other that they may be one or two.
+    InputError : If two nodes are so near each other that they may be one or two.
     """
     own = np.arange(cells.points.shape[1])
     used = np.unique(cells.nodes)
@@ -140,15 +167,22 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     if len(unclear):
         i, j = pairs[unclear[0]]
         raise InputError(
-            f"mesh file '{cells.path}': nodes {i + 1} and {j + 1}, at ({text(cells.points[:, i])}), are "
-            f"{distance[unclear[0]]:.3g} apart, too far for one node and too near for two; merge such nodes in the file."
+            f"mesh file '{cells.path}': nodes {i + 1} and {j + 1}, at ({text(cells.points[:, i])}),"
+            f" are {distance[unclear[0]]:.3g} apart, too far for one node and too near for two;"
+            " merge such nodes in the file."
         )
     if not same.any():
         return own
     pairs = pairs[same]
     if repair:
-        log.warning("%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, at most %.3g apart",
-                    cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max())  # fmt: skip
+        log.warning(
+            "%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, "
+            "at most %.3g apart",
+            cells.path,
+            text(cells.points[:, pairs[0, 0]]),
+            len(pairs),
+            distance[same].max(),
+        )
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), (len(own), len(own)))
     label = connected_components(graph, directed=False)[1]
     first = np.full(label.max() + 1, len(own))
@@ -157,50 +191,59 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
 
 
 def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs (m, 2) of nodes nearer than APART of the shortest edge there, how far apart, and that edge."""
+    """Pairs (m, 2) of nodes nearer than APART of the shortest edge there, how far apart, and that
+    edge.
+    """
     corners = cells.points[:, cells.corners].transpose(1, 0, 2)
     edge = np.min([np.linalg.norm(a - b, axis=0) for a, b in combinations(corners, 2)], axis=0)
     shortest = np.full(cells.points.shape[1], np.inf)
     for row in cells.nodes:
         np.minimum.at(shortest, row, edge)
     tree = KDTree(cells.points[:, used].T)
-    crowded = np.flatnonzero(tree.query_ball_point(tree.data, APART * shortest[used], return_length=True) > 1)
+    crowded = np.flatnonzero(
+        tree.query_ball_point(tree.data, APART * shortest[used], return_length=True) > 1
+    )
     near = tree.query_ball_point(tree.data[crowded], APART * shortest[used[crowded]])
-    found = {(min(i, j), max(i, j)) for i, others in zip(crowded.tolist(), near) for j in others if i != j}
+    found = {
+        (min(i, j), max(i, j))
+        for i, others in zip(crowded.tolist(), near)
+        for j in others
+        if i != j
+    }
     pairs = used[np.array(sorted(found), dtype=int).reshape(-1, 2)]
     distance = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
     return pairs, distance, shortest[pairs].min(axis=1)
 
 
 def repaired(cells: Cells, merged: np.ndarray) -> Cells:
-    """Put the elements on the merged nodes, each once, with their corners numbered the right way round.
+    """Put the elements on the merged nodes, each once, with their corners numbered the right way
+    round.
 
     Parameters
     ----------
-    cells
-        The elements of a file, with n nodes.
-    merged
-        (n,) for every node the one that stands for it, from `representatives`.
+    cells : The elements of a file, with n nodes.
+    merged : (n,) for every node the one that stands for it, from `representatives`.
 
     Returns
     -------
-    Cells
-        The repaired elements. What was repaired is told in the log.
+    The repaired elements. What was repaired is told in the log.
 
     Raises
     ------
-    InputError
-        If two corners of an element coincide.
+    InputError : If two corners of an element coincide.
     """
     sets = np.sort(merged[cells.corners], axis=0)
     flat = np.flatnonzero(np.any(np.diff(sets, axis=0) == 0, axis=0))
     if len(flat):
         raise InputError(
-            f"mesh file '{cells.path}': two corners coincide in {cells.name(flat[0])}; mesh this place anew."
+            f"mesh file '{cells.path}': two corners coincide in {cells.name(flat[0])}; mesh this"
+            " place anew."
         )
     once = np.sort(np.unique(sets, axis=1, return_index=True)[1])
     if len(once) < sets.shape[1]:
-        log.warning("%s: %d elements are there twice and are dropped", cells.path, sets.shape[1] - len(once))
+        log.warning(
+            "%s: %d elements are there twice and are dropped", cells.path, sets.shape[1] - len(once)
+        )
     cells = replace(cells, nodes=merged[cells.nodes[:, once]], numbers=cells.numbers[once])
     wrong = _volumes(cells.points, cells.corners) < 0
     if wrong.any():
@@ -219,13 +262,11 @@ def pieces(cells: Cells) -> int:
 
     Parameters
     ----------
-    cells
-        The elements of a file.
+    cells : The elements of a file.
 
     Returns
     -------
-    int
-        The number of pieces.
+    The number of pieces.
     """
     first = np.broadcast_to(cells.corners[0], cells.corners.shape)
     size = cells.points.shape[1]
@@ -235,40 +276,46 @@ def pieces(cells: Cells) -> int:
 
 
 def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
-    """Check that all elements have volume and nowhere fold over, and that no facet belongs to more than two.
+    """Check that all elements have volume and nowhere fold over, and that no facet belongs to more
+    than two.
 
     Parameters
     ----------
-    cells
-        The elements of the file, whose names are told.
-    mesh
-        The mesh that was made of them.
+    cells : The elements of the file, whose names are told.
+    mesh : The mesh that was made of them.
 
     Raises
     ------
-    InputError
-        With the name of the first element that is wrong.
+    InputError : With the name of the first element that is wrong.
     """
-    nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if len(cells.nodes) > len(cells.corners) else mesh.p[:, mesh.t]
+    nodes = (
+        mesh.doflocs[:, mesh.dofs.element_dofs]
+        if len(cells.nodes) > len(cells.corners)
+        else mesh.p[:, mesh.t]
+    )
     apart = np.abs(nodes.sum(axis=1) - cells.points[:, cells.nodes].sum(axis=1)).max(axis=0)
     wrong = np.flatnonzero(apart > SAME * np.ptp(nodes, axis=1).max(axis=0))
     if len(wrong):
         raise InputError(
-            f"mesh file '{cells.path}': {cells.name(wrong[0])} does not share the nodes within its edges and faces with its "
-            "neighbours; mesh this place anew."
+            f"mesh file '{cells.path}': {cells.name(wrong[0])} does not share the nodes within its"
+            " edges and faces with its neighbours; mesh this place anew."
         )
     volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
     bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
     if len(bad):
-        how = "has no volume" if np.abs(volume[bad[0]]).max() <= FLAT * size[bad[0]] else "folds over"
-        raise InputError(f"mesh file '{cells.path}': {cells.name(bad[0])} {how}; mesh this place anew.")
+        how = (
+            "has no volume" if np.abs(volume[bad[0]]).max() <= FLAT * size[bad[0]] else "folds over"
+        )
+        raise InputError(
+            f"mesh file '{cells.path}': {cells.name(bad[0])} {how}; mesh this place anew."
+        )
     shared = np.bincount(mesh.t2f.ravel())
     if shared.max() > 2:
         element = int(np.argmax(np.any(mesh.t2f == np.argmax(shared), axis=0)))
         raise InputError(
-            f"mesh file '{cells.path}': more than two elements share a facet, one of them is {cells.name(element)}; "
-            "elements must not overlap."
+            f"mesh file '{cells.path}': more than two elements share a facet, one of them is"
+            f" {cells.name(element)}; elements must not overlap."
         )
 
 
@@ -277,13 +324,11 @@ def volumes(mesh: skfem.Mesh) -> np.ndarray:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh with e elements.
+    mesh : A scikit-fem mesh with e elements.
 
     Returns
     -------
-    ndarray
-        (e, n + 1) ratios with their signs, at the n nodes of each element and at its centre.
+    (e, n + 1) ratios with their signs, at the n nodes of each element and at its centre.
     """
     places = np.asarray(mesh.elem().doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
@@ -291,26 +336,25 @@ def volumes(mesh: skfem.Mesh) -> np.ndarray:
 
 
 def check_surface(path: Path, mesh: skfem.Mesh) -> None:
-    """Check that the outward normals of a body's surface integrate to zero, as those of a closed surface do.
+    """Check that the outward normals of a body's surface integrate to zero, as those of a closed
+    surface do.
 
     Parameters
     ----------
-    path
-        The mesh file, for the message.
-    mesh
-        The mesh that was made of it.
+    path : The mesh file, for the message.
+    mesh : The mesh that was made of it.
 
     Raises
     ------
-    InputError
-        If they do not, because elements overlap.
+    InputError : If they do not, because elements overlap.
     """
     facets = mesh.boundary_facets()
     areas = _area_vectors(mesh.p[:, outer_corners(mesh, facets)])
     total = np.abs(areas.sum(axis=1)).max()
     if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
-            f"mesh file '{path}': the surface of the body is not closed, its normals sum up to {total:.3g}; elements overlap."
+            f"mesh file '{path}': the surface of the body is not closed, its normals sum up to"
+            f" {total:.3g}; elements overlap."
         )
 
 
@@ -319,15 +363,13 @@ def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    mesh
-        A scikit-fem mesh.
-    facets
-        (f,) numbers of facets of its surface.
+    mesh : A scikit-fem mesh.
+    facets : (f,) numbers of facets of its surface.
 
     Returns
     -------
-    ndarray
-        (c, f) numbers of the corners in their order around each facet; in the plane the body is on their left.
+    (c, f) numbers of the corners in their order around each facet; in the plane the body is on
+    their left.
     """
     cell = mesh.f2t[0, facets]
     local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
@@ -359,6 +401,10 @@ def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     else:
         ends: list[tuple[tuple[int, ...], tuple[int, ...]]] = [((1, 2), (0, 3)), ((2, 3), (0, 1))]
         if len(points) == 3:
-            ends = [((1, 2, 5, 6), (0, 3, 4, 7)), ((2, 3, 6, 7), (0, 1, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3))]
+            ends = [
+                ((1, 2, 5, 6), (0, 3, 4, 7)),
+                ((2, 3, 6, 7), (0, 1, 4, 5)),
+                ((4, 5, 6, 7), (0, 1, 2, 3)),
+            ]
         axes = [c[:, list(b)].sum(axis=1) - c[:, list(a)].sum(axis=1) for b, a in ends]
     return np.asarray(np.linalg.det(np.stack(axes).transpose(2, 0, 1)))

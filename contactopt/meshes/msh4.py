@@ -23,20 +23,20 @@ def version(path: Path) -> tuple[str | None, bool]:
 
     Parameters
     ----------
-    path
-        A file of any kind.
+    path : A file of any kind.
 
     Returns
     -------
-    tuple
-        The version, such as '4.1', where '4' stands for 4.0, or None if it is no file of Gmsh; and
-        whether it is binary.
+    The version, such as '4.1', where '4' stands for 4.0, or None if it is no file of Gmsh; and
+    whether it is binary.
     """
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
     if head[:1] == ["$NOD"]:
         return "1", False
-    return (head[1], head[2] != "0") if len(head) > 2 and head[0] == "$MeshFormat" else (None, False)
+    return (
+        (head[1], head[2] != "0") if len(head) > 2 and head[0] == "$MeshFormat" else (None, False)
+    )
 
 
 def read_msh4(path: Path, newer: bool) -> Any:
@@ -44,20 +44,16 @@ def read_msh4(path: Path, newer: bool) -> Any:
 
     Parameters
     ----------
-    path
-        The file.
-    newer
-        Whether its version is 4.1.
+    path : The file.
+    newer : Whether its version is 4.1.
 
     Returns
     -------
-    meshio.Mesh
-        The mesh, with the physical groups as sets of elements by name.
+    The mesh, with the physical groups as sets of elements by name.
 
     Raises
     ------
-    ValueError, KeyError
-        Where the file ends early or does not keep to the format.
+    ValueError, KeyError : Where the file ends early or does not keep to the format.
     """
     from meshio._common import num_nodes_per_cell
     from meshio.gmsh.common import _gmsh_to_meshio_type
@@ -77,7 +73,9 @@ def read_msh4(path: Path, newer: bool) -> Any:
         blocks.append((kind, rows[:, 1:]))
         members.append(groups.get((first, second) if newer else (second, first), []))
     sets = {
-        group: [np.arange(len(nodes) if group in own else 0) for (_, nodes), own in zip(blocks, members)]
+        group: [
+            np.arange(len(nodes) if group in own else 0) for (_, nodes), own in zip(blocks, members)
+        ]
         for group in sorted({group for own in members for group in own})
     }
     return _mesh(points, tags, blocks, sets)
@@ -88,18 +86,15 @@ def read_msh2(path: Path) -> Any:
 
     Parameters
     ----------
-    path
-        The file.
+    path : The file.
 
     Returns
     -------
-    meshio.Mesh
-        The mesh, with the physical groups as sets of elements by name.
+    The mesh, with the physical groups as sets of elements by name.
 
     Raises
     ------
-    ValueError, KeyError
-        Where the file ends early or does not keep to the format.
+    ValueError, KeyError : Where the file ends early or does not keep to the format.
     """
     from meshio._common import num_nodes_per_cell
     from meshio.gmsh.common import _gmsh_to_meshio_type
@@ -130,7 +125,9 @@ def read_msh2(path: Path) -> Any:
     for i, groups in enumerate(np.concatenate(parts) for parts in found):
         for tag in np.unique(groups[groups != 0]):
             dim = _DIMENSION[_gmsh_to_meshio_type[blocks[i][0]].rstrip("0123456789")]
-            own = sets.setdefault(names.get((dim, int(tag)), str(tag)), [np.arange(0)] * len(blocks))
+            own = sets.setdefault(
+                names.get((dim, int(tag)), str(tag)), [np.arange(0)] * len(blocks)
+            )
             own[i] = np.flatnonzero(groups == tag)
     return _mesh(points, tags, joined, sets)
 

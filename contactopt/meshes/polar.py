@@ -1,6 +1,8 @@
-"""Structured meshes of round bodies: rings and sectors of rings, half discs and discs, divided evenly around the origin.
+"""Structured meshes of round bodies: rings and sectors of rings, half discs and discs, divided
+evenly around the origin.
 
-Elements are of second order, with the nodes on edges along a circle on that circle. Linear displacements use the chords.
+Elements are of second order, with the nodes on edges along a circle on that circle. Linear
+displacements use the chords.
 """
 
 from __future__ import annotations
@@ -19,25 +21,27 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
 
     Parameters
     ----------
-    radii
-        (m,) ascending radii of the circles [length].
-    angles
-        (n,) ascending angles of the rays, from the x axis towards y [rad].
+    radii : (m,) ascending radii of the circles [length].
+    angles : (n,) ascending angles of the rays, from the x axis towards y [rad].
 
     Returns
     -------
-    MeshQuad2
-        With the boundaries 'inner' and 'outer', and 'start' and 'end' at the first and the last angle unless the ring
-        is closed.
+    With the boundaries 'inner' and 'outer', and 'start' and 'end' at the first and the last angle
+    unless the ring is closed.
     """
     flat = tensor_mesh(angles, radii)
     angle, radius = flat.p
     points = radius * np.stack([np.cos(angle), np.sin(angle)])
     names = {"inner": "y-", "outer": "y+", "start": "x-", "end": "x+"}
     if angles[-1] - angles[0] < 2 * np.pi * (1 - NEAR):
-        made = _quads(points, flat.t).with_boundaries({new: flat.boundaries[old] for new, old in names.items()})
+        made = _quads(points, flat.t).with_boundaries(
+            {new: flat.boundaries[old] for new, old in names.items()}
+        )
         return _on_circles(made)
-    number, first, last = np.arange(len(angle)), *(np.flatnonzero(angle == value) for value in (angles[0], angles[-1]))
+    number, first, last = (
+        np.arange(len(angle)),
+        *(np.flatnonzero(angle == value) for value in (angles[0], angles[-1])),
+    )
     number[last[np.argsort(radius[last])]] = first[np.argsort(radius[first])]
     kept = np.unique(number)
     made = _quads(points[:, kept], np.searchsorted(kept, number[flat.t]))
@@ -51,15 +55,12 @@ def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
 
     Parameters
     ----------
-    radius
-        Of the disc [length].
-    sectors
-        The nodes on the half circle divide it evenly into 4 * sectors parts.
+    radius : Of the disc [length].
+    sectors : The nodes on the half circle divide it evenly into 4 * sectors parts.
 
     Returns
     -------
-    MeshQuad2
-        With the boundaries 'rim' and 'axis', the diameter x = 0.
+    With the boundaries 'rim' and 'axis', the diameter x = 0.
     """
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     made = _quads(np.stack([y, -x]), t)
@@ -73,25 +74,25 @@ def disc(radius: float, sectors: int) -> MeshQuad2:
 
     Parameters
     ----------
-    radius
-        Of the disc [length].
-    sectors
-        The nodes on the circle divide it evenly into 8 * sectors parts.
+    radius : Of the disc [length].
+    sectors : The nodes on the circle divide it evenly into 8 * sectors parts.
 
     Returns
     -------
-    MeshQuad2
-        With the boundary 'rim'.
+    With the boundary 'rim'.
     """
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     diameter = np.flatnonzero(np.abs(y) < NEAR * radius)
     along = diameter[np.argsort(x[diameter])]
-    other = np.full(len(x), -1)  # the node that each becomes when the half disc is turned by half a turn
+    # the node that each becomes when the half disc is turned by half a turn
+    other = np.full(len(x), -1)
     other[along] = along[::-1]
     above = np.flatnonzero(other < 0)
     other[above] = len(x) + np.arange(len(above))
     points = np.stack([x, y])
-    made = _quads(np.concatenate([points, -points[:, above]], axis=1), np.concatenate([t, other[t]], axis=1))
+    made = _quads(
+        np.concatenate([points, -points[:, above]], axis=1), np.concatenate([t, other[t]], axis=1)
+    )
     return _on_circles(made.with_boundaries({"rim": made.boundary_facets()}), radius)
 
 
@@ -100,7 +101,9 @@ def _quads(points: np.ndarray, t: np.ndarray) -> MeshQuad:
 
 
 def _on_circles(mesh: MeshQuad, only: float | None = None) -> MeshQuad2:
-    """Elements of second order whose edges between nodes of one circle bend along it; None: on every circle."""
+    """Elements of second order whose edges between nodes of one circle bend along it; None: on
+    every circle.
+    """
     made = MeshQuad2.from_mesh(mesh)
     ends = mesh.p[:, mesh.facets]
     first, second = np.linalg.norm(ends, axis=0)
@@ -120,15 +123,12 @@ def even(start: float, end: float, parts: int) -> np.ndarray:
 
     Parameters
     ----------
-    start, end
-        The first and the last radius [length].
-    parts
-        Number of elements along half the circle.
+    start, end : The first and the last radius [length].
+    parts : Number of elements along half the circle.
 
     Returns
     -------
-    array (n,)
-        Ascending radii [length].
+    array (n,) : Ascending radii [length].
     """
     count = max(1, round(np.log(end / start) * parts / np.pi))
     return np.asarray(np.geomspace(start, end, count + 1))

@@ -9,29 +9,28 @@ from contactopt.checks import check_memory
 from contactopt.errors import InputError
 
 MOST_CELLS = 2e7  # of one mesh
-NEEDED = {2: 6e3, 3: 15e3}  # bytes of memory that a run takes for each cell in the plane and in space, at least
-FINEST = 1e-8  # shortest cell over the length of a grid; below it, places of nodes are lost in rounding
+# bytes of memory that a run takes for each cell in the plane and in space, at least
+NEEDED = {2: 6e3, 3: 15e3}
+# shortest cell over the length of a grid; below it, places of nodes are lost in rounding
+FINEST = 1e-8
 
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
     """A grid whose spacing grows from one end to the other.
 
-    The number of cells is the smallest that keeps the ratio of neighbours below its bound. The ratio is then lowered
-    so that the first cell is exactly as long as asked. A grid that would need one cell or less is a single cell.
+    The number of cells is the smallest that keeps the ratio of neighbours below its bound. The
+    ratio is then lowered so that the first cell is exactly as long as asked. A grid that would need
+    one cell or less is a single cell.
 
     Parameters
     ----------
-    length
-        Of the whole grid [length].
-    first
-        Length of the first cell [length].
-    growth
-        Largest ratio of neighbouring cells.
+    length : Of the whole grid [length].
+    first : Length of the first cell [length].
+    growth : Largest ratio of neighbouring cells.
 
     Returns
     -------
-    array (n,)
-        Ascending from 0 to `length`.
+    array (n,) : Ascending from 0 to `length`.
     """
     from scipy.optimize import brentq
 
@@ -54,19 +53,14 @@ def contact_grid(half_width: float, elements: int, length: float, growth: float)
 
     Parameters
     ----------
-    half_width
-        Of the zone [length].
-    elements
-        Number of cells in the zone.
-    length
-        Of the whole grid [length].
-    growth
-        Largest ratio of neighbouring cells beyond the zone.
+    half_width : Of the zone [length].
+    elements : Number of cells in the zone.
+    length : Of the whole grid [length].
+    growth : Largest ratio of neighbouring cells beyond the zone.
 
     Returns
     -------
-    array (n,)
-        Ascending from 0 to `length`.
+    array (n,) : Ascending from 0 to `length`.
     """
     zone = np.linspace(0.0, half_width, elements + 1)
     if length <= half_width * (1 + 1e-12):
@@ -80,37 +74,39 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
 
     Parameters
     ----------
-    grids
-        Two or three ascending arrays, the places of the nodes along x, y and z [length].
+    grids : Two or three ascending arrays, the places of the nodes along x, y and z [length].
 
     Returns
     -------
-    MeshQuad or MeshHex
-        Its boundaries 'x-', 'x+', 'y-', 'y+' and in space 'z-', 'z+' are the sides of the box.
+    Its boundaries 'x-', 'x+', 'y-', 'y+' and in space 'z-', 'z+' are the sides of the box.
 
     Raises
     ------
-    InputError
-        If the mesh would have more than MOST_CELLS cells or need more memory than is free, and if a cell would be shorter
-        than FINEST of its grid.
+    InputError : If the mesh would have more than MOST_CELLS cells or need more memory than is free,
+        and if a cell would be shorter than FINEST of its grid.
     """
     cells = float(np.prod([float(len(grid) - 1) for grid in grids]))
     if cells > MOST_CELLS:
-        raise InputError(f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements.")
+        raise InputError(
+            f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements."
+        )
     check_memory(f"a mesh of {cells:.2g} elements", NEEDED[len(grids)] * cells)
     for grid in grids:
         size, shortest = np.ptp(grid), np.diff(grid).min()
         if not shortest >= FINEST * size:
             raise InputError(
-                f"elements of size {shortest:.2g} in a body of size {size:.2g} are lost in rounding; make the contact and its "
-                "body more alike in size, or take fewer elements."
+                f"elements of size {shortest:.2g} in a body of size {size:.2g} are lost in"
+                " rounding; make the contact and its body more alike in size, or take fewer"
+                " elements."
             )
     mesh = (MeshQuad if len(grids) == 2 else MeshHex).init_tensor(*grids)
     planes = {}
     for axis, (name, grid) in enumerate(zip("xyz", grids)):
         near = 1e-9 * (grid[-1] - grid[0])
         for sign, value in (("-", grid[0]), ("+", grid[-1])):
-            planes[name + sign] = lambda x, axis=axis, value=value, near=near: np.abs(x[axis] - value) < near
+            planes[name + sign] = lambda x, axis=axis, value=value, near=near: (
+                np.abs(x[axis] - value) < near
+            )
     return mesh.with_boundaries(planes)
 
 
@@ -119,15 +115,12 @@ def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
 
     Parameters
     ----------
-    mesh
-        As tensor_mesh() makes it.
-    names
-        New name = old name, as in rename(mesh, contact="y-").
+    mesh : As tensor_mesh() makes it.
+    names : New name = old name, as in rename(mesh, contact="y-").
 
     Returns
     -------
-    MeshQuad or MeshHex
-        With both names.
+    With both names.
     """
     return mesh.with_boundaries({new: mesh.boundaries[old] for new, old in names.items()})
 
@@ -139,18 +132,14 @@ def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad
 
     Parameters
     ----------
-    radius
-        Of the sphere [length].
-    x
-        (n,) distances from the axis of the nodes on the lower part of the arc, from 0 to radius / sqrt(2), its middle
-        [length].
-    y
-        (m,) fractions from 0 to 1 of the way from the arc up, graded from the contact.
+    radius : Of the sphere [length].
+    x : (n,) distances from the axis of the nodes on the lower part of the arc, from 0 to radius /
+        sqrt(2), its middle [length].
+    y : (m,) fractions from 0 to 1 of the way from the arc up, graded from the contact.
 
     Returns
     -------
-    MeshQuad
-        With the boundaries 'axis', 'arc' and 'top', the flat face at z = radius.
+    With the boundaries 'axis', 'arc' and 'top', the flat face at z = radius.
     """
     mesh = tensor_mesh(x / x[-1], y)
     s, t = mesh.p
@@ -163,7 +152,11 @@ def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad
     top = np.stack([radius * s_even, np.full_like(s, radius)])
     corner = _arc(radius, np.array(np.pi / 4))[:, None]
     p = (1 - t) * lower + t * top + (1 - s) * left + s * right
-    p -= (1 - s) * t * np.array([[0.0], [radius]]) + s * (1 - t) * corner + s * t * np.array([[radius], [radius]])
+    p -= (
+        (1 - s) * t * np.array([[0.0], [radius]])
+        + s * (1 - t) * corner
+        + s * t * np.array([[radius], [radius]])
+    )
     names = {"axis": "x-", "top": "y+"}
     arc = np.concatenate([mesh.boundaries["y-"], mesh.boundaries["x+"]])
     boundaries = {new: mesh.boundaries[old] for new, old in names.items()} | {"arc": arc}
@@ -174,24 +167,22 @@ def _arc(radius: float, angle: np.ndarray) -> np.ndarray:
     return np.stack([radius * np.sin(angle), radius * (1 - np.cos(angle))])
 
 
-def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float]) -> MeshQuad | MeshHex:
+def patch(
+    mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float]
+) -> MeshQuad | MeshHex:
     """The mesh with a part of one of its boundaries as a boundary of its own.
 
     Parameters
     ----------
-    mesh
-        Any mesh with named boundaries.
-    boundary
-        Name of the whole.
-    name
-        Name of the part.
-    limits
-        Facets whose midpoints are below limits[i] along each axis i belong to the part [length].
+    mesh : Any mesh with named boundaries.
+    boundary : Name of the whole.
+    name : Name of the part.
+    limits : Facets whose midpoints are below limits[i] along each axis i belong to the part
+        [length].
 
     Returns
     -------
-    MeshQuad or MeshHex
-        With the new boundary.
+    With the new boundary.
     """
     facets = np.asarray(mesh.boundaries[boundary])
     middle = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
@@ -202,31 +193,39 @@ def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float
 def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
     """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra.
 
-    Edges become straight. All cells are cut in the same way, so that bodies match whose meshes had the same cells on
-    their contact faces.
+    Edges become straight. All cells are cut in the same way, so that bodies match whose meshes had
+    the same cells on their contact faces.
 
     Parameters
     ----------
-    mesh
-        Of quadrilaterals or hexahedra.
+    mesh : Of quadrilaterals or hexahedra.
 
     Returns
     -------
-    MeshTri or MeshTet
-        Boundaries keep their names.
+    Boundaries keep their names.
 
     Raises
     ------
-    InputError
-        If neighbours are not cut alike; number the vertices of all cells in one order then.
+    InputError : If neighbours are not cut alike; number the vertices of all cells in one order
+        then.
     """
     vertices = mesh.p[:, : mesh.nvertices]
-    cut = MeshQuad(vertices, mesh.t).to_meshtri() if len(vertices) == 2 else MeshHex(vertices, mesh.t).to_meshtet()
+    cut = (
+        MeshQuad(vertices, mesh.t).to_meshtri()
+        if len(vertices) == 2
+        else MeshHex(vertices, mesh.t).to_meshtet()
+    )
     facets = cut.boundary_facets()
     if len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
-        raise InputError("the mesh cannot be cut into simplices: its cells number their vertices in different orders.")
-    sides = mesh.t2f[:, cut.f2t[0, facets] % mesh.nelements]  # those of the cell that each outer facet comes from
+        raise InputError(
+            "the mesh cannot be cut into simplices: its cells number their vertices in different"
+            " orders."
+        )
+    # those of the cell that each outer facet comes from
+    sides = mesh.t2f[:, cut.f2t[0, facets] % mesh.nelements]
     corners = mesh.facets[:, sides]  # (corner, side, facet)
     inside = np.all([np.any(corners == vertex, axis=0) for vertex in cut.facets[:, facets]], axis=0)
     origin = sides[np.argmax(inside, axis=0), np.arange(len(facets))]
-    return cut.with_boundaries({name: facets[np.isin(origin, old)] for name, old in (mesh.boundaries or {}).items()})
+    return cut.with_boundaries(
+        {name: facets[np.isin(origin, old)] for name, old in (mesh.boundaries or {}).items()}
+    )

@@ -1,14 +1,15 @@
 """Methods: one file each, one line here. Nothing is imported before it is used.
 
-A method is a frozen dataclass whose fields are its settings. `iterate(problem, start)` takes a dimensionless
-InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer iteration, from a cold start if
-`start` is None. A method that knows Q r of an iterate to a stated accuracy yields it as well, as a Moved, which saves
-the driver a product. The driver (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method
-that ends by itself has met its own criterion or cannot go on.
+A method is a frozen dataclass whose fields are its settings. `iterate(problem, start)` takes a
+dimensionless InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer
+iteration, from a cold start if `start` is None. A method that knows Q r of an iterate to a stated
+accuracy yields it as well, as a Moved, which saves the driver a product. The driver
+(contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method that ends
+by itself has met its own criterion or cannot go on.
 
-Two statements are optional. `implicit = True` says that it takes a Q that is known by its products only. `solves(law)` says
-whether it solves problems of that law (contactopt.problem.laws); a method without it solves every law, because it needs
-nothing of a law but its projection.
+Two statements are optional. `implicit = True` says that it takes a Q that is known by its products
+only. `solves(law)` says whether it solves problems of that law (contactopt.problem.laws); a method
+without it solves every law, because it needs nothing of a law but its projection.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from contactopt.problem import Law
 
 
 class Repeated(Exception):
-    """Thrown by the driver into `iterate` where it yields, because its iterates come back to earlier ones.
+    """Thrown by the driver into `iterate` where it yields, because its iterates come back to
+    earlier ones.
 
     A method that has another way to go on catches it. All others end.
     """
@@ -31,15 +33,27 @@ class Repeated(Exception):
 
 # name -> (module, class, what it is)
 METHODS = {
-    "auto": ("contactopt.methods.auto", "Auto", "Newton, then cones and proximal where it fails; the default"),
-    "newton": ("contactopt.methods.newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
+    "auto": (
+        "contactopt.methods.auto",
+        "Auto",
+        "Newton, then cones and proximal where it fails; the default",
+    ),
+    "newton": (
+        "contactopt.methods.newton",
+        "Newton",
+        "semismooth Newton on the Alart-Curnier equations",
+    ),
     "proximal": ("contactopt.methods.proximal", "Proximal", "proximal-point loop around Newton"),
     "tresca": (
         "contactopt.methods.tresca_iteration",
         "Tresca",
         "successive convex problems with given friction bounds",
     ),
-    "acary_cadoux": ("contactopt.methods.cone", "AcaryCadoux", "fixed point on the SOCP over Coulomb's cones"),
+    "acary_cadoux": (
+        "contactopt.methods.cone",
+        "AcaryCadoux",
+        "fixed point on the SOCP over Coulomb's cones",
+    ),
     "relaxation": (
         "contactopt.methods.cone",
         "Relaxation",
@@ -81,29 +95,26 @@ def solvers_of(law: Law) -> list[str]:
 
     Parameters
     ----------
-    law
-        The law of a problem.
+    law : The law of a problem.
 
     Returns
     -------
-    list
-        Names in METHODS, in their order.
+    Names in METHODS, in their order.
     """
     return [name for name in METHODS if solves(find_method(name), law)]
 
 
 def default_method(settings: Mapping[str, Any]) -> str:
-    """Choose the method where none is named: `auto`, or `alternating` where the settings name a backend.
+    """Choose the method where none is named: `auto`, or `alternating` where the settings name a
+    backend.
 
     Parameters
     ----------
-    settings
-        The settings of the method.
+    settings : The settings of the method.
 
     Returns
     -------
-    str
-        A name in METHODS.
+    A name in METHODS.
     """
     return "alternating" if settings.get("normal") or settings.get("tangential") else "auto"
 
@@ -113,20 +124,16 @@ def find_method(name: str, **settings: Any) -> Method:
 
     Parameters
     ----------
-    name
-        A name in METHODS.
-    settings
-        The fields of the method that are not left as they are.
+    name : A name in METHODS.
+    settings : The fields of the method that are not left as they are.
 
     Returns
     -------
-    Method
-        The method.
+    The method.
 
     Raises
     ------
-    InputError
-        If there is no such method or setting, or a setting has a wrong value.
+    InputError : If there is no such method or setting, or a setting has a wrong value.
     """
     if name not in METHODS:
         raise InputError(f"unknown method {name!r}; choose from {', '.join(METHODS)}.")

@@ -1,15 +1,19 @@
-"""Alternating direction method of multipliers over Coulomb's cones, the slip term renewed in every iteration.
+"""Alternating direction method of multipliers over Coulomb's cones, the slip term renewed in every
+iteration.
 
-    min  r'Qr/2 + (q + g n)' r    subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,    g_i = mu_i |u_t,i|:
-r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier x of r = z by
-their difference; -rho x is the velocity u + g n, which renews g in every iteration. For fixed g this converges for
-every rho; with g renewed there is no proof, it needs no full rank of Q, but
-strong friction may defeat it (reports/robustness). Other laws have other sets and openings (contactopt.problem.laws);
-where both are fixed, as for Tresca's and associated friction, it always converges. Cost: one factorisation of Q + rho I, 2 n^3/3 operations (LU, since a Q from a file need not be quite symmetric), and n^2 per iteration. rho is
-balanced after 10, 20, 40, ... iterations where that is worth a factorisation, so that the errors of r = z and of the
-velocity fall together.
-Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato, Eckstein (2011),
-Distributed Optimization and Statistical Learning via ADMM, for the iteration and the balancing of rho.
+    min  r'Qr/2 + (q + g n)' r    subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,    g_i = mu_i
+         |u_t,i|:
+r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier
+x of r = z by their difference; -rho x is the velocity u + g n, which renews g in every iteration.
+For fixed g this converges for every rho; with g renewed there is no proof, it needs no full rank of
+Q, but strong friction may defeat it (reports/robustness). Other laws have other sets and openings
+(contactopt.problem.laws); where both are fixed, as for Tresca's and associated friction, it always
+converges. Cost: one factorisation of Q + rho I, 2 n^3/3 operations (LU, since a Q from a file need
+not be quite symmetric), and n^2 per iteration. rho is balanced after 10, 20, 40, ... iterations
+where that is worth a factorisation, so that the errors of r = z and of the velocity fall together.
+Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato,
+Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM, for the iteration and
+the balancing of rho.
 """
 
 from __future__ import annotations
@@ -39,8 +43,7 @@ class ADMM:
 
     Parameters
     ----------
-    rho
-        First weight of r = z, in units of the mean compliance. The iteration balances it later.
+    rho : First weight of r = z, in units of the mean compliance. The iteration balances it later.
     """
 
     rho: float = 1.0
@@ -54,7 +57,9 @@ class ADMM:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        z, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        z, multipliers = (
+            (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        )
         rho, count, check = self.rho, 0, FIRST_BALANCING
         system = Balanced(problem, rho)
         x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
@@ -62,7 +67,8 @@ class ADMM:
         if start is not None:
             x[:, 0] -= law.opening(x[:, 1:])
         while True:
-            # r minimises the quadratic program with the weight rho on |r - z + x|^2, under the balance.
+            # r minimises the quadratic program with the weight rho on |r - z + x|^2, under the
+            # balance.
             right = rho * (z - x) - problem.q
             right[:, 0] -= rho * law.opening(x[:, 1:])
             r, multipliers = system.solve(right, problem.s)
@@ -75,23 +81,39 @@ class ADMM:
             count += 1
             if count == check:
                 check *= 2
-                # The larger error says which way rho must go: a larger rho lets r = z fall faster, a smaller one the
+                # The larger error says which way rho must go: a larger rho lets r = z fall faster,
+                # a smaller one the
                 # velocity.
                 primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
-                moved = (problem.Q @ z.ravel(), problem.q, rho * x)  # what the velocity is the difference of
-                dual = rho * float(np.linalg.norm(z - old)) / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)
-                factor = float(np.clip(np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)), 1 / MOST_CHANGE, MOST_CHANGE))
+                # what the velocity is the difference of
+                moved = (problem.Q @ z.ravel(), problem.q, rho * x)
+                dual = (
+                    rho
+                    * float(np.linalg.norm(z - old))
+                    / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)
+                )
+                factor = float(
+                    np.clip(
+                        np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)),
+                        1 / MOST_CHANGE,
+                        MOST_CHANGE,
+                    )
+                )
                 if not 1 / LEAST_CHANGE < factor < LEAST_CHANGE:
                     rho, x = rho * factor, x / factor
                     system = Balanced(problem, rho)
 
 
 class Balanced:
-    """The solution of (Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is factorised once."""
+    """The solution of (Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is
+    factorised once.
+    """
 
     def __init__(self, problem: InterfaceProblem, rho: float):
         self.V = problem.V
-        self.inverse = _sparse_inverse(problem.Q, rho) if sp.issparse(problem.Q) else _inverse(problem.Q, rho)
+        self.inverse = (
+            _sparse_inverse(problem.Q, rho) if sp.issparse(problem.Q) else _inverse(problem.Q, rho)
+        )
         self.motions = self.inverse(problem.V) if problem.V.shape[1] else problem.V
         self.schur = problem.V.T @ self.motions
 
@@ -108,7 +130,8 @@ def _inverse(Q: np.ndarray, rho: float) -> Inverse:
     matrix = Q.T.copy()  # LAPACK factorises the transpose of a C array in place
     matrix[np.arange(len(Q)), np.arange(len(Q))] += rho
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", la.LinAlgWarning)  # an indefinite Q: the driver sees what comes of it
+        # an indefinite Q: the driver sees what comes of it
+        warnings.simplefilter("ignore", la.LinAlgWarning)
         factors = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
     return lambda x: np.asarray(la.lu_solve(factors, x, check_finite=False))
 
@@ -117,7 +140,12 @@ def _sparse_inverse(Q: sp.csr_array, rho: float) -> Inverse:
     """The same for a sparse Q, by SuperLU; raises LinAlgError where a pivot is zero."""
     matrix = sp.csc_array(Q + rho * sp.eye_array(Q.shape[0]))
     try:
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+        factors = splu(
+            matrix,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.01,
+            options={"SymmetricMode": True},
+        )
     except RuntimeError as error:
         raise la.LinAlgError("Q + rho I is singular") from error
     return lambda x: np.asarray(factors.solve(x))

@@ -1,14 +1,18 @@
 """The paper's two-stage iteration (section 5.1): normal and tangential forces in turn.
 
-Normal problem, r_t fixed (eq (21); its optimality conditions are Signorini's, eq (15)): a bound-constrained QP,
-    min  r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n    subject to  r_n >= 0,  V_n' r_n = -s - V_t' r_t.
-Tangential problem, r_n fixed (eq (22)): a box-constrained QP with one tangential direction, an SOCP with two,
+Normal problem, r_t fixed (eq (21); its optimality conditions are Signorini's, eq (15)): a
+bound-constrained QP,
+    min  r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n    subject to  r_n >= 0,  V_n' r_n = -s - V_t'
+         r_t.
+Tangential problem, r_n fixed (eq (22)): a box-constrained QP with one tangential direction, an SOCP
+with two,
     min  r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t    subject to  |r_t| <= mu |r_n|.
-The multipliers of the balance rows are the plates' displacements. Plates that move tangentially only belong to the
-tangential problem. Each iteration costs one QP and one QP or SOCP. It contracts where friction couples weakly to the
-normal force (small mu, similar bodies) and may cycle otherwise; relaxation < 1 then often helps. A backend's answer is
-made exact by active-set steps, or asked for again at tighter settings. The backend `pcg`, for both problems, forms no
-entry of Q: active sets and conjugate gradients with the preconditioners of contactopt.methods.preconditioners.
+The multipliers of the balance rows are the plates' displacements. Plates that move tangentially
+only belong to the tangential problem. Each iteration costs one QP and one QP or SOCP. It contracts
+where friction couples weakly to the normal force (small mu, similar bodies) and may cycle
+otherwise; relaxation < 1 then often helps. A backend's answer is made exact by active-set steps, or
+asked for again at tighter settings. The backend `pcg`, for both problems, forms no entry of Q:
+active sets and conjugate gradients with the preconditioners of contactopt.methods.preconditioners.
 """
 
 from __future__ import annotations
@@ -39,14 +43,11 @@ class Alternating:
 
     Parameters
     ----------
-    normal
-        Name of the backend of the normal program.
-    tangential
-        Name of the backend of the tangential program. None: proxqp for intervals, clarabel for discs.
-    relaxation
-        Fraction of each new tangential force that is taken, above 0 and at most 1.
-    preconditioner
-        Of the backend 'pcg', which needs products with Q only.
+    normal : Name of the backend of the normal program.
+    tangential : Name of the backend of the tangential program. None: proxqp for intervals, clarabel
+        for discs.
+    relaxation : Fraction of each new tangential force that is taken, above 0 and at most 1.
+    preconditioner : Of the backend 'pcg', which needs products with Q only.
     """
 
     normal: str = "proxqp"
@@ -66,7 +67,10 @@ class Alternating:
     def backends(self, dim: int) -> tuple[str, str]:
         if PCG in (self.normal, self.tangential):
             if self.normal != PCG or self.tangential not in (PCG, None):
-                raise InputError("the backend 'pcg' solves the normal and the tangential problem; name it for both.")
+                raise InputError(
+                    "the backend 'pcg' solves the normal and the tangential problem; name it for"
+                    " both."
+                )
             return PCG, PCG
         tangential = self.tangential or ("proxqp" if dim == 2 else "clarabel")
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
@@ -76,20 +80,21 @@ class Alternating:
 
         Parameters
         ----------
-        law
-            The law of a problem.
+        law : The law of a problem.
 
         Returns
         -------
-        bool
-            True for laws that bound tangential forces and under which slip does not open the gap.
+        True for laws that bound tangential forces and under which slip does not open the gap.
         """
         return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries
+        # columns with normal entries
+        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
         normal, tangential = self._subproblems(problem, pushes)
-        r, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        r, multipliers = (
+            (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        )
         multipliers = multipliers.copy()
         while True:
             r, multipliers[pushes] = normal.solve(r, multipliers)
@@ -102,8 +107,12 @@ class Alternating:
         normal, tangential = self.backends(problem.dim)
         if normal == PCG:
             P = model_of(problem, self.preconditioner)
-            return KrylovSubproblem(problem, P, pushes, True), KrylovSubproblem(problem, P, ~pushes, False)
-        return NormalProblem(normal, problem, pushes), TangentialProblem(tangential, problem, ~pushes)
+            return KrylovSubproblem(problem, P, pushes, True), KrylovSubproblem(
+                problem, P, ~pushes, False
+            )
+        return NormalProblem(normal, problem, pushes), TangentialProblem(
+            tangential, problem, ~pushes
+        )
 
 
 def _check_friction(problem: InterfaceProblem, tangential: np.ndarray) -> None:

@@ -1,14 +1,16 @@
 """Accelerated projected gradient method with restart, on convex subproblems of a fixed point.
 
-Acary and Cadoux's form of Coulomb friction: with the slip's contribution g_i = mu_i |u_t,i| held fixed, the forces
-solve
+Acary and Cadoux's form of Coulomb friction: with the slip's contribution g_i = mu_i |u_t,i| held
+fixed, the forces solve
     min  r'Qr/2 + (q + g n)' r    subject to  |r_t| <= mu r_n,  V'r + s = 0,
-a convex program over Coulomb's cones; g is renewed from its answer (the outer iteration that is yielded). Other laws
-have other sets and openings (contactopt.problem.laws); for bilateral contact the bound mu |r_n| is held. An inner iteration costs one product with Q
-(Nesterov's step 1 / largest eigenvalue, restarted where the momentum points uphill), an outer one many of them. The inner iteration always converges, in a number of steps like the square root of Q's condition number, and
-for singular Q more slowly; the fixed point has no proof of convergence.
-Sources: O'Donoghue, Candes (2015), Adaptive restart; Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the
-linear discrete Coulomb friction problem via convex optimization.
+a convex program over Coulomb's cones; g is renewed from its answer (the outer iteration that is
+yielded). Other laws have other sets and openings (contactopt.problem.laws); for bilateral contact
+the bound mu |r_n| is held. An inner iteration costs one product with Q (Nesterov's step 1 / largest
+eigenvalue, restarted where the momentum points uphill), an outer one many of them. The inner
+iteration always converges, in a number of steps like the square root of Q's condition number, and
+for singular Q more slowly; the fixed point has no proof of convergence. Sources: O'Donoghue, Candes
+(2015), Adaptive restart; Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear
+discrete Coulomb friction problem via convex optimization.
 """
 
 from __future__ import annotations
@@ -35,7 +37,10 @@ ROUNDS = 20  # of disc_qp
 
 @dataclass(frozen=True)
 class APG:
-    """Accelerated projected gradients. There are no settings: the step follows from the largest eigenvalue of Q."""
+    """Accelerated projected gradients.
+
+    There are no settings: the step follows from the largest eigenvalue of Q.
+    """
 
     sparse: ClassVar[bool] = True  # takes a sparse Q
 
@@ -55,7 +60,9 @@ class APG:
 
             prox = lambda y, lam, P=project: project_balanced(P, y, problem.V, problem.s, step, lam)  # noqa: E731
             gradient = lambda y, q=q: (problem.Q @ y.ravel()).reshape(q.shape) + q  # noqa: E731
-            new, lam = _accelerate(gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r))))
+            new, lam = _accelerate(
+                gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r)))
+            )
             change = float(np.linalg.norm(new - r)) / max(1.0, float(np.linalg.norm(new)))
             r, target = new, max(SHARPER * min(change, 1e2 * target), SHARPEST)
             yield r, lam
@@ -70,7 +77,9 @@ def _accelerate(
     accuracy: float,
     limit: int = INNER,
 ) -> Iterate:
-    """Minimise a quadratic over the convex set of prox, from r (k, d), until a step moves r by at most `accuracy`."""
+    """Minimise a quadratic over the convex set of prox, from r (k, d), until a step moves r by at
+    most `accuracy`.
+    """
     y, momentum = r, 1.0
     for _ in range(limit):
         check_time()
@@ -87,30 +96,29 @@ def _accelerate(
 
 
 def disc_qp(
-    Q: np.ndarray, c: np.ndarray, radius: np.ndarray, start: np.ndarray | None = None, tol: float = 1e-10
+    Q: np.ndarray,
+    c: np.ndarray,
+    radius: np.ndarray,
+    start: np.ndarray | None = None,
+    tol: float = 1e-10,
 ) -> tuple[np.ndarray, bool]:
-    """Solve min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)), natively.
+    """Solve min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)),
+    natively.
 
-    In rounds: the gradient is taken in double precision at the start of a round and its change in single precision,
-    which halves the memory traffic.
+    In rounds: the gradient is taken in double precision at the start of a round and its change in
+    single precision, which halves the memory traffic.
 
     Parameters
     ----------
-    Q
-        (k d, k d) symmetric positive semidefinite array.
-    c
-        (k, d) linear term.
-    radius
-        (k,) bounds, at least 0.
-    start
-        (k, d) point to start from; None: zero.
-    tol
-        Bound of the natural map |t - P(t - step (Q t + c))| over max(|t|, step |c|).
+    Q : (k d, k d) symmetric positive semidefinite array.
+    c : (k, d) linear term.
+    radius : (k,) bounds, at least 0.
+    start : (k, d) point to start from; None: zero.
+    tol : Bound of the natural map |t - P(t - step (Q t + c))| over max(|t|, step |c|).
 
     Returns
     -------
-    tuple
-        t (k, d), and whether it meets the tolerance.
+    t (k, d), and whether it meets the tolerance.
     """
     single, none = Q.astype(np.float32), np.zeros(0)
     step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(single) or 1.0)
@@ -118,19 +126,28 @@ def disc_qp(
     before = np.inf
     for _ in range(ROUNDS):
         u = (Q @ t.ravel()).reshape(t.shape) + c
-        size = max(float(np.linalg.norm(t)), step * float(np.linalg.norm(c)))  # unit of the certificate
+        # unit of the certificate
+        size = max(float(np.linalg.norm(t)), step * float(np.linalg.norm(c)))
         error = float(np.linalg.norm(t - disc(t - step * u, radius)))
         if error <= tol * size:
             return t, True
-        if error > 0.5 * before:  # single precision is not enough here: the last rounds in double precision
+        # single precision is not enough here: the last rounds in double precision
+        if error > 0.5 * before:
             single = Q
 
-        def gradient(y: np.ndarray, t: np.ndarray = t, u: np.ndarray = u, unit: float = error) -> np.ndarray:
+        def gradient(
+            y: np.ndarray, t: np.ndarray = t, u: np.ndarray = u, unit: float = error
+        ) -> np.ndarray:
             change = ((y - t) / unit).astype(single.dtype)  # noqa: B023
             return u + unit * (single @ change.ravel()).reshape(y.shape).astype(float)  # noqa: B023
 
         before = error
         t, _ = _accelerate(
-            gradient, lambda y, lam: (disc(y, radius), lam), t, none, step, max(1e-4 * error, 0.3 * tol * size)
+            gradient,
+            lambda y, lam: (disc(y, radius), lam),
+            t,
+            none,
+            step,
+            max(1e-4 * error, 0.3 * tol * size),
         )
     return t, False

@@ -1,22 +1,30 @@
-"""The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
+"""The default, without a number to choose: Newton's method, and where it fails cones, then the
+proximal loop.
 
-0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual falls.
-1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
-   falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system. Where its sortings go round in
-   a circle near a solution, a few proximal steps from the best of its points break out of it.
-2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
-   and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
-   Where these fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-3. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING linear systems of it.
-4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex programs.
-5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early says nothing of the next;
-   then the proximal loop from the best of all points, its weight falling slowly: jammed packings need hundreds of steps.
-   When SPARSE_ROUND of them have not halved the residual, the same again on other paths, with twice the patience.
-6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the residual, twice as many after
-   each restart, the loop starts again from contact forces drawn at random (fixed seed, so that runs repeat) and larger than
-   those of the point it leaves: strong friction may have solutions that repel the loop and others that attract it.
-It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
-may have none.
+0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
+   falls.
+1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
+   force at all) while its residual falls. Elastic bodies end here (reports/newton_steps), each step
+   one dense linear system. Where its sortings go round in a circle near a solution, a few proximal
+   steps from the best of its points break out of it.
+2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
+   deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. They need no
+   symmetric Q and no backend. Where these fail, it ends if a proof is found that there is no
+   solution (contactopt.problem.feasibility).
+3. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
+   linear systems of it.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex
+   programs.
+5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early
+   says nothing of the next; then the proximal loop from the best of all points, its weight falling
+   slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved the
+   residual, the same again on other paths, with twice the patience.
+6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
+   residual, twice as many after each restart, the loop starts again from contact forces drawn at
+   random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
+   friction may have solutions that repel the loop and others that attract it.
+It ends where the driver's certificate or limits say so. There is no proof that it finds a solution:
+Coulomb's problem may have none.
 """
 
 from __future__ import annotations
@@ -73,9 +81,8 @@ class Auto:
 
     Parameters
     ----------
-    preconditioner
-        Of Newton's steps where Q is known by its products: a name in contactopt.methods.preconditioners, or 'none'.
-        None: the best that fits the contacts.
+    preconditioner : Of Newton's steps where Q is known by its products: a name in
+        contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
     """
 
     preconditioner: str | None = None
@@ -89,18 +96,25 @@ class Auto:
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
+    def iterate(
+        self, problem: InterfaceProblem, start: Iterate | None = None
+    ) -> Iterator[Iterate | Known]:
         if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
             reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
         else:
             if isinstance(problem.Q, Convolution):
                 start = yield from self._nested(problem, start)
-                note(logger, "Newton's method on nested grids made no progress; it goes on with the finest grid alone")
+                note(
+                    logger,
+                    "Newton's method on nested grids made no progress; it goes on with the finest"
+                    " grid alone",
+                )
             reached = yield from self._newton(problem, start, self.preconditioner)
             if isinstance(problem.Q, InterfaceOperator):
                 note(
                     logger,
-                    "Newton's method made no progress with products, so all that follows looks at the entries of Q",
+                    "Newton's method made no progress with products, so all that follows looks at"
+                    " the entries of Q",
                 )
                 try:
                     problem = problem.explicit()
@@ -108,7 +122,11 @@ class Auto:
                     note(logger, f"the default method ends with Newton's steps: {error}")
                     return
                 reached = yield from self._newton(problem, None, None)  # its steps are exact now
-            note(logger, "Newton's method made no progress, so interior points and the proximal loop take over")
+            note(
+                logger,
+                "Newton's method made no progress, so interior points and the proximal loop take"
+                " over",
+            )
         from contactopt.methods.cone import AcaryCadoux
 
         matrix = block_matrix(problem.Q, problem.dim)
@@ -117,7 +135,9 @@ class Auto:
         elif not sp.issparse(problem.Q):
             residual = coulomb_equations(problem).evaluate(*reached)[0]
             if residual <= NEARBY * np.linalg.norm(reached[0]):
-                reached = yield from self._proximal(problem, matrix, reached, 1, LEAST_ALPHA, aim=residual / 2)
+                reached = yield from self._proximal(
+                    problem, matrix, reached, 1, LEAST_ALPHA, aim=residual / 2
+                )
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         if interior:
             for full in (True, False):
@@ -136,7 +156,9 @@ class Auto:
             return
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
+            last = yield from self._proximal(
+                problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha
+            )
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
@@ -144,8 +166,12 @@ class Auto:
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
     @staticmethod
-    def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate | Known, None, None]:
-        """Without end: paths drawn at random, and the gentle proximal loop from the best point so far."""
+    def _jammed(
+        problem: InterfaceProblem, matrix: Blocks, reached: Iterate
+    ) -> Generator[Iterate | Known, None, None]:
+        """Without end: paths drawn at random, and the gentle proximal loop from the best point so
+        far.
+        """
         from contactopt.methods.cone import AcaryCadoux
 
         random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
@@ -156,14 +182,24 @@ class Auto:
                 reached = yield from Auto._interior(problem, matrix, reached, turning)
             for _ in range(PATHS if interior else 0):
                 path = Path.random(random, problem.contacts)
-                reached = yield from Auto._interior(problem, matrix, reached, interior_iterates(problem, matrix, path))
+                reached = yield from Auto._interior(
+                    problem, matrix, reached, interior_iterates(problem, matrix, path)
+                )
             patience = SPARSE_ROUND * 2**restarts
-            last = yield from Auto._proximal(problem, matrix, reached, patience, GENTLE_ALPHA, gentle=True)
+            last = yield from Auto._proximal(
+                problem, matrix, reached, patience, GENTLE_ALPHA, gentle=True
+            )
             reached = min(reached, last, key=lambda point: evaluate(*point)[0])
-            note(logger, "the proximal loop got nowhere and goes on from the best point, by other paths to begin with")
+            note(
+                logger,
+                "the proximal loop got nowhere and goes on from the best point, by other paths to"
+                " begin with",
+            )
 
     @staticmethod
-    def _nested(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate | Known, None, Iterate | None]:
+    def _nested(
+        problem: InterfaceProblem, start: Iterate | None
+    ) -> Generator[Iterate | Known, None, Iterate | None]:
         """Iterates of the nested method while they change for the better; returns the best."""
         from contactopt.methods.nested import Nested
 
@@ -177,11 +213,12 @@ class Auto:
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Newton's iterates; returns the best.
 
-        What comes next needs the entries of Q. Where there are many, or bodies are solved by iteration, these are dear, and
-        Newton's method goes on until its own products have cost as much.
+        What comes next needs the entries of Q. Where there are many, or bodies are solved by
+        iteration, these are dear, and Newton's method goes on until its own products have cost as
+        much.
 
-        A start that leads nowhere is given up for the solution of the bonded problem, from which Newton's method begins
-        where it has none.
+        A start that leads nowhere is given up for the solution of the bonded problem, from which
+        Newton's method begins where it has none.
         """
         operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
 
@@ -198,12 +235,17 @@ class Auto:
             first = lambda steps, since: since >= PATIENCE or steps > NEWTON_STEPS  # noqa: E731
             found, least = yield from _followed(method.steps(problem, start), first)
             warm = found or start
-            note(logger, "Newton's method made no progress from the given start and begins anew without it")
+            note(
+                logger,
+                "Newton's method made no progress from the given start and begins anew without it",
+            )
         found, residual = yield from _followed(method.steps(problem, None), tired)
         return (found if residual < least else warm) or cold_start(problem)
 
     @staticmethod
-    def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate | Known, None, Iterate]:
+    def _cones(
+        problem: InterfaceProblem, start: Iterate
+    ) -> Generator[Iterate | Known, None, Iterate]:
         """A few cone programs; returns the best point, `start` if there was none better."""
         from contactopt.methods.cone import AcaryCadoux
 
@@ -212,7 +254,9 @@ class Auto:
         evaluate = coulomb_equations(problem).evaluate
         points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(problem))
         try:
-            found, residual = yield from _followed(points, lambda steps, since: steps >= CONE_PROGRAMS)
+            found, residual = yield from _followed(
+                points, lambda steps, since: steps >= CONE_PROGRAMS
+            )
         except BackendError as error:  # no answer: the proximal loop needs none
             note(logger, f"the cone programs of the default method gave no answer: {error}")
             return start
@@ -220,9 +264,13 @@ class Auto:
 
     @staticmethod
     def _interior(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate, points: Iterator[tuple[Iterate, float]]
+        problem: InterfaceProblem,
+        matrix: Blocks,
+        start: Iterate,
+        points: Iterator[tuple[Iterate, float]],
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Points with their errors and, where they came near to a solution, a few proximal steps for the last digits.
+        """Points with their errors and, where they came near to a solution, a few proximal steps
+        for the last digits.
 
         Returns the last point or a better `start`.
         """
@@ -244,7 +292,8 @@ class Auto:
         gentle: bool = False,
         aim: float = np.inf,
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last.
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns
+        the last.
 
         aim  residual that the first of these rounds must reach
         """
@@ -268,7 +317,8 @@ class Auto:
 def _followed(
     points: Iterator[tuple[Iterate | Known, float]], tired: Callable[[int, int], bool]
 ) -> Generator[Iterate | Known, None, tuple[Iterate | None, float]]:
-    """Hand points on until a stage is tired or repeats itself; returns the best point and its residual.
+    """Hand points on until a stage is tired or repeats itself; returns the best point and its
+    residual.
 
     tired  of the number of points so far, and of how many of them came since the last progress
     """

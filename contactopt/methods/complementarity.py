@@ -1,15 +1,19 @@
 """Coulomb friction in 2D as a linear complementarity problem (LCP), solved by Lemke's method.
 
-Split r_t = -mu r_n + x and u_t = v - y with v, y >= 0. Then 0 <= x = r_t + mu r_n and 0 <= mu r_n - r_t = 2 mu r_n - x say
+Split r_t = -mu r_n + x and u_t = v - y with v, y >= 0. Then 0 <= x = r_t + mu r_n and 0 <= mu r_n -
+r_t = 2 mu r_n - x say
 |r_t| <= mu r_n, x v = 0 says r_t = -mu r_n where u_t > 0, (2 mu r_n - x) y = 0 says r_t = mu r_n where u_t < 0: the law is
-    0 <= (r_n, x, y)  complementary to  (u_n, v = u_t + y, 2 mu r_n - x) >= 0,   u = Q r + V lambda + q,  r linear in (r_n, x).
-A free lambda is a - b with a, b >= 0, complementary to -(V' r + s) >= 0 and V' r + s >= 0: together they are the balance.
-Lemke's method pivots with the covering vector of ones; lexicographic ties keep degenerate problems from cycling. It may
-end on a ray (rare: measured for mu >= 2 only). Then a form with 4k unknowns is tried, r_t = b - c with b, c >= 0 and |u_t|
-bounded by y: its matrix is copositive for every Q >= 0 and mu, so that for positive definite Q and plates that press no
-ray exists, up to rounding. If that ends on a ray too there is no answer. About m = 3k to 4k pivots of 2 m^2 operations:
-for small problems. Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring (1986), A mathematical programming
-approach to three-dimensional contact problems with friction; Stewart, Trinkle (1996) for the copositive form.
+    0 <= (r_n, x, y)  complementary to  (u_n, v = u_t + y, 2 mu r_n - x) >= 0,   u = Q r + V lambda
+                      + q,  r linear in (r_n, x).
+A free lambda is a - b with a, b >= 0, complementary to -(V' r + s) >= 0 and V' r + s >= 0: together
+they are the balance. Lemke's method pivots with the covering vector of ones; lexicographic ties
+keep degenerate problems from cycling. It may end on a ray (rare: measured for mu >= 2 only). Then a
+form with 4k unknowns is tried, r_t = b - c with b, c >= 0 and |u_t| bounded by y: its matrix is
+copositive for every Q >= 0 and mu, so that for positive definite Q and plates that press no ray
+exists, up to rounding. If that ends on a ray too there is no answer. About m = 3k to 4k pivots of 2
+m^2 operations: for small problems. Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring
+(1986), A mathematical programming approach to three-dimensional contact problems with friction;
+Stewart, Trinkle (1996) for the copositive form.
 """
 
 from __future__ import annotations
@@ -44,12 +48,17 @@ class Lemke:
 
     def backends(self, dim: int) -> tuple[str, str]:
         if dim != 2:
-            raise InputError("the method 'lemke' needs a 2D problem: in 3D friction is no LCP; use 'auto'.")
+            raise InputError(
+                "the method 'lemke' needs a 2D problem: in 3D friction is no LCP; use 'auto'."
+            )
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         if problem.dim != 2 or problem.contacts > MOST_CONTACTS:
-            raise InputError(f"the method 'lemke' needs a 2D problem of at most {MOST_CONTACTS} contacts; use 'auto'.")
+            raise InputError(
+                f"the method 'lemke' needs a 2D problem of at most {MOST_CONTACTS} contacts; use"
+                " 'auto'."
+            )
         for copositive in (False, True):
             M, q, C = complementarity_problem(problem, copositive)
             z = lemke(M, q)
@@ -62,19 +71,17 @@ class Lemke:
 def complementarity_problem(
     problem: InterfaceProblem, copositive: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Write a problem in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda last in z.
+    """Write a problem in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda
+    last in z.
 
     Parameters
     ----------
-    problem
-        The interface problem of k contacts under Coulomb's law.
-    copositive
-        Whether the form with 4 k unknowns is written, whose matrix is copositive.
+    problem : The interface problem of k contacts under Coulomb's law.
+    copositive : Whether the form with 4 k unknowns is written, whose matrix is copositive.
 
     Returns
     -------
-    tuple
-        M (m, m), q (m,) and C (2 k, c).
+    M (m, m), q (m,) and C (2 k, c).
     """
     k, p = problem.contacts, len(problem.s)
     normal, tangent, eye = np.eye(2 * k)[:, ::2], np.eye(2 * k)[:, 1::2], np.eye(k)
@@ -94,15 +101,13 @@ def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
 
     Parameters
     ----------
-    M
-        (m, m) matrix.
-    q
-        (m,) right-hand side.
+    M : (m, m) matrix.
+    q : (m,) right-hand side.
 
     Returns
     -------
-    ndarray or None
-        A solution z (m,) with z >= 0, M z + q >= 0 and z'(M z + q) = 0; None if the pivots end on a ray.
+    A solution z (m,) with z >= 0, M z + q >= 0 and z'(M z + q) = 0; None if the pivots end on a
+    ray.
     """
     m = len(q)
     if np.all(q >= 0):
@@ -117,7 +122,8 @@ def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
         out, basis[row] = int(basis[row]), enter
         if out == cover:
             z = np.zeros(2 * m)
-            z[basis] = np.linalg.solve(columns[:, basis], q)  # again, without the pivots' rounding errors
+            # again, without the pivots' rounding errors
+            z[basis] = np.linalg.solve(columns[:, basis], q)
             return np.where(z > 1e-13 * z.max(), z, 0.0)[m:]
         enter = out + m if out < m else out - m
         rows = np.flatnonzero(T[:, enter] > PIVOT)

@@ -1,18 +1,21 @@
-"""Friction as a second-order cone program: the convex relaxation, and the fixed point that corrects it.
+"""Friction as a second-order cone program: the convex relaxation, and the fixed point that corrects
+it.
 
 Both solve, over Coulomb's cones,
     min  r' Q r / 2 + (q + mu s n)' r    subject to  |r_t| <= mu r_n,  V' r + s_plates = 0.
-`Relaxation` solves it once with s = 0. That is another law, friction with an associated flow rule: where a contact
-slips its gap opens by mu |u_t|, so that a block dragged along a plane rises from it. It gets stick, open contacts and
-problems without slip right; where contacts slip, forces and approach are off by a term that grows with mu.
-`AcaryCadoux` repeats it with s = |u_t| of the last answer, which takes the opening back; a fixed point is exactly a
-solution of Coulomb's problem. On a problem whose law is associated friction both solve that law, in one program. Each outer iteration costs one SOCP, whose matrices are handed over once; the answer is
-made exact by Newton steps on r = P(r - u), P the projection on the cones. Converges linearly where mu times the
-coupling of slip and dilatancy is small; there is no proof. Where Q
-is badly rank-deficient the Newton steps may fail, and the certificate stays at what the backend's accuracy gives.
-The SOCP has an answer unless loads pull the bodies apart or friction cannot hold a plate that is dragged.
-Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via
-convex optimization.
+`Relaxation` solves it once with s = 0. That is another law, friction with an associated flow rule:
+where a contact slips its gap opens by mu |u_t|, so that a block dragged along a plane rises from
+it. It gets stick, open contacts and problems without slip right; where contacts slip, forces and
+approach are off by a term that grows with mu. `AcaryCadoux` repeats it with s = |u_t| of the last
+answer, which takes the opening back; a fixed point is exactly a solution of Coulomb's problem. On a
+problem whose law is associated friction both solve that law, in one program. Each outer iteration
+costs one SOCP, whose matrices are handed over once; the answer is made exact by Newton steps on r =
+P(r - u), P the projection on the cones. Converges linearly where mu times the coupling of slip and
+dilatancy is small; there is no proof. Where Q is badly rank-deficient the Newton steps may fail,
+and the certificate stays at what the backend's accuracy gives. The SOCP has an answer unless loads
+pull the bodies apart or friction cannot hold a plate that is dragged. Source: Acary, Cadoux,
+Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via convex
+optimization.
 """
 
 from __future__ import annotations
@@ -42,10 +45,9 @@ class AcaryCadoux:
 
     Parameters
     ----------
-    bridge
-        'clarabel' calls that solver directly; 'cvxpy' solves contactopt.models.acary_cadoux as it is written there.
-    backend
-        The conic backend behind cvxpy. The direct bridge knows clarabel only.
+    bridge : 'clarabel' calls that solver directly; 'cvxpy' solves contactopt.models.acary_cadoux as
+        it is written there.
+    backend : The conic backend behind cvxpy. The direct bridge knows clarabel only.
     """
 
     bridge: str = "clarabel"
@@ -55,7 +57,10 @@ class AcaryCadoux:
         if self.bridge not in BRIDGES:
             raise InputError(f"unknown bridge {self.bridge!r}; choose from {', '.join(BRIDGES)}.")
         if self.bridge == "clarabel" and self.backend != "clarabel":
-            raise InputError(f"backend {self.backend!r} needs bridge='cvxpy'; the direct bridge knows clarabel only.")
+            raise InputError(
+                f"backend {self.backend!r} needs bridge='cvxpy'; the direct bridge knows clarabel"
+                " only."
+            )
 
     def backends(self, dim: int) -> tuple[str, str]:
         return (find(self.backend, CONIC).name,) * 2
@@ -74,7 +79,10 @@ class AcaryCadoux:
 
 @dataclass(frozen=True)
 class Relaxation(AcaryCadoux):
-    """One cone program, whose solution is that of associated friction. It has the settings of AcaryCadoux."""
+    """One cone program, whose solution is that of associated friction.
+
+    It has the settings of AcaryCadoux.
+    """
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         return islice(super().iterate(problem), 1)
@@ -85,22 +93,20 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
     return problem.law.opening(problem.displacements(r, multipliers)[:, 1:])
 
 
-def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callable[[np.ndarray], Iterate]:
+def cone_program(
+    problem: InterfaceProblem, bridge: str, backend: str
+) -> Callable[[np.ndarray], Iterate]:
     """Prepare the cone program of the module's head for one opening after the other.
 
     Parameters
     ----------
-    problem
-        The interface problem of k contacts.
-    bridge
-        A name in BRIDGES.
-    backend
-        A name in CONIC, where the bridge is cvxpy.
+    problem : The interface problem of k contacts.
+    bridge : A name in BRIDGES.
+    backend : A name in CONIC, where the bridge is cvxpy.
 
     Returns
     -------
-    callable
-        A function of the opening mu s (k,) [length] that returns r (k, dim) and multipliers (p,).
+    A function of the opening mu s (k,) [length] that returns r (k, dim) and multipliers (p,).
     """
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
@@ -120,7 +126,13 @@ def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callab
         else:
             r, lam = direct.solve(c.ravel())
         return crossover(
-            problem.Q, c.ravel(), V, s_plates, lambda y: coulomb_cone_derivative(y, problem.mu), r.reshape(c.shape), lam
+            problem.Q,
+            c.ravel(),
+            V,
+            s_plates,
+            lambda y: coulomb_cone_derivative(y, problem.mu),
+            r.reshape(c.shape),
+            lam,
         )
 
     return solve

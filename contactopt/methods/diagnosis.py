@@ -1,43 +1,53 @@
-"""What can be known of a friction problem before solving it: rank, thresholds of mu, tightness of its relaxation.
+"""What can be known of a friction problem before solving it: rank, thresholds of mu, tightness of
+its relaxation.
 
-Coefficients are scaled together, mu_i = mu m_i with max m_i = 1; a threshold is a value of mu, the largest of them.
-Of Q the symmetric part is taken. D r = r - r' etc. are differences of two states, E = diag(m), w = u_t.
+Coefficients are scaled together, mu_i = mu m_i with max m_i = 1; a threshold is a value of mu, the
+largest of them. Of Q the symmetric part is taken. D r = r - r' etc. are differences of two states,
+E = diag(m), w = u_t.
 
-Inequalities. Two states that obey Signorini have D r_n . D u_n <= 0; two that obey friction with bounds g, g' have
+Inequalities. Two states that obey Signorini have D r_n . D u_n <= 0; two that obey friction with
+bounds g, g' have
     D r_t . D w <= sum_i |D g_i| |D w_i|                                                                        (F)
-by maximal dissipation, in 2D and 3D. With L = diag(L_i) > 0, one number per contact, and b^2 the largest eigenvalue of
-L^-1/2 Q_tt L^-1/2, the right side is at most mu b |E D r_n|_L |D w| in the norm of Q_tt^-1 when g = mu E r_n. If the
-plates move along the normals only (V_t = 0), D r_n lies in Z = ker V_n', lambda drops out, and
+by maximal dissipation, in 2D and 3D. With L = diag(L_i) > 0, one number per contact, and b^2 the
+largest eigenvalue of L^-1/2 Q_tt L^-1/2, the right side is at most mu b |E D r_n|_L |D w| in the
+norm of Q_tt^-1 when g = mu E r_n. If the plates move along the normals only (V_t = 0), D r_n lies
+in Z = ker V_n', lambda drops out, and
     D r . D u = D r_n' S D r_n + |D w|^2 in the norm of Q_tt^-1,   S = Q_nn - Q_nt Q_tt^-1 Q_tn.
-Let a^2 be the largest eigenvalue of (E L E, S) on Z, k^2 = b^2 times that of (E L E, Q_nn) on Z, and c^2 < 1 that of
-(Q_nt Q_tt^-1 Q_tn, Q_nn) on Z: the coupling of normal and tangential directions. Then, for every load q, s:
+Let a^2 be the largest eigenvalue of (E L E, S) on Z, k^2 = b^2 times that of (E L E, Q_nn) on Z,
+and c^2 < 1 that of (Q_nt Q_tt^-1 Q_tn, Q_nn) on Z: the coupling of normal and tangential
+directions. Then, for every load q, s:
  1. Two solutions: x^2 + y^2 <= mu a b x y with x = |D r_n|_S, y = |D w|: equal if mu < 2 / (a b).
     Two Tresca steps from bounds that differ by d: x <= (mu a b / 2) |d|, so the Tresca iteration contracts there too.
- 2. Normal problem: |D r_n| <= c |D r_t|, norms of Q_nn and Q_tt. Tangential problem for two r_n that differ by d:
-    (F) gives |D r_t|^2 <= (c^2 + mu^2 k^2) |d|^2, so that the alternating iteration contracts if
-    c^2 (c^2 + mu^2 k^2) < 1; put together for one Tresca step they give x^2 (1 - c^4) <= (mu c k)^2 |d|^2, the same
-    threshold mu < sqrt(1 - c^4) / (c k).
-These `guaranteed` thresholds are sufficient, not sharp: they fall like the square root of the mesh width, because they
-allow slip that changes sign from node to node. Singular S or plates that move tangentially: none, given as 0.
+ 2. Normal problem: |D r_n| <= c |D r_t|, norms of Q_nn and Q_tt. Tangential problem for two r_n
+    that differ by d: (F) gives |D r_t|^2 <= (c^2 + mu^2 k^2) |d|^2, so that the alternating
+    iteration contracts if c^2 (c^2 + mu^2 k^2) < 1; put together for one Tresca step they give x^2
+    (1 - c^4) <= (mu c k)^2 |d|^2, the same threshold mu < sqrt(1 - c^4) / (c k).
+These `guaranteed` thresholds are sufficient, not sharp: they fall like the square root of the mesh
+width, because they allow slip that changes sign from node to node. Singular S or plates that move
+tangentially: none, given as 0.
 
-Slip map. Let all contacts press and slip one way, w_i = |w_i| e with one direction e: D r_t = -mu E e D g, and a step of
-either iteration is D r_n = mu T D g, T = P Q_nt E e, P the inverse of Q_nn on Z. The iterations stop converging at
-spectral radius mu rho(T) = 1; the solution stops being isolated at an eigenvalue +1 of mu T, that is, by +e or -e, where
-mu times the largest modulus of a real eigenvalue of T is 1: two different conditions. Each is exact for these slip
-directions, and loads that produce them exist, so that no guarantee can reach beyond: `uniform_slip` thresholds bound the
-best possible ones from above (the least over the tangential axes), `guaranteed` from below. For one contact in 2D without tangential plate motion both
-equal Q_nn / |Q_nt| = K_tt / |K_tn|, and that is exact for all loads. Plates that move tangentially are held there.
+Slip map. Let all contacts press and slip one way, w_i = |w_i| e with one direction e: D r_t = -mu E
+e D g, and a step of either iteration is D r_n = mu T D g, T = P Q_nt E e, P the inverse of Q_nn on
+Z. The iterations stop converging at spectral radius mu rho(T) = 1; the solution stops being
+isolated at an eigenvalue +1 of mu T, that is, by +e or -e, where mu times the largest modulus of a
+real eigenvalue of T is 1: two different conditions. Each is exact for these slip directions, and
+loads that produce them exist, so that no guarantee can reach beyond: `uniform_slip` thresholds
+bound the best possible ones from above (the least over the tangential axes), `guaranteed` from
+below. For one contact in 2D without tangential plate motion both equal Q_nn / |Q_nt| = K_tt /
+|K_tn|, and that is exact for all loads. Plates that move tangentially are held there.
 
-At a solution the same test takes its own stick, slip and open sets (and, in 3D, how the direction of slip turns): the
-linear maps of the Tresca iteration, mu T with stick inside, and of the alternating iteration, where stick follows r_n one
-step late. Their spectral radii are the rates of convergence near this solution, exact unless a contact is between two
-states; global convergence, other solutions and the solution's change of state with mu are not covered: a heuristic there.
+At a solution the same test takes its own stick, slip and open sets (and, in 3D, how the direction
+of slip turns): the linear maps of the Tresca iteration, mu T with stick inside, and of the
+alternating iteration, where stick follows r_n one step late. Their spectral radii are the rates of
+convergence near this solution, exact unless a contact is between two states; global convergence,
+other solutions and the solution's change of state with mu are not covered: a heuristic there.
 
-Relaxation. The cone program  min r'Qr/2 + q'r, |r_t| <= mu r_n, V'r + s = 0  asks for u_n >= mu |u_t| and r . u = 0. Its
-solution solves Coulomb's problem if and only if no loaded contact with friction slips in it (there it has
-u_n = mu |u_t|, Coulomb u_n = 0). mu = 0 is enough, and so is stick of all that touches if the rest opens by more than
-mu |u_t|; Q_nt = 0 is not. It is solved, and its answer certified for both problems.
-All of this is dense linear algebra, O(n^3), and one cone program.
+Relaxation. The cone program  min r'Qr/2 + q'r, |r_t| <= mu r_n, V'r + s = 0  asks for u_n >= mu
+                              |u_t| and r . u = 0. Its
+solution solves Coulomb's problem if and only if no loaded contact with friction slips in it (there
+it has u_n = mu |u_t|, Coulomb u_n = 0). mu = 0 is enough, and so is stick of all that touches if
+the rest opens by more than mu |u_t|; Q_nt = 0 is not. It is solved, and its answer certified for
+both problems. All of this is dense linear algebra, O(n^3), and one cone program.
 """
 
 from __future__ import annotations
@@ -51,12 +61,20 @@ from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.methods.cone import Relaxation
 from contactopt.methods.driver import solve
-from contactopt.problem import InterfaceProblem, Solution, balance_residual, dimensionless, natural_map_residual
+from contactopt.problem import (
+    InterfaceProblem,
+    Solution,
+    balance_residual,
+    dimensionless,
+    natural_map_residual,
+)
 from contactopt.problem.cones import coulomb_cone
 from contactopt.problem.contact_status import contact_status
 
-CERTIFIED, DISTINCT = 1e-8, 1e-6  # a residual of at most the one is a solution, above the other it is none
-REAL, ZERO = 1e-7, 1e-10  # an eigenvalue with relatively less imaginary part is real; a smaller one is rounding
+# a residual of at most the one is a solution, above the other it is none
+CERTIFIED, DISTINCT = 1e-8, 1e-6
+# an eigenvalue with relatively less imaginary part is real; a smaller one is rounding
+REAL, ZERO = 1e-7, 1e-10
 
 
 @dataclass(frozen=True)
@@ -64,7 +82,8 @@ class Thresholds:
     """Bounds of the largest friction coefficient, all coefficients scaled together [-].
 
     unique       below it there is one solution
-    tresca       below it the Tresca iteration contracts;   alternating  below it the alternating iteration contracts
+    tresca       below it the Tresca iteration contracts;   alternating  below it the alternating
+                 iteration contracts
     """
 
     unique: float
@@ -74,10 +93,13 @@ class Thresholds:
 
 @dataclass(frozen=True)
 class Local:
-    """The slip map at a solution. Counts of contacts; rates of convergence per iteration at the actual mu (>= 1: none).
+    """The slip map at a solution.
+
+    Counts of contacts; rates of convergence per iteration at the actual mu (>= 1: none).
 
     contraction  mu at which the Tresca map of these stick and slip sets gets spectral radius 1
-    singular     mu at which it gets an eigenvalue +1 and the solution stops being isolated; inf: never
+    singular     mu at which it gets an eigenvalue +1 and the solution stops being isolated; inf:
+                 never
     """
 
     stick: int
@@ -93,14 +115,17 @@ class Local:
 class Diagnosis:
     """See the head of this module; print it for a summary.
 
-    size, held      n of Q (n, n); how many of its rows are zero: supported components, not counted in the rank
-    rank            of Q: eigenvalues above n eps times the largest; `least` is the least over the largest
+    size, held      n of Q (n, n); how many of its rows are zero: supported components, not counted
+                    in the rank
+    rank            of Q: eigenvalues above n eps times the largest; `least` is the least over the
+                    largest
     condition       largest eigenvalue over the least that counts for the rank [-]
     asymmetry       |Q - Q'| / |Q|, Frobenius norms
     guaranteed      sufficient for every load; 0: nothing is guaranteed
     uniform_slip    upper bounds of what could be guaranteed; nan where Q_nn is singular
     exact           both are equal and exact (one contact in 2D)
-    relaxation      "tight", "not tight", "undecided" (its solver failed) or "none" (bilateral contact)
+    relaxation      "tight", "not tight", "undecided" (its solver failed) or "none" (bilateral
+                    contact)
     """
 
     contacts: int
@@ -123,14 +148,24 @@ class Diagnosis:
             low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
             if self.exact:
                 return f"{name}: {what} for every load if and only if mu < {low:.4g}"
-            sure = f"{what} for every load if mu < {low:.3g}" if low > 0 else f"{what} is not guaranteed"
-            return f"{name}: {sure}" + ("" if np.isnan(high) else f"; it is lost for some load at mu = {high:.3g}")
+            sure = (
+                f"{what} for every load if mu < {low:.3g}"
+                if low > 0
+                else f"{what} is not guaranteed"
+            )
+            return f"{name}: {sure}" + (
+                "" if np.isnan(high) else f"; it is lost for some load at mu = {high:.3g}"
+            )
 
         lines = [
             f"{count(self.contacts, 'contact')} in {self.dim}D, mu = {self.mu:g}",
-            f"Q: rank {self.rank} of {self.size} (held components: {self.held}), condition {self.condition:.2g}, "
-            f"asymmetry {self.asymmetry:.1g}"
-            + (", not positive semidefinite" if self.least < -self.size * np.finfo(float).eps else ""),
+            f"Q: rank {self.rank} of {self.size} (held components: {self.held}), condition"
+            f" {self.condition:.2g}, asymmetry {self.asymmetry:.1g}"
+            + (
+                ", not positive semidefinite"
+                if self.least < -self.size * np.finfo(float).eps
+                else ""
+            ),
             threshold("number of solutions", "uniqueness", "unique"),
             threshold("Tresca iteration", "convergence", "tresca"),
             threshold("alternating iteration", "convergence", "alternating"),
@@ -139,18 +174,26 @@ class Diagnosis:
         if self.local is not None:
             at = self.local
             lines.append(
-                f"at the solution: {at.stick} stick, {at.slip} slip, {at.open} open; rate of alternating "
-                f"{at.alternating_rate:.3g}, Tresca {at.tresca_rate:.3g} (1 at mu = {at.contraction:.3g}); "
-                f"isolated up to mu = {at.singular:.3g}"
+                f"at the solution: {at.stick} stick, {at.slip} slip, {at.open} open; rate of"
+                f" alternating {at.alternating_rate:.3g}, Tresca {at.tresca_rate:.3g} (1 at mu ="
+                f" {at.contraction:.3g}); isolated up to mu = {at.singular:.3g}"
             )
         return "\n".join(lines)
 
     def __repr__(self) -> str:
         guaranteed = (
-            f"unique below mu = {self.guaranteed.unique:.3g}" if self.guaranteed.unique else "uniqueness not guaranteed"
+            f"unique below mu = {self.guaranteed.unique:.3g}"
+            if self.guaranteed.unique
+            else "uniqueness not guaranteed"
         )
         contacts = f"{count(self.contacts, 'contact')} in {self.dim}D"
-        return line("Diagnosis", contacts, f"mu = {self.mu:g}", f"rank {self.rank} of {self.size}", guaranteed)
+        return line(
+            "Diagnosis",
+            contacts,
+            f"mu = {self.mu:g}",
+            f"rank {self.rank} of {self.size}",
+            guaranteed,
+        )
 
     def _repr_html_(self) -> str:
         parts = (text.partition(": ") for text in str(self).splitlines()[1:])
@@ -158,7 +201,8 @@ class Diagnosis:
 
 
 def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Diagnosis:
-    """Say what is known of a problem before it is solved and, given a solution, of the iterations near it.
+    """Say what is known of a problem before it is solved and, given a solution, of the iterations
+    near it.
 
     Parameters
     ----------
@@ -167,16 +211,18 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
 
     Returns
     -------
-    Diagnosis : rank of Q, thresholds of the friction coefficient, tightness of the convex relaxation
+    Diagnosis : rank of Q, thresholds of the friction coefficient, tightness of the convex
+        relaxation
 
     Raises
     ------
-    InputError : for laws without a friction coefficient, if the solution does not solve this problem, or if the load pulls
-        the bodies apart
+    InputError : for laws without a friction coefficient, if the solution does not solve this
+        problem, or if the load pulls the bodies apart
     """
     if not problem.law.proportional or problem.law.dilatant:
         raise InputError(
-            "diagnose asks what a friction coefficient does, so it needs Coulomb's law or bilateral contact."
+            "diagnose asks what a friction coefficient does, so it needs Coulomb's law or bilateral"
+            " contact."
         )
     largest = float(problem.mu.max(initial=0.0))
     scaled, scales = dimensionless(problem)
@@ -186,13 +232,20 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     top = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
     counted = eigenvalues[eigenvalues > len(eigenvalues) * np.finfo(float).eps * top]
     uniform = _uniform_slip(scaled, shape)
-    exact = problem.contacts == 1 and problem.dim == 2 and _normal_plates(scaled) and uniform.unique > 0
+    exact = (
+        problem.contacts == 1 and problem.dim == 2 and _normal_plates(scaled) and uniform.unique > 0
+    )
     local = None
     if solution is not None:
         residual = natural_map_residual(problem, solution.reactions, solution.multipliers)
         if residual > DISTINCT:
-            raise InputError(f"diagnose needs a solution of this problem; the residual of this one is {residual:.1e}.")
-        local = _local(scaled, *scales.to_dimensionless(solution.reactions, solution.multipliers), largest)
+            raise InputError(
+                "diagnose needs a solution of this problem; the residual of this one is"
+                f" {residual:.1e}."
+            )
+        local = _local(
+            scaled, *scales.to_dimensionless(solution.reactions, solution.multipliers), largest
+        )
     return Diagnosis(
         problem.contacts,
         problem.dim,
@@ -231,14 +284,22 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
             return Thresholds(0.0, 0.0, 0.0)
         if Z.shape[1] == 0:  # the plates determine every normal force
             return Thresholds(np.inf, np.inf, np.inf)
-        coupling = Z.T @ Q[np.ix_(n, t)] @ la.cho_solve(la.cho_factor(Q[np.ix_(t, t)]), Q[np.ix_(t, n)]) @ Z
+        coupling = (
+            Z.T
+            @ Q[np.ix_(n, t)]
+            @ la.cho_solve(la.cho_factor(Q[np.ix_(t, t)]), Q[np.ix_(t, n)])
+            @ Z
+        )
         normal = Z.T @ Q[np.ix_(n, n)] @ Z
         weight = np.diag(Q)[t].reshape(len(n), -1).mean(axis=1)
         root = np.sqrt(np.repeat(weight, problem.dim - 1))
         b2 = _largest(Q[np.ix_(t, t)] / np.outer(root, root), np.eye(len(t)))
         bound = Z.T @ ((shape**2 * weight)[:, None] * Z)
         ab = np.sqrt(b2 * _largest(bound, normal - coupling))
-        c2, ck = _largest(coupling, normal), np.sqrt(b2 * _largest(bound, normal) * _largest(coupling, normal))
+        c2, ck = (
+            _largest(coupling, normal),
+            np.sqrt(b2 * _largest(bound, normal) * _largest(coupling, normal)),
+        )
     except la.LinAlgError:
         return Thresholds(0.0, 0.0, 0.0)
     first, second = _over(2.0, ab), _over(np.sqrt(max(0.0, 1 - c2**2)), ck)
@@ -248,7 +309,14 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
 def _largest(A: np.ndarray, B: np.ndarray) -> float:
     """Largest eigenvalue of A x = value B x, at least 0; LinAlgError if B is not positive definite."""
     last = len(A) - 1
-    return max(0.0, float(la.eigh((A + A.T) / 2, (B + B.T) / 2, eigvals_only=True, subset_by_index=(last, last))[0]))
+    return max(
+        0.0,
+        float(
+            la.eigh((A + A.T) / 2, (B + B.T) / 2, eigvals_only=True, subset_by_index=(last, last))[
+                0
+            ]
+        ),
+    )
 
 
 def _over(a: float, b: float) -> float:
@@ -267,7 +335,10 @@ def _uniform_slip(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
             values = la.eigvals(_solve(matrix, right)[: len(n)])
         except la.LinAlgError:
             return Thresholds(np.nan, np.nan, np.nan)
-        radius, real = max(radius, np.abs(values).max()), max(real, np.abs(_real(values)).max(initial=0.0))
+        radius, real = (
+            max(radius, np.abs(values).max()),
+            max(real, np.abs(_real(values)).max(initial=0.0)),
+        )
     return Thresholds(_over(1.0, real), _over(1.0, radius), _over(1.0, radius))
 
 
@@ -289,11 +360,17 @@ def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: float) -> Local:
-    """Per closed contact  G D r_t + H D w = -mu d D g:  stick G = 0, H = I; slip along d; no friction G = I, d = 0."""
+    """Per closed contact  G D r_t + H D w = -mu d D g:  stick G = 0, H = I; slip along d; no
+    friction G = I, d = 0.
+    """
     k, dim = r.shape
     bound, force = problem.mu * np.abs(r[:, 0]), np.linalg.norm(r[:, 1:], axis=1)
     status = contact_status(problem, r)
-    closed, stick, slip = status.touching, status.stick, status.slip & (problem.mu > 0) & (force > 0)
+    closed, stick, slip = (
+        status.touching,
+        status.stick,
+        status.slip & (problem.mu > 0) & (force > 0),
+    )
     counts = int(stick.sum()), int(slip.sum()), int((~closed).sum())
     if not np.any(closed):
         return Local(*counts, 0.0, 0.0, np.inf, np.inf)
@@ -318,15 +395,25 @@ def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: f
         values = la.eigvals(_solve(tresca, right)[:m])
         pushes = np.any(np.abs(V[n]) > 1e-9, axis=0)
         A, B = V[:, pushes], V[:, ~pushes]
-        tangential = np.block([[G + H @ Q[np.ix_(t, t)], H @ B[t]], [B[t].T, np.zeros((B.shape[1],) * 2)]])
-        right = -np.block([[direction + H @ Q[np.ix_(t, n)], H @ A[t]], [np.zeros((B.shape[1], m + A.shape[1]))]])
+        tangential = np.block(
+            [[G + H @ Q[np.ix_(t, t)], H @ B[t]], [B[t].T, np.zeros((B.shape[1],) * 2)]]
+        )
+        right = -np.block(
+            [[direction + H @ Q[np.ix_(t, n)], H @ A[t]], [np.zeros((B.shape[1], m + A.shape[1]))]]
+        )
         r_t = _solve(tangential, right)[: len(t)]
         right = -np.vstack([Q[np.ix_(n, t)], A[t].T]) @ r_t
         late = la.eigvals(_solve(_bordered(Q[np.ix_(n, n)], A[n]), right))
     except la.LinAlgError:
         return Local(*counts, np.nan, np.nan, np.nan, np.nan)
     slow, rate = (float(np.abs(x).max(initial=0.0)) for x in (late, values))
-    return Local(*counts, slow, rate, _over(largest, rate), _over(largest, float(_real(values).max(initial=0.0))))
+    return Local(
+        *counts,
+        slow,
+        rate,
+        _over(largest, rate),
+        _over(largest, float(_real(values).max(initial=0.0))),
+    )
 
 
 def _relaxation(problem: InterfaceProblem) -> str:

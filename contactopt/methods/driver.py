@@ -34,10 +34,14 @@ CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
-FAR = 0.1  # residual above which a method that has worked for long may be at a problem without a solution
-DOUBT = 1.0  # seconds of work after which the proof is first looked for; then after ten times as long, and so on
+# residual above which a method that has worked for long may be at a problem without a solution
+FAR = 0.1
+# seconds of work after which the proof is first looked for; then after ten times as long, and so on
+DOUBT = 1.0
 SAME = 1e-11  # relative distance at which two iterates are the same state
-CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
+# repeated states in a row after which a method is not going anywhere; some change course before
+# that
+CONFIRM = 8
 
 
 def solve(
@@ -52,33 +56,37 @@ def solve(
     progress: Callable[[int, float], None] | None = None,
     **settings: Any,
 ) -> Solution:
-    """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
+    """Solve an interface problem; the answer's status is `solved` only if its certificate is at
+    most `tol`.
 
-    A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend that fails while solving
-    gives a status, too, with the last iterate.
+    A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend
+    that fails while solving gives a status, too, with the last iterate.
 
     Parameters
     ----------
     problem : what to solve
-    method : a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating` if the
-        settings name a backend
+    method : a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`,
+        or `alternating` if the settings name a backend
     tol : bound on natural_map_residual(problem, reactions, multipliers) [-]
     max_iterations : of the method
-    time_limit : from the call on [s]; what cannot be interrupted, such as one factorisation, is waited for
-    change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not used. If it is met
-        first, the iteration ends with status `settled` unless the certificate agrees
+    time_limit : from the call on [s]; what cannot be interrupted, such as one factorisation, is
+        waited for
+    change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not
+        used. If it is met first, the iteration ends with status `settled` unless the certificate
+        agrees
     start : a solution of a problem of the same size, to start from instead of cold
     progress : called with (iteration, residual) after each outer iteration
     settings : of a method that is given by its name
 
     Returns
     -------
-    Solution : reactions (k, dim) [force], multipliers (p,) [length], status, certificate and history
+    Solution : reactions (k, dim) [force], multipliers (p,) [length], status, certificate and
+        history
 
     Raises
     ------
-    InputError : on arguments that make no sense, an unknown or missing backend, a method that does not solve the problem's
-        law, or a load that pulls the bodies apart
+    InputError : on arguments that make no sense, an unknown or missing backend, a method that does
+        not solve the problem's law, or a load that pulls the bodies apart
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
@@ -88,19 +96,26 @@ def solve(
         raise InputError(f"time_limit must be a number of seconds, at least 0; got {time_limit!r}.")
     chosen = _method_for(problem, method, settings)
     with collected() as notes:
-        solution = _run(problem, chosen, tol, max_iterations, time_limit, change_tol, start, progress)
+        solution = _run(
+            problem, chosen, tol, max_iterations, time_limit, change_tol, start, progress
+        )
     return replace(solution, notes=tuple(notes))
 
 
-def _method_for(problem: InterfaceProblem, method: str | Method | None, settings: Mapping[str, Any]) -> Method:
+def _method_for(
+    problem: InterfaceProblem, method: str | Method | None, settings: Mapping[str, Any]
+) -> Method:
     """The method object; InputError if it is none, or does not solve the problem's law."""
     if method is None or isinstance(method, str):
         method = find_method(method or default_method(settings), **settings)
     elif not callable(getattr(method, "iterate", None)):
-        raise InputError(f"method must be a name or an object with a function `iterate`; got {method!r}.")
+        raise InputError(
+            f"method must be a name or an object with a function `iterate`; got {method!r}."
+        )
     elif settings:
         raise InputError(
-            f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
+            f"settings {', '.join(settings)} belong to a method given by name; set them on the"
+            " method object."
         )
     if not solves(method, problem.law):
         raise InputError(
@@ -126,14 +141,17 @@ def _run(
     if not problem.symmetric and not getattr(method, "unsymmetric", False):
         name = type(method).__name__.lower()
         raise InputError(
-            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto or proximal."
+            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto"
+            " or proximal."
         )
     if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
     operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
-    steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
+    steps = method.iterate(
+        scaled, None if start is None else _dimensionless_start(start, problem, scales)
+    )
     ended: Status | None = None
     repeated: Status | None = None
     message = ""
@@ -172,12 +190,15 @@ def _run(
 def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None
 ) -> tuple[Iterate | Known | None, Status | None, str]:
-    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended and why.
+    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended
+    and why.
 
-    repeated  how the last iterates repeat earlier ones; a method that does not go on in another way ends so
+    repeated  how the last iterates repeat earlier ones; a method that does not go on in another way
+              ends so
     """
     try:
-        with np.errstate(all="ignore"), until(time.perf_counter() + left):  # what overflows is seen below
+        # what overflows is seen below
+        with np.errstate(all="ignore"), until(time.perf_counter() + left):
             iterate = next(steps, None) if repeated is None else _turned(steps)
     except TimeUp:
         return None, Status.TIME_LIMIT, ""
@@ -193,7 +214,9 @@ def _next(
 
 
 def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
-    """The next iterate of a method that was told that it repeats itself; None where it has no other way to go on."""
+    """The next iterate of a method that was told that it repeats itself; None where it has no other
+    way to go on.
+    """
     try:
         return steps.throw(Repeated()) if isinstance(steps, Generator) else None
     except (Repeated, StopIteration):
@@ -201,7 +224,9 @@ def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
 
 
 def _counts(operator: InterfaceOperator | None) -> dict[str, float]:
-    """What a method has spent so far: products with Q and, where it works on the bodies themselves, V-cycles."""
+    """What a method has spent so far: products with Q and, where it works on the bodies themselves,
+    V-cycles.
+    """
     if operator is None:
         return {}
     counts: dict[str, float] = {"products": operator.products}
@@ -209,23 +234,32 @@ def _counts(operator: InterfaceOperator | None) -> dict[str, float]:
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
-    """No contact: no force. It solves the problem unless a plate needs forces that balance its load."""
+    """No contact: no force.
+
+    It solves the problem unless a plate needs forces that balance its load.
+    """
     r, multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     residual = natural_map_residual(problem, r, multipliers)
     status = Status.SOLVED if residual <= tol else Status.SETTLED
-    message = status.sentence if residual <= tol else "there is no contact that could balance the load on the plate"
+    message = (
+        status.sentence
+        if residual <= tol
+        else "there is no contact that could balance the load on the plate"
+    )
     return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
 
 
-def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+def _dimensionless_start(
+    start: Solution, problem: InterfaceProblem, scales: Scales
+) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(start, Solution):
         raise InputError(f"start must be a Solution; got {type(start).__name__}.")
     r = real_array("the start's array of reactions", start.reactions)
     multipliers = real_array("the start's array of multipliers", start.multipliers)
     if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
         raise InputError(
-            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs "
-            f"{problem.q.shape} and {problem.s.shape}."
+            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs"
+            f" {problem.q.shape} and {problem.s.shape}."
         )
     return scales.to_dimensionless(r, multipliers)
 
@@ -253,7 +287,8 @@ class _Recorder:
     def _certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by Q r from the method where it is known.
 
-        Where products cost iterations it is computed to a digit as long as it is far from the tolerance.
+        Where products cost iterations it is computed to a digit as long as it is far from the
+        tolerance.
         """
         if known:
             length = self.scales.length
@@ -264,7 +299,9 @@ class _Recorder:
         self.displacements = None
         rough = loosened(self.problem.Q, ROUGH)
         if rough is not self.problem.Q:
-            residual = natural_map_residual(replace(self.problem, Q=rough), self.reactions, self.multipliers)
+            residual = natural_map_residual(
+                replace(self.problem, Q=rough), self.reactions, self.multipliers
+            )
             if residual > max(100 * ROUGH, 10 * self.tol):
                 return residual
         return natural_map_residual(self.problem, self.reactions, self.multipliers)
@@ -275,7 +312,8 @@ class _Recorder:
         r, lam, *known = iterate
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         if self.lengthless:
-            # The same forces solve the problem with u = V lambda = 0, and rounding has no length to be small beside.
+            # The same forces solve the problem with u = V lambda = 0, and rounding has no length to
+            # be small beside.
             self.multipliers = np.zeros(len(lam))
         begin = time.perf_counter()
         self.residual = self._certificate(known)
@@ -283,9 +321,13 @@ class _Recorder:
         change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
         self.previous = self.reactions
         state = np.concatenate([r.ravel(), lam])
-        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME]
+        repeats = [
+            m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME
+        ]
         self.recent = [*self.recent[1 - CYCLE :], state]
-        self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
+        self.history.append(
+            {"residual": self.residual, "change": change, "seconds": self.clock} | counts
+        )
         if self.progress is not None:
             self.progress(len(self.history), self.residual)
         if self.residual <= self.tol:
@@ -312,8 +354,8 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 def _check_equilibrium(problem: InterfaceProblem) -> None:
     """Contact only pushes: InputError for a load that it cannot balance.
 
-    Where the multipliers are known by name, the motion along which the bodies escape is looked for. Otherwise only a plate
-    that moves along the normals and is pulled off is refused.
+    Where the multipliers are known by name, the motion along which the bodies escape is looked for.
+    Otherwise only a plate that moves along the normals and is pulled off is refused.
     """
     if problem.motions:
         found = escape(problem)
@@ -326,5 +368,12 @@ def _check_equilibrium(problem: InterfaceProblem) -> None:
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
         size = np.abs(column).max(initial=0.0)
         push = column[:, 0] * np.sign(s)  # what normal reactions add to s
-        if size > 0 and np.all(np.abs(column[:, 1:]) <= 1e-9 * size) and s != 0 and np.all(push >= -1e-9 * size):
-            raise InputError("the load on the plate pulls the bodies apart: no equilibrium; press them together.")
+        if (
+            size > 0
+            and np.all(np.abs(column[:, 1:]) <= 1e-9 * size)
+            and s != 0
+            and np.all(push >= -1e-9 * size)
+        ):
+            raise InputError(
+                "the load on the plate pulls the bodies apart: no equilibrium; press them together."
+            )

@@ -1,18 +1,24 @@
-"""All solutions of a small 2D problem, by a mixed-integer linear program (MILP) over the states of its contacts.
+"""All solutions of a small 2D problem, by a mixed-integer linear program (MILP) over the states of
+its contacts.
 
-Each contact is open (r = 0, u_n >= 0), sticks (u = 0, |r_t| <= mu r_n), or slips forwards or backwards (u_n = 0,
-r_t = -+ mu r_n, +- u_t >= 0): four binaries with sum one, and linear constraints that a bound M of r or u switches off.
-HiGHS finds a combination of states; the linear system of these states gives the point without M and its tolerances; the
-natural map certifies it; a cut removes every combination that has this point, and the search goes on until none is left.
+Each contact is open (r = 0, u_n >= 0), sticks (u = 0, |r_t| <= mu r_n), or slips forwards or
+backwards (u_n = 0, r_t = -+ mu r_n, +- u_t >= 0): four binaries with sum one, and linear
+constraints that a bound M of r or u switches off. HiGHS finds a combination of states; the linear
+system of these states gives the point without M and its tolerances; the natural map certifies it; a
+cut removes every combination that has this point, and the search goes on until none is left.
 Degenerate points, where several combinations meet, are therefore found once.
 
-M is no guess. With Z a basis of ker V' and r0 >= 0 purely normal forces that balance the plates, (r - r0) . u =
--r0_n . u_n - mu r_n . |u_t| <= 0 at every solution, so that r = r0 + Z y obeys y'A y + g'y <= 0, A = Z'Q Z,
-g = Z'(Q r0 + q), an ellipsoid: |r_i + (Z A^-1 g)_i / 2 - r0_i| <= sqrt((Z A^-1 Z')_ii g'A^-1 g) / 2. The same line gives
-r0_n . u_n <= g'A^-1 g / 4, which bounds u_n, then lambda, then u_t. This needs A positive definite and r0 > 0.
+M is no guess. With Z a basis of ker V' and r0 >= 0 purely normal forces that balance the plates, (r
+- r0) . u =
+-r0_n . u_n - mu r_n . |u_t| <= 0 at every solution, so that r = r0 + Z y obeys y'A y + g'y <= 0, A
+= Z'Q Z, g = Z'(Q r0 + q), an ellipsoid: |r_i + (Z A^-1 g)_i / 2 - r0_i| <= sqrt((Z A^-1 Z')_ii
+g'A^-1 g) /
+2. The same line gives r0_n . u_n <= g'A^-1 g / 4, which bounds u_n, then lambda, then u_t. This
+needs A positive definite and r0 > 0.
 
-A combination whose linear system is singular may have a continuum of solutions, all of the same four states; it is
-represented by one of its points. Time grows exponentially with the number of contacts in the worst case.
+A combination whose linear system is singular may have a continuum of solutions, all of the same
+four states; it is represented by one of its points. Time grows exponentially with the number of
+contacts in the worst case.
 """
 
 from __future__ import annotations
@@ -23,7 +29,13 @@ from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.problem import InterfaceProblem, Solution, Status, dimensionless, natural_map_residual
+from contactopt.problem import (
+    InterfaceProblem,
+    Solution,
+    Status,
+    dimensionless,
+    natural_map_residual,
+)
 
 MOST_CONTACTS = 24  # contacts
 CERTIFIED = 1e-8  # natural-map residual of a solution
@@ -45,14 +57,15 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
 
     Raises
     ------
-    InputError : in 3D, for other laws, for more than 24 contacts, for a Q that is not positive definite on the forces that
-        keep the balance, and for plates that do not press
+    InputError : in 3D, for other laws, for more than 24 contacts, for a Q that is not positive
+        definite on the forces that keep the balance, and for plates that do not press
     BackendError : if the solver HiGHS fails
     """
     check_number("limit", limit, low=0.0)
     if problem.dim != 2 or not _coulomb(problem) or problem.contacts > MOST_CONTACTS:
         raise InputError(
-            f"all_solutions needs a 2D problem of Coulomb's law with at most {MOST_CONTACTS} contacts; use solve."
+            f"all_solutions needs a 2D problem of Coulomb's law with at most {MOST_CONTACTS}"
+            " contacts; use solve."
         )
     scaled, scales = dimensionless(problem)
     program, found = _Program(scaled), list[Solution]()
@@ -66,7 +79,16 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
         possible = np.eye(4, dtype=bool)[states]
         if residual <= CERTIFIED:
             possible |= _states_of(scaled, r, lam)
-            found.append(Solution(reactions, multipliers, Status.SOLVED, residual, program.searches, "all_solutions"))
+            found.append(
+                Solution(
+                    reactions,
+                    multipliers,
+                    Status.SOLVED,
+                    residual,
+                    program.searches,
+                    "all_solutions",
+                )
+            )
         program.exclude(possible)
     return found
 
@@ -85,7 +107,8 @@ class _Program:
         r_n, r_t = (np.hstack([np.eye(2 * k)[i::2], np.zeros((k, p))]) for i in (0, 1))
         force, displacement, multipliers = _bounds(problem)
         R, U_n, U_t = force[:, 0], displacement[:, 0], displacement[:, 1]
-        bond, free = 2 * mu * R, (mu == 0) * U_t  # without friction only FORWARD is used, with slip of either sign
+        # without friction only FORWARD is used, with slip of either sign
+        bond, free = 2 * mu * R, (mu == 0) * U_t
         K = np.hstack([problem.Q, problem.V])
         rows: list[tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]] = []
         zero, none = np.zeros(k), np.full(k, np.inf)
@@ -108,12 +131,15 @@ class _Program:
         lower = np.column_stack([zero, -force[:, 1]]).ravel()
         used = np.concatenate([np.ones(k), mu > 0, np.ones(k), mu > 0])
         self.bounds = Bounds(
-            np.concatenate([lower, -multipliers, np.zeros(4 * k)]), np.concatenate([force.ravel(), multipliers, used])
+            np.concatenate([lower, -multipliers, np.zeros(4 * k)]),
+            np.concatenate([force.ravel(), multipliers, used]),
         )
         self.integer = np.concatenate([np.zeros(2 * k + p), np.ones(4 * k)])
 
     def search(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States (k,) and unknowns (2k + p,) of a combination not yet excluded; None, None if there is none."""
+        """States (k,) and unknowns (2k + p,) of a combination not yet excluded; None, None if there
+        is none.
+        """
         self.searches += 1
         n, k = len(self.problem.Q) + len(self.problem.s), self.problem.contacts
         answer = milp(
@@ -129,7 +155,9 @@ class _Program:
         return np.argmax(answer.x[n:].reshape(4, k), axis=0), answer.x[:n]
 
     def point(self, states: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r (k, 2) and lambda (p,): the solution of the linear system of these states that is nearest to `near`."""
+        """r (k, 2) and lambda (p,): the solution of the linear system of these states that is
+        nearest to `near`.
+        """
         problem, k = self.problem, self.problem.contacts
         A, b = np.hstack([problem.Q, problem.V]), -problem.q.ravel()
         shut, opened, slips = np.flatnonzero(states != OPEN), states == OPEN, states >= FORWARD
@@ -146,7 +174,9 @@ class _Program:
         return r, x[2 * k :]
 
     def exclude(self, possible: np.ndarray) -> None:
-        """Cut every combination that takes the state of each contact from its `possible` ones (k, 4)."""
+        """Cut every combination that takes the state of each contact from its `possible` ones (k,
+        4).
+        """
         cut = np.concatenate([np.zeros(len(self.integer) - possible.size), possible.T.ravel()])
         self.A = np.vstack([self.A, cut])
         self.low, self.high = np.append(self.low, -np.inf), np.append(self.high, len(possible) - 1)
@@ -155,7 +185,10 @@ class _Program:
 def _states_of(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> np.ndarray:
     """Which states (k, 4) a point has, more than one where it is degenerate."""
     u = problem.displacements(r, lam)
-    near_r, near_u = SAME * np.abs(r).max(initial=0.0), SAME * max(np.abs(u).max(), np.abs(problem.q).max())
+    near_r, near_u = (
+        SAME * np.abs(r).max(initial=0.0),
+        SAME * max(np.abs(u).max(), np.abs(problem.q).max()),
+    )
     u_n, u_t, r_n, r_t = np.abs(u[:, 0]), u[:, 1], r[:, 0], r[:, 1]
     shut, bound = u_n <= near_u, problem.mu * r_n
     return np.stack(
@@ -170,7 +203,9 @@ def _states_of(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> np.
 
 
 def _bounds(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds of |r| (k, 2), |u| (k, 2) and |lambda| (p,) at every solution, derived in the module's head."""
+    """Bounds of |r| (k, 2), |u| (k, 2) and |lambda| (p,) at every solution, derived in the module's
+    head.
+    """
     k, p = problem.contacts, len(problem.s)
     r0, Z, V_n = np.zeros(2 * k), np.eye(2 * k), problem.V[::2]
     if p:
@@ -183,12 +218,16 @@ def _bounds(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray, np.ndarr
             bounds=[(0, None)] * k + [(0, 1.0)],
         )
         if not least.success or least.x[-1] <= SAME or np.linalg.matrix_rank(V_n) < p:
-            raise InputError("all_solutions needs plates that press the bodies together and do not drag them.")
+            raise InputError(
+                "all_solutions needs plates that press the bodies together and do not drag them."
+            )
         r0[::2], Z = least.x[:k], la.null_space(problem.V.T)
     A, g = Z.T @ problem.Q @ Z, Z.T @ (problem.Q @ r0 + problem.q.ravel())
     eigenvalues = la.eigvalsh((A + A.T) / 2) if A.size else np.ones(1)
     if eigenvalues.min() <= len(A) * 1e-12 * eigenvalues.max():
-        raise InputError("all_solutions needs a positive definite Q; reactions of a singular one are not unique.")
+        raise InputError(
+            "all_solutions needs a positive definite Q; reactions of a singular one are not unique."
+        )
     G = Z @ np.linalg.solve(A, Z.T)
     energy = float(g @ np.linalg.solve(A, g)) if A.size else 0.0
     center = r0 - Z @ np.linalg.solve(A, g) / 2 if A.size else r0

@@ -1,16 +1,18 @@
-"""Lagrange multiplier method for friction inside the two-stage iteration: Uzawa's iteration (paper, section 5.1).
+"""Lagrange multiplier method for friction inside the two-stage iteration: Uzawa's iteration (paper,
+section 5.1).
 
-Normal problem, r_t fixed: the QP (21), solved by conjugate gradients with bounds (contactopt.methods.kernels.mprgp) and made exact by
-active set steps. Tangential problem, r_n fixed: the friction force is the Lagrange multiplier of the bound on the slip
-rate; Uzawa's ascent on it,
+Normal problem, r_t fixed: the QP (21), solved by conjugate gradients with bounds
+(contactopt.methods.kernels.mprgp) and made exact by active set steps. Tangential problem, r_n
+fixed: the friction force is the Lagrange multiplier of the bound on the slip rate; Uzawa's ascent
+on it,
     r_t <- projection of r_t - rho u_t on the discs |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
-is repeated until it has converged. It minimises the convex program (22) of `alternating`; tangentially moving plates
-keep their balance within the projection. rho = 1 / largest eigenvalue of Q_tt, so that the inner iteration always
-converges, linearly at a rate 1 - 1 / condition number of Q_tt: cheap iterations, one product with Q_tt each, but many.
-The outer loop contracts or cycles exactly as `alternating` does (moderate mu, weak coupling); relaxation < 1 helps
-there.
-Sources: Uzawa's method in Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational Inequalities;
-Panagiotopoulos (1975) for the alternation.
+is repeated until it has converged. It minimises the convex program (22) of `alternating`;
+tangentially moving plates keep their balance within the projection. rho = 1 / largest eigenvalue of
+Q_tt, so that the inner iteration always converges, linearly at a rate 1 - 1 / condition number of
+Q_tt: cheap iterations, one product with Q_tt each, but many. The outer loop contracts or cycles
+exactly as `alternating` does (moderate mu, weak coupling); relaxation < 1 helps there. Sources:
+Uzawa's method in Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational
+Inequalities; Panagiotopoulos (1975) for the alternation.
 """
 
 from __future__ import annotations
@@ -40,8 +42,7 @@ class Lagrangian:
 
     Parameters
     ----------
-    relaxation
-        Fraction of each new tangential force that is taken, above 0 and at most 1.
+    relaxation : Fraction of each new tangential force that is taken, above 0 and at most 1.
     """
 
     relaxation: float = 1.0
@@ -58,7 +59,8 @@ class Lagrangian:
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
         r_n, r_t, lam = r[:, 0], r[:, 1:], lam.copy()
-        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries
+        # columns with normal entries
+        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
         normal, tangential = Part(problem, pushes, 0), Part(problem, ~pushes, 1)
         change = 1.0
         while True:
@@ -70,11 +72,15 @@ class Lagrangian:
 
 
 class Part:
-    """Normal (first = 0) or tangential (first = 1) components of a problem, with the plates that belong to them."""
+    """Normal (first = 0) or tangential (first = 1) components of a problem, with the plates that
+    belong to them.
+    """
 
     def __init__(self, problem: InterfaceProblem, own: np.ndarray, first: int):
         blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-        here, there = (blocks[:, :1], blocks[:, 1:]) if first == 0 else (blocks[:, 1:], blocks[:, :1])
+        here, there = (
+            (blocks[:, :1], blocks[:, 1:]) if first == 0 else (blocks[:, 1:], blocks[:, :1])
+        )
         rows, others = here.ravel(), there.ravel()
         self.problem, self.own, self.shape = problem, own, here.shape
         self.q, self.V, self.V_there = problem.q.ravel()[rows], problem.V[rows], problem.V[others]
@@ -86,7 +92,9 @@ class Part:
         c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
         return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
 
-    def exact(self, r_n: np.ndarray, r_t: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def exact(
+        self, r_n: np.ndarray, r_t: np.ndarray, lam: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The normal QP."""
         low = self.problem.law.lowest
         c, V, s = self.data(r_t, lam)
@@ -104,7 +112,9 @@ class Part:
         for _ in range(INNER):
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
-            new, own = project_balanced(lambda y: disc_derivative(y, radius), y, V, s, self.step, own)
+            new, own = project_balanced(
+                lambda y: disc_derivative(y, radius), y, V, s, self.step, own
+            )
             move = float(np.linalg.norm(new - r_t))
             r_t, first = new, max(first, move)
             if move <= accuracy * max(1.0, float(np.linalg.norm(r_t))):

@@ -19,20 +19,19 @@ Known = tuple[np.ndarray, np.ndarray, Moved]  # the same, and Q r
 class Method(Protocol):
     """What every method offers, as the head of this module says."""
 
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
+    def iterate(
+        self, problem: InterfaceProblem, start: Iterate | None = None
+    ) -> Iterator[Iterate | Known]:
         """Iterate on a dimensionless problem. The driver decides when to stop.
 
         Parameters
         ----------
-        problem
-            The dimensionless interface problem.
-        start
-            Reactions (k, dim) and multipliers (p,) to start from; None: a cold start.
+        problem : The dimensionless interface problem.
+        start : Reactions (k, dim) and multipliers (p,) to start from; None: a cold start.
 
         Yields
         ------
-        tuple
-            Reactions (k, dim), multipliers (p,) and, where the method knows it, Q r as a Moved.
+        Reactions (k, dim), multipliers (p,) and, where the method knows it, Q r as a Moved.
         """
 
     def backends(self, dim: int) -> tuple[str, str]:
@@ -40,18 +39,15 @@ class Method(Protocol):
 
         Parameters
         ----------
-        dim
-            Number of components of a contact, 2 or 3.
+        dim : Number of components of a contact, 2 or 3.
 
         Returns
         -------
-        tuple
-            The normal and the tangential backend, NATIVE where it needs none.
+        The normal and the tangential backend, NATIVE where it needs none.
 
         Raises
         ------
-        InputError
-            If one cannot be used.
+        InputError : If one cannot be used.
         """
 
 
@@ -59,19 +55,18 @@ NATIVE = "native"  # in place of a backend's name: our own linear algebra
 
 
 def solves(method: Any, law: Law) -> bool:
-    """Say whether a method solves problems of a law. A method that says nothing about it solves all.
+    """Say whether a method solves problems of a law.
+
+    A method that says nothing about it solves all.
 
     Parameters
     ----------
-    method
-        The method, an object with `iterate`.
-    law
-        The law of a problem.
+    method : The method, an object with `iterate`.
+    law : The law of a problem.
 
     Returns
     -------
-    bool
-        The answer of the method's own `solves`, if it has one.
+    The answer of the method's own `solves`, if it has one.
     """
     predicate = getattr(method, "solves", None)
     return predicate is None or bool(predicate(law))

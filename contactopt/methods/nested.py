@@ -1,12 +1,14 @@
-"""Newton's method on nested grids, for problems whose Q is a convolution: half-spaces, rough surfaces.
+"""Newton's method on nested grids, for problems whose Q is a convolution: half-spaces, rough
+surfaces.
 
-The problem is solved on coarse grids first, where it costs little to find out which contacts close and slip; each solution
-starts the next finer grid. The steps are those of the primal-dual active set method (`newton`), whose linear systems are
-solved by PCG or GMRES in single precision to the accuracy that the step is worth, while residuals are computed in double
-precision. Without friction only the normal components are computed.
-Sources: Polonsky, Keer (1999), A numerical method for solving rough contact problems based on the multi-level multi-summation
-and conjugate gradient techniques, for contact by FFT and conjugate gradients; Hueber, Stadler, Wohlmuth (2008) for the active
-sets; Eisenstat, Walker (1996) for the accuracy of steps.
+The problem is solved on coarse grids first, where it costs little to find out which contacts close
+and slip; each solution starts the next finer grid. The steps are those of the primal-dual active
+set method (`newton`), whose linear systems are solved by PCG or GMRES in single precision to the
+accuracy that the step is worth, while residuals are computed in double precision. Without friction
+only the normal components are computed. Sources: Polonsky, Keer (1999), A numerical method for
+solving rough contact problems based on the multi-level multi-summation and conjugate gradient
+techniques, for contact by FFT and conjugate gradients; Hueber, Stadler, Wohlmuth (2008) for the
+active sets; Eisenstat, Walker (1996) for the accuracy of steps.
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ from contactopt.problem.laws.law import Law
 
 logger = logging.getLogger(__name__)
 
-NEAR = 1e-8  # residual over the size of the forces, from which on iterates of the finest grid are shown to the driver
+# residual over the size of the forces, from which on iterates of the finest grid are shown to the
+# driver
+NEAR = 1e-8
 
 
 @dataclass(frozen=True)
@@ -58,16 +62,23 @@ class Nested:
         for point, _ in self.steps(problem, start):
             yield point
 
-    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate, float]]:
+    def steps(
+        self, problem: InterfaceProblem, start: Iterate | None = None
+    ) -> Iterator[tuple[Iterate, float]]:
         """Iterates on the finest grid with the residual of the equations."""
         if not isinstance(problem.Q, Convolution):
-            raise InputError("the method 'nested' needs half-spaces on both sides, or one on a rigid body; use 'auto'.")
+            raise InputError(
+                "the method 'nested' needs half-spaces on both sides, or one on a rigid body; use"
+                " 'auto'."
+            )
         levels = [Level.of_problem(problem)]
         while levels[-1].halves:
             levels.append(levels[-1].coarse())
         given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
         point = (
-            _robust_start(levels[-1], _first_guess(levels, given)) if len(levels) > 1 else _first_guess(levels, given)
+            _robust_start(levels[-1], _first_guess(levels, given))
+            if len(levels) > 1
+            else _first_guess(levels, given)
         )
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
             point, at = _solve_level(coarse, point)
@@ -78,7 +89,10 @@ class Nested:
             other = finest.evaluate(*given)
             point, at = (given, other) if other.residual < CLOSER * at.residual else (point, at)
         while True:
-            if at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0]))) or at.residual > 0.5 * last:
+            if (
+                at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0])))
+                or at.residual > 0.5 * last
+            ):
                 yield (_whole(problem, point[0] + at.error), point[1]), at.residual
             change, count = step(finest, at, _worth(at.residual, last))
             last = at.residual
@@ -94,7 +108,9 @@ class Nested:
 
 
 def _first_guess(levels: list[Level], given: Point | None) -> Point:
-    """A point on the coarsest level: the one given, or the forces spread evenly that balance the loads."""
+    """A point on the coarsest level: the one given, or the forces spread evenly that balance the
+    loads.
+    """
     coarsest = levels[-1]
     if given is not None:
         for level in levels[:-1]:
@@ -112,16 +128,24 @@ def _first_guess(levels: list[Level], given: Point | None) -> Point:
 
 
 def _robust_start(coarsest: Level, point: Point) -> Point:
-    """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default method on an array Q."""
+    """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default
+    method on an array Q.
+    """
     reached, at = _solve_level(coarsest, point, COARSEST_ENOUGH)
     if (
         at.residual <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
         or len(coarsest.components) < coarsest.kernel.dim
     ):
         return reached
-    note(logger, "Newton's method failed on the coarsest grid, so the default method starts there from an array Q")
+    note(
+        logger,
+        "Newton's method failed on the coarsest grid, so the default method starts there from an"
+        " array Q",
+    )
     V = np.moveaxis(coarsest.V, 0, 1).reshape(coarsest.q.size, -1)
-    small = InterfaceProblem(coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s)
+    small = InterfaceProblem(
+        coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s
+    )
     best = at.residual
     for r, lam, *_ in islice(find_method("auto").iterate(small), COARSE_TRIES):
         candidate = np.ascontiguousarray(r.T), lam
@@ -133,7 +157,9 @@ def _robust_start(coarsest: Level, point: Point) -> Point:
     return reached
 
 
-def _solve_level(level: Level, point: Point, enough: float = COARSE_ENOUGH) -> tuple[Point, Evaluation]:
+def _solve_level(
+    level: Level, point: Point, enough: float = COARSE_ENOUGH
+) -> tuple[Point, Evaluation]:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
     at, last = level.evaluate(*point), np.inf
     for _ in range(COARSE_STEPS):
@@ -147,7 +173,9 @@ def _solve_level(level: Level, point: Point, enough: float = COARSE_ENOUGH) -> t
 
 
 def _worth(residual: float, last: float) -> float:
-    """Relative accuracy of a step: little while the residual does not fall, because the contacts still change."""
+    """Relative accuracy of a step: little while the residual does not fall, because the contacts
+    still change.
+    """
     if last in (0.0, np.inf):
         return NESTED_LOOSEST
     return min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2))

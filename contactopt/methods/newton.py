@@ -1,15 +1,18 @@
-"""Semismooth Newton method on the Alart-Curnier equations, the primal-dual active set method for Coulomb friction.
+"""Semismooth Newton method on the Alart-Curnier equations, the primal-dual active set method for
+Coulomb friction.
 
-Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law (contactopt.problem.laws): each step
-sorts the contacts into open, sticking and slipping and solves one linear system of the closed ones: dense, n^3/3 to
-2 n^3/3 operations, by sparse factors where Q is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that
-the step is worth (Eisenstat, Walker 1996), some ten products with Q each (contactopt.methods.kernels.krylov). Where the
-bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
-(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution; the number of steps hardly depends on the mesh
-(reports/newton_steps). Motions that friction alone holds, and no sticking contact, follow from a convex problem before each
-step (contactopt.methods.kernels.balance). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
-friction may make it cycle, which is what `proximal` is for.
-Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
+Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law
+(contactopt.problem.laws): each step sorts the contacts into open, sticking and slipping and solves
+one linear system of the closed ones: dense, n^3/3 to 2 n^3/3 operations, by sparse factors where Q
+is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that the step is worth
+(Eisenstat, Walker 1996), some ten products with Q each (contactopt.methods.kernels.krylov). Where
+the bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
+(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution; the number of
+steps hardly depends on the mesh (reports/newton_steps). Motions that friction alone holds, and no
+sticking contact, follow from a convex problem before each step
+(contactopt.methods.kernels.balance). Not globally convergent: rank-deficient Q (rigid bodies,
+redundant contacts) or strong friction may make it cycle, which is what `proximal` is for. Sources:
+Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction.
 """
 
@@ -55,12 +58,11 @@ class Newton:
 
     Parameters
     ----------
-    linear
-        'dense', 'krylov', which needs products with Q only, or 'coupled', which iterates on the bodies at once. None:
-        dense for an array Q, coupled where the bodies are solved by iteration, and krylov for other operators.
-    preconditioner
-        Of 'krylov' and 'coupled': a name in contactopt.methods.preconditioners, or 'none'. None: the best that fits
-        the contacts.
+    linear : 'dense', 'krylov', which needs products with Q only, or 'coupled', which iterates on
+        the bodies at once. None: dense for an array Q, coupled where the bodies are solved by
+        iteration, and krylov for other operators.
+    preconditioner : Of 'krylov' and 'coupled': a name in contactopt.methods.preconditioners, or
+        'none'. None: the best that fits the contacts.
     """
 
     linear: str | None = None
@@ -71,42 +73,50 @@ class Newton:
 
     def __post_init__(self) -> None:
         if self.linear not in (None, "dense", "krylov", "coupled"):
-            raise InputError(f"unknown linear solver {self.linear!r}; choose dense, krylov or coupled.")
+            raise InputError(
+                f"unknown linear solver {self.linear!r}; choose dense, krylov or coupled."
+            )
         find_preconditioner(self.preconditioner)
 
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
+    def iterate(
+        self, problem: InterfaceProblem, start: Iterate | None = None
+    ) -> Iterator[Iterate | Known]:
         for point, _ in self.steps(problem, start):
             yield point
 
-    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate | Known, float]]:
+    def steps(
+        self, problem: InterfaceProblem, start: Iterate | None = None
+    ) -> Iterator[tuple[Iterate | Known, float]]:
         """Iterate as `iterate` does, and tell the residual of the equations.
 
         Parameters
         ----------
-        problem, start
-            As for `iterate`.
+        problem, start : As for `iterate`.
 
         Yields
         ------
-        tuple
-            An iterate, and the residual of the equations that its step began with.
+        An iterate, and the residual of the equations that its step began with.
 
         Raises
         ------
-        InputError
-            If the linear algebra that was asked for does not fit Q.
+        InputError : If the linear algebra that was asked for does not fit Q.
         """
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:
-            raise InputError("linear='coupled' needs bodies that are solved by iteration; take the solver 'multigrid'.")
+            raise InputError(
+                "linear='coupled' needs bodies that are solved by iteration; take the solver"
+                " 'multigrid'."
+            )
         if form is not None and self.linear in (None, "coupled"):
             yield from coupled_steps(problem, form, self.preconditioner, start)
             note(logger, UNSOLVED)
             return
-        implicit = self.linear == "krylov" or (self.linear is None and isinstance(problem.Q, InterfaceOperator))
+        implicit = self.linear == "krylov" or (
+            self.linear is None and isinstance(problem.Q, InterfaceOperator)
+        )
         if self.linear == "dense" or (isinstance(problem.Q, InterfaceOperator) and not implicit):
             problem = problem.explicit()
         equations = coulomb_equations(problem)

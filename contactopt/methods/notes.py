@@ -1,7 +1,9 @@
-"""What a solve did otherwise than asked or expected, in sentences: logged where it happens and kept in the Solution.
+"""What a solve did otherwise than asked or expected, in sentences: logged where it happens and kept
+in the Solution.
 
-A method that falls back on something weaker or dearer calls `note`. The driver opens `collected` around each solve; the
-list belongs to that solve alone, also where solves run in several threads or one inside another.
+A method that falls back on something weaker or dearer calls `note`. The driver opens `collected`
+around each solve; the list belongs to that solve alone, also where solves run in several threads or
+one inside another.
 """
 
 from __future__ import annotations
@@ -19,10 +21,8 @@ def note(logger: logging.Logger, sentence: str) -> None:
 
     Parameters
     ----------
-    logger
-        The logger of the module that speaks.
-    sentence
-        What was done otherwise than asked or expected.
+    logger : The logger of the module that speaks.
+    sentence : What was done otherwise than asked or expected.
     """
     logger.info(sentence)
     notes = _notes.get()
@@ -36,8 +36,7 @@ def collected() -> Iterator[list[str]]:
 
     Yields
     ------
-    list
-        The sentences. The list grows while the block runs.
+    The sentences. The list grows while the block runs.
     """
     notes: list[str] = []
     token = _notes.set(notes)

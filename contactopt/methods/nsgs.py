@@ -1,14 +1,16 @@
-"""Nonsmooth Gauss-Seidel method: one contact after another, each local Coulomb problem solved exactly.
+"""Nonsmooth Gauss-Seidel method: one contact after another, each local Coulomb problem solved
+exactly.
 
-With the forces of all others fixed, contact i solves u_i = Q_ii r_i + v_i: open if v_n >= 0, else sticking if
--Q_ii^-1 v_i lies in the cone, else slipping, u_t = -l r_t with l > 0. Then, r_n eliminated and S the Schur complement,
-(S + l I) r_t = Q_tn v_n / Q_nn - v_t, and |r_t| = mu r_n is one equation for l with a root in a known interval: linear
-in 2D (closed form), solved by safeguarded Newton steps in 3D.
-Plates enter by the method of multipliers: the sweep works on Q + tau V V', q + V (lambda + tau s), and lambda grows by
-tau (V' r + s) after it; tau V' V = 10 mean compliances. A sweep costs one product with Q and k local problems of some
-microseconds each. No factorisation, works for rank-deficient Q; converges linearly, slowly where each contact feels
-all others, and may not converge for strong friction. Source: Jourdan, Alart, Jean (1998), A Gauss-Seidel like
-algorithm to solve frictional contact problems.
+With the forces of all others fixed, contact i solves u_i = Q_ii r_i + v_i: open if v_n >= 0, else
+sticking if -Q_ii^-1 v_i lies in the cone, else slipping, u_t = -l r_t with l > 0. Then, r_n
+eliminated and S the Schur complement, (S + l I) r_t = Q_tn v_n / Q_nn - v_t, and |r_t| = mu r_n is
+one equation for l with a root in a known interval: linear in 2D (closed form), solved by
+safeguarded Newton steps in 3D. Plates enter by the method of multipliers: the sweep works on Q +
+tau V V', q + V (lambda + tau s), and lambda grows by tau (V' r + s) after it; tau V' V = 10 mean
+compliances. A sweep costs one product with Q and k local problems of some microseconds each. No
+factorisation, works for rank-deficient Q; converges linearly, slowly where each contact feels all
+others, and may not converge for strong friction. Source: Jourdan, Alart, Jean (1998), A
+Gauss-Seidel like algorithm to solve frictional contact problems.
 """
 
 from __future__ import annotations
@@ -41,8 +43,7 @@ class NSGS:
 
     Parameters
     ----------
-    relaxation
-        Fraction of each local change that is taken, between 0 and 2.
+    relaxation : Fraction of each local change that is taken, between 0 and 2.
     """
 
     relaxation: float = 1.0
@@ -60,13 +61,18 @@ class NSGS:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         (k, dim), V, s = problem.q.shape, problem.V, problem.s
-        r, lam = (np.zeros((k, dim)), np.zeros(len(s))) if start is None else (start[0].copy(), start[1])
+        r, lam = (
+            (np.zeros((k, dim)), np.zeros(len(s))) if start is None else (start[0].copy(), start[1])
+        )
         flat = r.reshape(-1)  # a view: changes with r
         tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
         motions = V.reshape(k, dim, -1)
         rows = [_coupling(problem.Q, dim, i) for i in range(k)]
         bounds = zip(rows, motions, problem.mu, problem.law.lowest == 0)
-        contacts = [Local(own + (T * tau) @ T.T, float(mu), not apart) for (_, _, own), T, mu, apart in bounds]
+        contacts = [
+            Local(own + (T * tau) @ T.T, float(mu), not apart)
+            for (_, _, own), T, mu, apart in bounds
+        ]
         while True:
             check_time()
             w = problem.q + (V @ (lam + tau * s)).reshape(k, dim)
@@ -79,7 +85,11 @@ class NSGS:
                 if len(s):
                     moved += T @ (tau * pushed)
                 new = local.solve((moved - local.W @ old).tolist())
-                r[i] = new if self.relaxation == 1.0 else local.admissible(old + self.relaxation * (new - old))
+                r[i] = (
+                    new
+                    if self.relaxation == 1.0
+                    else local.admissible(old + self.relaxation * (new - old))
+                )
                 if len(s):
                     pushed += T.T @ (r[i] - old)
             lam = lam + tau * (V.T @ flat + s)
@@ -87,7 +97,9 @@ class NSGS:
 
 
 def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.ndarray, np.ndarray]:
-    """The components that move contact i, their part (dim, m) of Q, and the contact's own block (dim, dim)."""
+    """The components that move contact i, their part (dim, m) of Q, and the contact's own block
+    (dim, dim).
+    """
     own = slice(dim * i, dim * (i + 1))
     if not sp.issparse(Q):
         return slice(None), Q[own], Q[own, own]
@@ -97,7 +109,10 @@ def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.nd
 
 
 class Local:
-    """Coulomb's law at one contact, u = W r + v: W (dim, dim), mu >= 0. Scalar arithmetic, for speed."""
+    """Coulomb's law at one contact, u = W r + v: W (dim, dim), mu >= 0.
+
+    Scalar arithmetic, for speed.
+    """
 
     def __init__(self, W: np.ndarray, mu: float, bilateral: bool):
         self.W, self.mu, self.bilateral = W, mu, bilateral

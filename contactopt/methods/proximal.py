@@ -1,12 +1,14 @@
-"""Proximal-point loop around the semismooth Newton method: robust where Q has no full rank, on any form of Q.
+"""Proximal-point loop around the semismooth Newton method: robust where Q has no full rank, on any
+form of Q.
 
-Outer iterate r_j solves Coulomb's problem with u = Q r + V lambda + q + alpha (r - r_{j-1}), a problem whose compliance
-Q + alpha I has full rank, by Newton steps from r_{j-1} with a line search. alpha falls by 5 after a success and rises by 8
-after a failure, so that the loop ends as Newton's method where that converges. The fixed points are exactly the solutions
-of Coulomb's problem; there is no proof of convergence for Coulomb friction. Cost: one linear system per Newton step,
-dense, or by a sparse factorisation where Q is sparse. Q need not be symmetric.
-Source: Acary, Bremond, Huber (2018), section on proximal-point algorithms; Rockafellar (1976). The multiplier form of
-the same loop is the augmented Lagrangian method with penalty 1 / alpha.
+Outer iterate r_j solves Coulomb's problem with u = Q r + V lambda + q + alpha (r - r_{j-1}), a
+problem whose compliance Q + alpha I has full rank, by Newton steps from r_{j-1} with a line search.
+alpha falls by 5 after a success and rises by 8 after a failure, so that the loop ends as Newton's
+method where that converges. The fixed points are exactly the solutions of Coulomb's problem; there
+is no proof of convergence for Coulomb friction. Cost: one linear system per Newton step, dense, or
+by a sparse factorisation where Q is sparse. Q need not be symmetric. Source: Acary, Bremond, Huber
+(2018), section on proximal-point algorithms; Rockafellar (1976). The multiplier form of the same
+loop is the augmented Lagrangian method with penalty 1 / alpha.
 """
 
 from __future__ import annotations
@@ -19,14 +21,22 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.linear.operators import diagonal
-from contactopt.methods.constants import EASY, FALL, GENTLE_FALL, GENTLE_RISE, RISE, SUBPROBLEM_STEPS
+from contactopt.methods.constants import (
+    EASY,
+    FALL,
+    GENTLE_FALL,
+    GENTLE_RISE,
+    RISE,
+    SUBPROBLEM_STEPS,
+)
 from contactopt.methods.kernels.alart_curnier import cold_start
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.methods.kernels.sparse_newton import ProximalEquations
 from contactopt.methods.method import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 
-LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6  # of the proximal term; where even the largest fails, the loop ends
+# of the proximal term; where even the largest fails, the loop ends
+LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
 
 
 @dataclass(frozen=True)
@@ -35,8 +45,7 @@ class Proximal:
 
     Parameters
     ----------
-    alpha
-        First weight of the proximal term, in units of the mean compliance.
+    alpha : First weight of the proximal term, in units of the mean compliance.
     """
 
     alpha: float = 1e-3
@@ -62,18 +71,17 @@ def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEqu
 
     Parameters
     ----------
-    problem
-        The dimensionless interface problem.
-    matrix
-        Its Q, ready for block systems.
+    problem : The dimensionless interface problem.
+    matrix : Its Q, ready for block systems.
 
     Returns
     -------
-    ProximalEquations
-        The equations, which `at` gives a centre and a weight.
+    The equations, which `at` gives a centre and a weight.
     """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
-    return ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, compliance)
+    return ProximalEquations(
+        matrix, problem.q, problem.V, problem.s, problem.law.project, compliance
+    )
 
 
 def proximal_iterates(
@@ -83,22 +91,19 @@ def proximal_iterates(
 
     Parameters
     ----------
-    equations
-        The equations of the problem.
-    point
-        Forces (k, dim) and multipliers (p,) to start from.
-    alpha
-        The first weight of the proximal term.
-    gentle
-        Whether alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon
-        fails.
+    equations : The equations of the problem.
+    point : Forces (k, dim) and multipliers (p,) to start from.
+    alpha : The first weight of the proximal term.
+    gentle : Whether alpha changes slowly, so that few subproblems fail: for problems on which every
+        smaller alpha soon fails.
 
     Yields
     ------
-    tuple
-        The solution of each subproblem, or of a failed one the point that Newton's method left it at.
+    The solution of each subproblem, or of a failed one the point that Newton's method left it at.
     """
-    (fall, rise), easy = ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
+    (fall, rise), easy = (
+        ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
+    )
     while alpha < LARGEST_WEIGHT:
         new, solved, steps = equations.at(point[0], alpha).solve(*point)
         yield new

@@ -2,14 +2,15 @@
 
 Each outer iteration solves ONE convex problem, normal and tangential forces together,
     min  r' Q r / 2 + q' r    subject to  r_n >= 0,  |r_t| <= g,  V' r + s = 0,
-a box-constrained QP with one tangential direction, an SOCP with two, and then sets g = mu |r_n|. Its answer is made
-exact by Newton steps on r = P(r - u), P the projection on half-lines and discs. The first bounds are those of the bonded
-problem if a plate presses the bodies together, else zero: then the first iterate is contact without friction.
-Converges linearly, at a rate proportional to mu times the coupling of normal and tangential forces; beyond a critical
-mu it cycles, and relaxation < 1 then often helps. A fixed point is exactly a solution of Coulomb's problem. Bounds too
-small for a plate that is dragged tangentially leave the convex problem without an answer.
-Sources: Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for the numerical
-realization of contact problems with Coulomb friction.
+a box-constrained QP with one tangential direction, an SOCP with two, and then sets g = mu |r_n|.
+Its answer is made exact by Newton steps on r = P(r - u), P the projection on half-lines and discs.
+The first bounds are those of the bonded problem if a plate presses the bodies together, else zero:
+then the first iterate is contact without friction. Converges linearly, at a rate proportional to mu
+times the coupling of normal and tangential forces; beyond a critical mu it cycles, and relaxation <
+1 then often helps. A fixed point is exactly a solution of Coulomb's problem. Bounds too small for a
+plate that is dragged tangentially leave the convex problem without an answer. Sources:
+Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for the
+numerical realization of contact problems with Coulomb friction.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ class Tresca:
 
     Parameters
     ----------
-    backend
-        Name of the QP backend in 2D and of the conic backend in 3D. None: proxqp and clarabel.
-    relaxation
-        Fraction of each change of the friction bounds that is taken, above 0 and at most 1.
+    backend : Name of the QP backend in 2D and of the conic backend in 3D. None: proxqp and
+        clarabel.
+    relaxation : Fraction of each change of the friction bounds that is taken, above 0 and at most
+        1.
     """
 
     backend: str | None = None
@@ -66,7 +67,9 @@ class Tresca:
 
 
 def _glued(problem: InterfaceProblem) -> np.ndarray:
-    """Reactions (k, dim) of contacts that all stick if plates press the bodies together, else zeros."""
+    """Reactions (k, dim) of contacts that all stick if plates press the bodies together, else
+    zeros.
+    """
     r, (k, dim) = np.zeros(problem.q.shape), problem.q.shape
     if len(problem.s) == 0:
         return r
@@ -93,10 +96,17 @@ class TrescaProblem:
         """r (k, dim) and the multipliers (p,) for the bounds g (k,)."""
         problem, c = self.problem, self.problem.q.ravel()
         if isinstance(self.solver, BoxQP):
-            low, high = np.stack([self.low, -g], axis=1), np.stack([np.full(len(g), np.inf), g], axis=1)
-            r, lam = self.solver.solve(c, -problem.s, low.ravel(), high.ravel(), start=start.ravel())
+            low, high = (
+                np.stack([self.low, -g], axis=1),
+                np.stack([np.full(len(g), np.inf), g], axis=1),
+            )
+            r, lam = self.solver.solve(
+                c, -problem.s, low.ravel(), high.ravel(), start=start.ravel()
+            )
         else:
             answer = self.solver.solve(g=g)
             r, lam = answer["r"], answer["approach"]
         project: Projection = lambda y: cylinder_derivative(y, g, self.low)  # noqa: E731
-        return crossover(problem.Q, c, problem.V, problem.s, project, r.reshape(problem.q.shape), lam)
+        return crossover(
+            problem.Q, c, problem.V, problem.s, project, r.reshape(problem.q.shape), lam
+        )

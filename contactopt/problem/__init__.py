@@ -1,9 +1,16 @@
-"""The heart: the interface problem of frictional contact, its solution and its certificate. Optimisation only.
+"""The heart: the interface problem of frictional contact, its solution and its certificate.
+
+Optimisation only.
 
 Nothing here, or below in what it imports, knows finite elements.
 """
 
-from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual, siconos_residual
+from contactopt.problem.certificate import (
+    balance_residual,
+    fit_multipliers,
+    natural_map_residual,
+    siconos_residual,
+)
 from contactopt.problem.chart import Chart
 from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem

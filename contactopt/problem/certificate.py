@@ -1,27 +1,32 @@
 """The certificate of every answer: how far reactions are from solving an interface problem.
 
-Two yardsticks of the problem and of the answer make the certificate dimensionless, a force F and a length L. With
-d = Q r, w = q + V lambda and u = d + w, |.| the length of one contact's block and F0 the largest |r_i|:
+Two yardsticks of the problem and of the answer make the certificate dimensionless, a force F and a
+length L. With d = Q r, w = q + V lambda and u = d + w, |.| the length of one contact's block and F0
+the largest |r_i|:
 
-    L = the largest of  min(1, |r_i| / (1e-6 F0)) |d_i|   (displacements that the forces make where they act),
-                        max(-w_n, 0)                      (overlaps that the forces must remove),
-                        min |w_n|                         (the narrowest gap),
-                        1e-6 min(1, |r_i| / (1e-6 F0)) |q_i|   (what rounding leaves of gaps that motions closed), and
-                        1e-6 c min(F0, S)                 (what it leaves of displacements that cancel, as those of a
-                                                           uniform pressure on a periodic half-space);
+    L = the largest of  min(1, |r_i| / (1e-6 F0)) |d_i|   (displacements that the forces make where
+                        they act), max(-w_n, 0)                      (overlaps that the forces must
+                        remove), min |w_n|                         (the narrowest gap), 1e-6 min(1,
+                        |r_i| / (1e-6 F0)) |q_i|   (what rounding leaves of gaps that motions
+                        closed), and 1e-6 c min(F0, S)                 (what it leaves of
+                        displacements that cancel, as those of a uniform pressure on a periodic
+                        half-space);
     F = min(F0, max(L / c, S)), at least 1e-5 max(L / c, S), with the mean compliance c = sum |r_i| c_i / sum |r_i| and
         the force on a plate S = max_j |s_j| / max_i |V_ij|; c_i is the mean of the diagonal of Q over block i.
 
-L does not grow with the gaps of distant contacts, which stay open. F does not grow with forces that move nothing (the
-null space of Q): a force counts only as far as it makes a displacement or holds a plate.
+L does not grow with the gaps of distant contacts, which stay open. F does not grow with forces that
+move nothing (the null space of Q): a force counts only as far as it makes a displacement or holds a
+plate.
 
-With the contact law's map P (for Coulomb friction the map of Alart and Curnier) the error of contact i is
+With the contact law's map P (for Coulomb friction the map of Alart and Curnier) the error of
+contact i is
 
     e_i = |r_i - P(r_i - rho_i u_i)| / F,       rho_i = (F / L) min(max(c / c_i, 1), 1e4),
 
-which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a larger rho_i, because
-there a small error of the displacement is a large error of the force. The certificate is the largest of all e_i, of
-(|r_t| - mu r_n) / F, and of the relative errors |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F) of the balance.
+which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a
+larger rho_i, because there a small error of the displacement is a large error of the force. The
+certificate is the largest of all e_i, of (|r_t| - mu r_n) / F, and of the relative errors |V_j' r +
+s_j| / max(|s_j|, max_i |V_ij| F) of the balance.
 
 What a certificate of at most tol promises for Coulomb friction, at every contact:
 
@@ -30,11 +35,13 @@ What a certificate of at most tol promises for Coulomb friction, at every contac
     complementarity      r_n <= tol F  or  u_n <= tol L
     friction bound       |r_t| <= mu r_n + tol F
     sticking             |u_t| <= tol L  where  |r_t| < mu r_n - (1 + mu) tol F
-    slip direction       friction across the direction of slip is at most  tol F (1 + mu r_n L / (F |u_t|))
+    slip direction       friction across the direction of slip is at most  tol F (1 + mu r_n L / (F
+                         |u_t|))
     balance              |V_j' r + s_j| <= tol max(|s_j|, max_i |V_ij| F)
 
-The certificate does not bound the distance to a solution: where Q is nearly singular, forces that differ much have
-displacements that differ little. It is the same in all units, and costs one product with Q.
+The certificate does not bound the distance to a solution: where Q is nearly singular, forces that
+differ much have displacements that differ little. It is the same in all units, and costs one
+product with Q.
 """
 
 from __future__ import annotations
@@ -50,7 +57,8 @@ from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
-ROUNDED = 1e-6  # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
+# share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
+ROUNDED = 1e-6
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
@@ -60,8 +68,10 @@ class Moved:
     """Q r, known from displacements that are carried along with the forces r.
 
     value     (k dim,) [length]
-    accuracy  error of these displacements in the energy norm, relative to them: how far the bodies are from equilibrium
-    displacements  (N,) these displacements, the unknowns X of contactopt.linear.saddle_point [length]
+    accuracy  error of these displacements in the energy norm, relative to them: how far the bodies
+              are from equilibrium
+    displacements  (N,) these displacements, the unknowns X of contactopt.linear.saddle_point
+                   [length]
     """
 
     value: np.ndarray
@@ -71,7 +81,9 @@ class Moved:
 
 @dataclass(frozen=True)
 class Yardsticks:
-    """What errors are compared with: a force F, a length L, and the steps rho (k,) of the natural map [force/length]."""
+    """What errors are compared with: a force F, a length L, and the steps rho (k,) of the natural
+    map [force/length].
+    """
 
     force: float
     length: float
@@ -85,13 +97,15 @@ def natural_map_residual(
     multipliers: np.ndarray | None = None,
     moved: Moved | None = None,
 ) -> float:
-    """How far reactions are from a solution, dimensionless: the certificate, as in the head of this module.
+    """How far reactions are from a solution, dimensionless: the certificate, as in the head of this
+    module.
 
     Parameters
     ----------
     problem : the interface problem
     reactions : (k, dim) forces, normal first [force]
-    multipliers : (p,) displacements of the plates [length]; None: those that fit best (`fit_multipliers`)
+    multipliers : (p,) displacements of the plates [length]; None: those that fit best
+        (`fit_multipliers`)
     moved : Q r where it is known already; then its accuracy counts as well
 
     Returns
@@ -99,8 +113,8 @@ def natural_map_residual(
     The largest relative error [-], 0 at a solution; inf if a number is not finite.
 
     Raises InputError on shapes that do not fit.
-    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to Newton like solution
-    methods, for the map; the yardsticks are those of the head of this module.
+    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to
+    Newton like solution methods, for the map; the yardsticks are those of the head of this module.
     """
     r, lam = _checked(problem, reactions, multipliers)
     if not (np.all(np.isfinite(r)) and np.all(np.isfinite(lam))):
@@ -123,22 +137,21 @@ def natural_map_residual(
     return worst if np.isfinite(worst) else np.inf
 
 
-def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray) -> Yardsticks:
-    """Find the force F, the length L and the steps rho of the certificate, as in the head of this module.
+def yardsticks(
+    problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray
+) -> Yardsticks:
+    """Find the force F, the length L and the steps rho of the certificate, as in the head of this
+    module.
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    r
-        (k, dim) forces [force].
-    d, w
-        (k, dim) displacements d = Q r and w = q + V lambda [length]; all finite.
+    problem : The interface problem.
+    r : (k, dim) forces [force].
+    d, w : (k, dim) displacements d = Q r and w = q + V lambda [length]; all finite.
 
     Returns
     -------
-    Yardsticks
-        What the errors are compared with.
+    What the errors are compared with.
     """
     size = np.linalg.norm(r, axis=1)
     largest = float(size.max())
@@ -171,11 +184,15 @@ def _plate_force(problem: InterfaceProblem) -> float:
     if len(problem.s) == 0:
         return 0.0
     reach = np.abs(problem.V).max(axis=0, initial=0.0)
-    return float(np.max(np.divide(np.abs(problem.s), reach, out=np.zeros(len(reach)), where=reach > 0)))
+    return float(
+        np.max(np.divide(np.abs(problem.s), reach, out=np.zeros(len(reach)), where=reach > 0))
+    )
 
 
 def _compliances(problem: InterfaceProblem) -> np.ndarray:
-    """(k,) mean of the positive diagonal entries of each block; 0 where there is none above rounding."""
+    """(k,) mean of the positive diagonal entries of each block; 0 where there is none above
+    rounding.
+    """
     entries = np.asarray(diagonal(problem.Q), dtype=float).reshape(problem.q.shape)
     entries = np.where(entries > 1e-13 * entries.max(initial=0.0), entries, 0.0)
     count = np.count_nonzero(entries, axis=1)
@@ -183,28 +200,30 @@ def _compliances(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
-    """The least displacement that is an error or may be one: of a contact that bears force or overlaps. 0 without any."""
+    """The least displacement that is an error or may be one: of a contact that bears force or
+    overlaps. 0 without any.
+    """
     size = np.linalg.norm(u, axis=1)
     counts = ((np.any(r != 0, axis=1)) | (u[:, 0] < 0)) & (size > 0)
     return float(size[counts].min()) if counts.any() else 0.0
 
 
-def balance_residual(problem: InterfaceProblem, reactions: np.ndarray, force: float | None = None) -> float:
-    """Compute the largest relative error of the balance V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F).
+def balance_residual(
+    problem: InterfaceProblem, reactions: np.ndarray, force: float | None = None
+) -> float:
+    """Compute the largest relative error of the balance V' r + s = 0: |V_j' r + s_j| / max(|s_j|,
+    max_i |V_ij| F).
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    reactions
-        (k, dim) contact forces, normal first [force].
-    force
-        The yardstick F [force]; by default the largest |r_i|.
+    problem : The interface problem.
+    reactions : (k, dim) contact forces, normal first [force].
+    force : The yardstick F [force]; by default the largest |r_i|.
 
     Returns
     -------
-    float
-        The error [-]. It is 0 without a balance, and infinite where a resultant that must vanish has no yardstick.
+    The error [-]. It is 0 without a balance, and infinite where a resultant that must vanish has no
+    yardstick.
     """
     if len(problem.s) == 0:
         return 0.0
@@ -214,14 +233,24 @@ def balance_residual(problem: InterfaceProblem, reactions: np.ndarray, force: fl
     error = np.abs(problem.V.T @ r.ravel() + problem.s)
     size = np.maximum(np.abs(problem.s), np.abs(problem.V).max(axis=0, initial=0.0) * force)
     return float(
-        np.max(np.where(error > 0, np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0), 0))
+        np.max(
+            np.where(
+                error > 0,
+                np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0),
+                0,
+            )
+        )
     )
 
 
-def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None) -> float:
-    """The measure that Siconos and the FCLib collection compare methods by; for comparison, not for a verdict.
+def siconos_residual(
+    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None
+) -> float:
+    """The measure that Siconos and the FCLib collection compare methods by; for comparison, not for
+    a verdict.
 
-    With K the product of the friction cones it is |r - proj_K(r - (u + mu |u_t| n))| / max(|q|, |r|, |u|), where
+    With K the product of the friction cones it is |r - proj_K(r - (u + mu |u_t| n))| / max(|q|,
+    |r|, |u|), where
     |.| is the norm of all components together. It depends on units, and forces that move nothing or one distant open
     contact make it as small as one likes. The balance of a plate is not in it.
 
@@ -229,14 +258,15 @@ def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multiplie
     ----------
     problem : the interface problem
     reactions : (k, dim) forces, normal first [force]
-    multipliers : (p,) displacements of the plates [length]; None: those that fit best (`fit_multipliers`)
+    multipliers : (p,) displacements of the plates [length]; None: those that fit best
+        (`fit_multipliers`)
 
     Returns
     -------
     The residual [-], 0 at a solution.
 
-    Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction: formulations and
-    numerical comparisons; De Saxce, Feng (1998) for the map.
+    Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction:
+    formulations and numerical comparisons; De Saxce, Feng (1998) for the map.
     """
     r, lam = _checked(problem, reactions, multipliers)
     u = problem.displacements(r, lam)
@@ -246,28 +276,28 @@ def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multiplie
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """Find the multipliers that fit reactions best, by least squares on the components whose displacement must vanish.
+    """Find the multipliers that fit reactions best, by least squares on the components whose
+    displacement must vanish.
 
     Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound.
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    reactions
-        (k, dim) contact forces, normal first [force].
+    problem : The interface problem.
+    reactions : (k, dim) contact forces, normal first [force].
 
     Returns
     -------
-    ndarray
-        (p,) multipliers lambda; zeros where no displacement must vanish.
+    (p,) multipliers lambda; zeros where no displacement must vanish.
     """
     if len(problem.s) == 0:
         return np.zeros(0)
     r_n, r_t = split(np.asarray(reactions, dtype=float))
     pressed = np.abs(r_n) > 1e-8 * np.abs(r_n).max(initial=0.0)
     stuck = pressed & (np.linalg.norm(r_t, axis=1) < (1 - 1e-6) * problem.law.bound(r_n))
-    rows = np.concatenate([pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1).ravel()
+    rows = np.concatenate(
+        [pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1
+    ).ravel()
     if not rows.any():
         return np.zeros(len(problem.s))
     u = (problem.Q @ np.ravel(reactions))[rows] + problem.q.ravel()[rows]
@@ -283,9 +313,13 @@ def _checked(
     try:
         r = np.asarray(reactions, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InputError(f"reactions must be an array of numbers; got {type(reactions).__name__}.") from error
+        raise InputError(
+            f"reactions must be an array of numbers; got {type(reactions).__name__}."
+        ) from error
     if r.shape != problem.q.shape:
-        raise InputError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}.")
+        raise InputError(
+            f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}."
+        )
     if multipliers is None:
         lam = fit_multipliers(problem, r) if np.all(np.isfinite(r)) else np.zeros(len(problem.s))
     else:

@@ -1,4 +1,6 @@
-"""The contact surface's own coordinates: what every reader of places on it uses, whatever way the bodies are turned."""
+"""The contact surface's own coordinates: what every reader of places on it uses, whatever way the
+bodies are turned.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +10,24 @@ import numpy as np
 
 from contactopt.errors import InputError
 
-ON_PLANE = 1e-9  # a contact nearer than this fraction of the largest place lies on the plane of symmetry
+# a contact nearer than this fraction of the largest place lies on the plane of symmetry
+ON_PLANE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
     """Places of the k contacts on their surface, in coordinates that turn with it.
 
-    In 2D the one coordinate is the arc length along the contact line. In 3D the two coordinates are those of a tangent
-    plane. The origin is the centre of the surface: where a symmetry plane or an axis cuts it, the cut; otherwise the
-    middle.
+    In 2D the one coordinate is the arc length along the contact line. In 3D the two coordinates are
+    those of a tangent plane. The origin is the centre of the surface: where a symmetry plane or an
+    axis cuts it, the cut; otherwise the middle.
 
     places    (dim - 1, k) coordinates [length]
-    mirrored  (dim - 1,) whether the surface goes on beyond x_i = 0 as its own mirror image (a symmetry plane or an axis)
+    mirrored  (dim - 1,) whether the surface goes on beyond x_i = 0 as its own mirror image (a
+              symmetry plane or an axis)
     period    length of a contact line that is closed [length]; None where it has ends, and in 3D
-    cells     (v, c) contacts at the corners of the lines, triangles or quadrilaterals that cover the surface; None where they
-              are not known
+    cells     (v, c) contacts at the corners of the lines, triangles or quadrilaterals that cover
+              the surface; None where they are not known
     Raises InputError on shapes that do not fit and on numbers that are not finite.
     """
 
@@ -36,7 +40,8 @@ class Chart:
         places = np.array(self.places, dtype=float)
         if places.ndim != 2 or len(places) != len(self.mirrored):
             raise InputError(
-                f"a chart needs one row of places per direction; got shape {places.shape} for {len(self.mirrored)}."
+                f"a chart needs one row of places per direction; got shape {places.shape} for"
+                f" {len(self.mirrored)}."
             )
         if not np.all(np.isfinite(places)):
             raise InputError("a chart holds a number that is not finite.")
@@ -45,24 +50,22 @@ class Chart:
 
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
-        """Lay a chart through bare points, of which nothing else is known, along the directions in which they extend
+        """Lay a chart through bare points, of which nothing else is known, along the directions in
+        which they extend
         most.
 
-        Coordinates that are given on the surface already, d = dim - 1, are taken as they are. Otherwise the origin is
-        the middle of the points, the axes are their principal directions, and the sign of each axis is chosen so that
-        its largest component in space is positive.
+        Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
+        Otherwise the origin is the middle of the points, the axes are their principal directions,
+        and the sign of each axis is chosen so that its largest component in space is positive.
 
         Parameters
         ----------
-        coordinates
-            (d, k) points [length].
-        dim
-            Number of components of a contact, 2 or 3.
+        coordinates : (d, k) points [length].
+        dim : Number of components of a contact, 2 or 3.
 
         Returns
         -------
-        Chart
-            The chart, open and without symmetry.
+        The chart, open and without symmetry.
         """
         count = dim - 1
         if len(coordinates) <= count:
@@ -84,8 +87,7 @@ class Chart:
 
         Returns
         -------
-        ndarray
-            (k,) numbers of the contacts.
+        (k,) numbers of the contacts.
         """
         return np.argsort(self.places[0], kind="stable")
 
@@ -94,16 +96,18 @@ class Chart:
 
         Parameters
         ----------
-        contact
-            The number of the contact.
+        contact : The number of the contact.
 
         Returns
         -------
-        ndarray
-            (dim - 1, k) [length].
+        (dim - 1, k) [length].
         """
         apart = self.places - self.places[:, [contact]]
-        return apart if self.period is None else (apart + self.period / 2) % self.period - self.period / 2
+        return (
+            apart
+            if self.period is None
+            else (apart + self.period / 2) % self.period - self.period / 2
+        )
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:
         """List the places of the whole surface, with those of all mirror images.
@@ -112,8 +116,7 @@ class Chart:
 
         Returns
         -------
-        tuple
-            Places (dim - 1, m) [length], and the contact (m,) of each.
+        Places (dim - 1, m) [length], and the contact (m,) of each.
         """
         x, contact = self.places, np.arange(self.places.shape[1])
         near = ON_PLANE * np.abs(x).max(initial=0.0)
@@ -124,12 +127,12 @@ class Chart:
         return x, contact
 
     def spacing(self) -> np.ndarray:
-        """Compute the distance between the two neighbours of every contact of a line, at an end to the only one.
+        """Compute the distance between the two neighbours of every contact of a line, at an end to
+        the only one.
 
         Returns
         -------
-        ndarray
-            (k,) distances [length].
+        (k,) distances [length].
         """
         order = self.order()
         steps, spacing = np.diff(self.places[0, order]), np.empty(len(order))
@@ -146,21 +149,18 @@ class Chart:
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
     """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
 
-    A force that is spread over the area of a node makes a displacement proportional to 1 / length of the contact line
-    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a
-    surface.
+    A force that is spread over the area of a node makes a displacement proportional to 1 / length
+    of the contact line there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area /
+    spacing on a line, sqrt(area) on a surface.
 
     Parameters
     ----------
-    chart
-        The places of the k contacts on their surface [length].
-    areas
-        (k,) nodal areas [length^2].
+    chart : The places of the k contacts on their surface [length].
+    areas : (k,) nodal areas [length^2].
 
     Returns
     -------
-    ndarray
-        (k,) positive weights [-]. The mean of w^2 is one.
+    (k,) positive weights [-]. The mean of w^2 is one.
     """
     if len(chart.places) == 2:
         square = np.sqrt(areas)
@@ -168,6 +168,7 @@ def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
         spacing = chart.spacing()
         square = areas / np.where(spacing > 0, spacing, 1.0)
     positive = square[square > 0]
-    # The node on an axis has no area; it gets a hundredth of the mean instead of an infinite diagonal.
+    # The node on an axis has no area; it gets a hundredth of the mean instead of an infinite
+    # diagonal.
     square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)
     return np.sqrt(square / np.mean(square))

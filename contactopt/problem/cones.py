@@ -1,4 +1,5 @@
-"""Projections of contact mechanics: half-line, interval or disc, Coulomb's cone; vectorised over the contacts.
+"""Projections of contact mechanics: half-line, interval or disc, Coulomb's cone; vectorised over
+the contacts.
 
 This is geometry alone. Which of them a contact obeys is the business of contactopt.problem.laws.
 """
@@ -13,13 +14,11 @@ def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    blocks
-        (k, dim) forces or displacements, normal component first.
+    blocks : (k, dim) forces or displacements, normal component first.
 
     Returns
     -------
-    tuple
-        The normal part (k,) and the tangential part (k, dim - 1). Both are views.
+    The normal part (k,) and the tangential part (k, dim - 1). Both are views.
     """
     return blocks[:, 0], blocks[:, 1:]
 
@@ -29,13 +28,11 @@ def unit(t: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    t
-        (k, d) vectors.
+    t : (k, d) vectors.
 
     Returns
     -------
-    ndarray
-        (k, d) vectors of length one; zero where t is zero.
+    (k, d) vectors of length one; zero where t is zero.
     """
     length = np.linalg.norm(t, axis=1)[:, None]
     return np.divide(t, length, out=np.zeros(t.shape), where=length > 0)
@@ -46,15 +43,12 @@ def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    t
-        (k, d) points.
-    radius
-        (k,) radii, at least 0.
+    t : (k, d) points.
+    radius : (k,) radii, at least 0.
 
     Returns
     -------
-    array (k, d)
-        The nearest points.
+    array (k, d) : The nearest points.
     """
     length = np.linalg.norm(t, axis=1)
     shrink = np.divide(radius, length, out=np.ones_like(length), where=length > radius)
@@ -66,15 +60,12 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    r
-        (k, dim) points, normal component first.
-    mu
-        (k,) friction coefficients, at least 0.
+    r : (k, dim) points, normal component first.
+    mu : (k,) friction coefficients, at least 0.
 
     Returns
     -------
-    array (k, dim)
-        The nearest points.
+    array (k, dim) : The nearest points.
     """
     n, t = split(r)
     length = np.linalg.norm(t, axis=1)
@@ -87,20 +78,19 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
     return out
 
 
-def half_line_derivative(y: np.ndarray, low: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def half_line_derivative(
+    y: np.ndarray, low: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Projection on the half-line [low, inf), and its generalised derivative.
 
     Parameters
     ----------
-    y
-        (k, 1) points.
-    low
-        One number or (k,); it may be -inf.
+    y : (k, 1) points.
+    low : One number or (k,); it may be -inf.
 
     Returns
     -------
-    arrays (k, 1) and (k, 1, 1)
-        The nearest points and the derivative, 0 or 1.
+    arrays (k, 1) and (k, 1, 1) : The nearest points and the derivative, 0 or 1.
     """
     bound = np.broadcast_to(low, len(y))[:, None]
     return np.maximum(y, bound), (y > bound).astype(float)[:, :, None]
@@ -113,20 +103,19 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
 
     Parameters
     ----------
-    y
-        (k, d) points.
-    radius
-        (k,) radii, at least 0.
+    y : (k, d) points.
+    radius : (k,) radii, at least 0.
 
     Returns
     -------
-    arrays (k, d) and (k, d, d)
-        The nearest points and the derivative.
+    arrays (k, d) and (k, d, d) : The nearest points and the derivative.
     """
     k, d = y.shape
     if d == 1:
         bound = np.broadcast_to(radius, (k,))[:, None]
-        return np.minimum(np.maximum(y, -bound), bound), (np.abs(y) <= bound).astype(float)[:, :, None]
+        return np.minimum(np.maximum(y, -bound), bound), (np.abs(y) <= bound).astype(float)[
+            :, :, None
+        ]
     length = np.linalg.norm(y, axis=1)
     outside = length > radius
     unit = np.divide(y, length[:, None], out=np.zeros_like(y), where=length[:, None] > 0)
@@ -143,17 +132,13 @@ def cylinder_derivative(
 
     Parameters
     ----------
-    y
-        (k, dim) points, normal component first.
-    radius
-        (k,) radii, at least 0.
-    low
-        One number or (k,); it may be -inf.
+    y : (k, dim) points, normal component first.
+    radius : (k,) radii, at least 0.
+    low : One number or (k,); it may be -inf.
 
     Returns
     -------
-    arrays (k, dim) and (k, dim, dim)
-        The nearest points and the derivative.
+    arrays (k, dim) and (k, dim, dim) : The nearest points and the derivative.
     """
     P, D = np.empty_like(y), np.zeros((*y.shape, y.shape[1]))
     P[:, :1], D[:, :1, :1] = half_line_derivative(y[:, :1], low)
@@ -164,23 +149,20 @@ def cylinder_derivative(
 def disc_of_height(
     height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of the tangential part alone, on discs whose radius is mu |height|, and its derivative.
+    """Projection of the tangential part alone, on discs whose radius is mu |height|, and its
+    derivative.
 
     Parameters
     ----------
-    height
-        (k,) normal components, which stay as they are.
-    t
-        (k, dim - 1) tangential components.
-    mu
-        (k,) friction coefficients.
-    slope
-        (k,) derivative of |height| by the height, so that the radii grow by mu slope.
+    height : (k,) normal components, which stay as they are.
+    t : (k, dim - 1) tangential components.
+    mu : (k,) friction coefficients.
+    slope : (k,) derivative of |height| by the height, so that the radii grow by mu slope.
 
     Returns
     -------
-    arrays (k, dim) and (k, dim, dim)
-        The heights beside the projected tangential components, and the derivative.
+    arrays (k, dim) and (k, dim, dim) : The heights beside the projected tangential components, and
+        the derivative.
     """
     k, dim = len(t), t.shape[1] + 1
     bound, grow = mu * np.abs(height), mu * slope
@@ -200,21 +182,18 @@ def disc_of_height(
 def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Projection on Coulomb's cones as in coulomb_cone(), and its generalised derivative.
 
-    The derivative is the identity inside the cone and zero in its polar. Between them the nearest point is h (1, mu
-    unit) with h = (y_n + mu |y_t|) / (1 + mu^2). The derivative projects on that ray and shrinks what is tangent to
-    the disc.
+    The derivative is the identity inside the cone and zero in its polar. Between them the nearest
+    point is h (1, mu unit) with h = (y_n + mu |y_t|) / (1 + mu^2). The derivative projects on that
+    ray and shrinks what is tangent to the disc.
 
     Parameters
     ----------
-    y
-        (k, dim) points, normal component first.
-    mu
-        (k,) friction coefficients, at least 0.
+    y : (k, dim) points, normal component first.
+    mu : (k,) friction coefficients, at least 0.
 
     Returns
     -------
-    arrays (k, dim) and (k, dim, dim)
-        The nearest points and the derivative.
+    arrays (k, dim) and (k, dim, dim) : The nearest points and the derivative.
     """
     k, dim = y.shape
     n, t = split(y)
@@ -224,7 +203,9 @@ def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, 
     D = np.zeros((k, dim, dim))
     D[~polar & ~surface] = np.eye(dim)
     m, size = mu[surface], length[surface]
-    unit = np.divide(t[surface], size[:, None], out=np.zeros((len(m), dim - 1)), where=size[:, None] > 0)
+    unit = np.divide(
+        t[surface], size[:, None], out=np.zeros((len(m), dim - 1)), where=size[:, None] > 0
+    )
     height = (n[surface] + m * size) / (1 + m**2)
     ray = np.concatenate([np.ones((len(m), 1)), m[:, None] * unit], axis=1)
     D[surface] = ray[:, :, None] * ray[:, None, :] / (1 + m**2)[:, None, None]

@@ -30,15 +30,12 @@ def contact_status(problem: InterfaceProblem, reactions: np.ndarray) -> ContactS
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    reactions
-        (k, dim) contact forces, normal first [force].
+    problem : The interface problem.
+    reactions : (k, dim) contact forces, normal first [force].
 
     Returns
     -------
-    ContactStatus
-        Three masks (k,), of which exactly one is True at each contact.
+    Three masks (k,), of which exactly one is True at each contact.
     """
     touching, stick = problem.law.pressed(reactions), problem.law.sticking(reactions)
     return ContactStatus(~touching, stick, touching & ~stick)

@@ -1,14 +1,16 @@
 """Problems without a solution: a ray that proves it.
 
-Every solution of Coulomb's problem has forces r in the friction cones K that balance the plates, and no penetration:
+Every solution of Coulomb's problem has forces r in the friction cones K that balance the plates,
+and no penetration:
     r in K,   V' r + s = 0,   (Q r + V lambda + q)_n >= 0.
-Let y (k,) >= 0 weigh the contacts, y_i = 0 at contacts without a part in the proof, e = (y, 0) its blocks, and z (p,)
-displace the plates, such that
+Let y (k,) >= 0 weigh the contacts, y_i = 0 at contacts without a part in the proof, e = (y, 0) its
+blocks, and z (p,) displace the plates, such that
     g = Q' e + V z is in the polar cone of K (g_n + mu |g_t| <= 0),   V' e = 0,   q' e + s' z < 0.
-Then 0 <= e' u + z' (V' r + s) = g' r + q' e + s' z < 0 for every such r and lambda, a contradiction: there is no solution.
-Such a ray exists, but for closure, exactly where the three conditions cannot be met. It is found by a linear program with
-a polygon inside each polar cone, made exact by a least-squares step, and checked in floating point on its own.
-Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
+Then 0 <= e' u + z' (V' r + s) = g' r + q' e + s' z < 0 for every such r and lambda, a
+contradiction: there is no solution. Such a ray exists, but for closure, exactly where the three
+conditions cannot be met. It is found by a linear program with a polygon inside each polar cone,
+made exact by a least-squares step, and checked in floating point on its own. Source: Farkas' lemma
+for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Infeasible:
-    """A proof that a problem has no solution: the ray (weights y (k,), motions z (p,)) of this module's head.
+    """A proof that a problem has no solution: the ray (weights y (k,), motions z (p,)) of this
+    module's head.
 
     sentence  what it means, for people
     margin    -(q' e + s' z) [work], positive
@@ -49,20 +52,18 @@ class Infeasible:
 def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasible | None:
     """Look for a proof that a problem has no solution.
 
-    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. A
-    positive definite Q without a plate needs no search: every such problem has a solution.
+    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not
+    looked at. A positive definite Q without a plate needs no search: every such problem has a
+    solution.
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    time_limit
-        How long the linear program may take [s].
+    problem : The interface problem.
+    time_limit : How long the linear program may take [s].
 
     Returns
     -------
-    Infeasible or None
-        The proof. None says nothing: the problem may have a solution or not.
+    The proof. None says nothing: the problem may have a solution or not.
     """
     if (
         not (problem.law.unilateral and problem.law.proportional)
@@ -71,7 +72,9 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     ):
         return None
     entries = problem.Q.nnz if sp.issparse(problem.Q) else problem.Q.size
-    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > MOST_ENTRIES or _definite(problem):
+    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > MOST_ENTRIES or _definite(
+        problem
+    ):
         return None
     scaled, scales = dimensionless(problem)
     Q = scaled.Q if sp.issparse(scaled.Q) else sp.csr_array(scaled.Q)
@@ -82,7 +85,9 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     for _ in range(POLISH):
         if _verified(scaled, Q, *ray):
             weights, motions = ray
-            margin = -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
+            margin = (
+                -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
+            )
             told = _sentence(scaled, weights, motions)
             return Infeasible(weights, motions * scales.multipliers / scales.length, margin, told)
         ray = _polished(scaled, Q, *ray)
@@ -103,12 +108,18 @@ def _definite(problem: InterfaceProblem) -> bool:
 
 def _without_ridge(problem: InterfaceProblem, Q: sp.csr_array) -> sp.csr_array:
     """Q without the unit compliance that the dimensionless form gives components that cannot move."""
-    held = np.abs(problem.Q.diagonal()) == 0 if sp.issparse(problem.Q) else ~np.any(problem.Q, axis=1)
+    held = (
+        np.abs(problem.Q.diagonal()) == 0 if sp.issparse(problem.Q) else ~np.any(problem.Q, axis=1)
+    )
     return sp.csr_array(Q - sp.diags_array(np.where(held, Q.diagonal(), 0.0)))
 
 
-def _verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray) -> bool:
-    """Whether (weights, motions) is a ray, with its conditions met to rounding and its margin far above it."""
+def _verified(
+    problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray
+) -> bool:
+    """Whether (weights, motions) is a ray, with its conditions met to rounding and its margin far
+    above it.
+    """
     k, d = problem.q.shape
     if np.any(weights < 0) or not (np.all(np.isfinite(weights)) and np.all(np.isfinite(motions))):
         return False
@@ -117,26 +128,36 @@ def _verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, m
     V, flat = problem.V, e.ravel()
     g = (Q.T @ flat + V @ motions).reshape(k, d)
     size = (abs(Q).T @ flat + np.abs(V) @ np.abs(motions)).reshape(k, d).max(axis=1)
-    polar = g[:, 0] + problem.mu * np.linalg.norm(g[:, 1:], axis=1) <= EXACT * (1 + problem.mu) * size
+    polar = (
+        g[:, 0] + problem.mu * np.linalg.norm(g[:, 1:], axis=1) <= EXACT * (1 + problem.mu) * size
+    )
     free = np.abs(V.T @ flat) <= EXACT * (np.abs(V).T @ flat)
     terms = float(np.abs(problem.q[:, 0]) @ weights + np.abs(problem.s) @ np.abs(motions))
     gain = -float(problem.q[:, 0] @ weights + problem.s @ motions)
     return bool(np.all(polar) and np.all(free) and gain > MARGIN * terms > 0)
 
 
-def _program(problem: InterfaceProblem, Q: sp.csr_array, time_limit: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """min q' e + s' z over rays with y, z in the unit box; None if it is not negative or there is no answer in time."""
+def _program(
+    problem: InterfaceProblem, Q: sp.csr_array, time_limit: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """min q' e + s' z over rays with y, z in the unit box; None if it is not negative or there is
+    no answer in time.
+    """
     from scipy.optimize import linprog
 
     k, d = problem.q.shape
     normal = np.arange(k) * d
-    G = sp.hstack([sp.csr_array(Q.T[:, normal]), sp.csr_array(problem.V)], format="csr")  # g from (y, z)
+    # g from (y, z)
+    G = sp.hstack([sp.csr_array(Q.T[:, normal]), sp.csr_array(problem.V)], format="csr")
     g_n = G[normal]
     if d == 2:
         ways, factor = np.array([[1.0], [-1.0]]), 1.0
     else:
         angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-        ways, factor = np.stack([np.cos(angle), np.sin(angle)], axis=1), 1 / np.cos(np.pi / DIRECTIONS)
+        ways, factor = (
+            np.stack([np.cos(angle), np.sin(angle)], axis=1),
+            1 / np.cos(np.pi / DIRECTIONS),
+        )
     rough = problem.mu > 0
     rows = [g_n[~rough]]
     for way in ways:
@@ -155,7 +176,11 @@ def _program(problem: InterfaceProblem, Q: sp.csr_array, time_limit: float) -> t
         np.zeros(p) if p else None,
         [(0, 1)] * k + [(-1, 1)] * p,
         method="highs",
-        options={"time_limit": time_limit, "primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+        options={
+            "time_limit": time_limit,
+            "primal_feasibility_tolerance": 1e-10,
+            "dual_feasibility_tolerance": 1e-10,
+        },
     )
     if answer.x is None or answer.fun is None or answer.fun > -1e-9:
         return None
@@ -181,7 +206,12 @@ def _polished(
     slopes = blocks[:, 0] + problem.mu[:, None] * np.einsum("kd,kdj->kj", unit, blocks[:, 1:])
     smooth = problem.mu == 0
     balance = np.hstack([problem.V[normal[used]].T, np.zeros((len(motions), len(motions)))])
-    rows = [blocks[apex & ~smooth].reshape(-1, len(x)), blocks[apex & smooth, 0], slopes[edge], balance]
+    rows = [
+        blocks[apex & ~smooth].reshape(-1, len(x)),
+        blocks[apex & smooth, 0],
+        slopes[edge],
+        balance,
+    ]
     active = np.vstack(rows)
     x = x - np.linalg.lstsq(active, active @ x, rcond=1e-11)[0] if len(active) else x
     new = np.zeros(k)
@@ -193,15 +223,23 @@ def _sentence(problem: InterfaceProblem, weights: np.ndarray, motions: np.ndarra
     largest = float(weights.max(initial=0.0))
     contacts: list[int] = np.flatnonzero(weights > 1e-6 * largest).tolist() if largest > 0 else []
     if len(contacts) == 0:
-        what = problem.motions[int(np.argmax(np.abs(problem.s * motions)))] if problem.motions else "the plate"
-        return f"no forces of the contacts can balance the load on {what}, so there is no solution; change the load."
+        what = (
+            problem.motions[int(np.argmax(np.abs(problem.s * motions)))]
+            if problem.motions
+            else "the plate"
+        )
+        return (
+            f"no forces of the contacts can balance the load on {what}, so there is no solution;"
+            " change the load."
+        )
     listed = ", ".join(map(str, contacts[:8])) + (", ..." if len(contacts) > 8 else "")
     if np.any(problem.s):
         return (
-            f"the load presses contacts {listed} together further than any forces of the contacts can hold apart, so there "
-            "is no solution; check the load, the gaps and the supports."
+            f"the load presses contacts {listed} together further than any forces of the contacts"
+            " can hold apart, so there is no solution; check the load, the gaps and the supports."
         )
     return (
-        f"the bodies overlap at contacts {listed} in a way that no forces of the contacts can separate, so there is no "
-        "solution; check the prescribed displacements, the gaps and the supports."
+        f"the bodies overlap at contacts {listed} in a way that no forces of the contacts can"
+        " separate, so there is no solution; check the prescribed displacements, the gaps and the"
+        " supports."
     )

@@ -1,7 +1,7 @@
 """The pairs of surfaces of an interface problem, and one pair taken alone.
 
-Places on a contact surface mean something within one pair only. Whoever reads them (figures, half-widths, preconditioners)
-does so pair by pair.
+Places on a contact surface mean something within one pair only. Whoever reads them (figures,
+half-widths, preconditioners) does so pair by pair.
 """
 
 from __future__ import annotations
@@ -43,13 +43,11 @@ class Pair:
 
         Parameters
         ----------
-        dim
-            Number of components of a contact.
+        dim : Number of components of a contact.
 
         Returns
         -------
-        ndarray
-            (k_i dim,) numbers of the rows.
+        (k_i dim,) numbers of the rows.
         """
         return np.arange(self.start * dim, self.stop * dim)
 
@@ -59,15 +57,12 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    pair
-        One of its pairs, with k_i contacts.
+    problem : The interface problem.
+    pair : One of its pairs, with k_i contacts.
 
     Returns
     -------
-    InterfaceProblem
-        The problem of the k_i contacts. Where there is one pair only, it is the problem itself.
+    The problem of the k_i contacts. Where there is one pair only, it is the problem itself.
     """
     if len(problem.pairs) == 1:
         return problem
@@ -85,30 +80,31 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
     )
 
 
-def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[InterfaceProblem, Solution]:
-    """Take one pair of surfaces alone, with the forces of all other pairs as they are in the solution.
+def alone(
+    problem: InterfaceProblem, solution: Solution, pair: Pair
+) -> tuple[InterfaceProblem, Solution]:
+    """Take one pair of surfaces alone, with the forces of all other pairs as they are in the
+    solution.
 
-    The displacements of the pair are the same functions of its own forces, and the loads are those that the solution's
-    forces on the pair balance. A solution of the whole problem therefore gives one of this problem. Where there is one
-    pair only, both are returned as they are.
+    The displacements of the pair are the same functions of its own forces, and the loads are those
+    that the solution's forces on the pair balance. A solution of the whole problem therefore gives
+    one of this problem. Where there is one pair only, both are returned as they are.
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    solution
-        A solution of it.
-    pair
-        One of its pairs, with k_i contacts.
+    problem : The interface problem.
+    solution : A solution of it.
+    pair : One of its pairs, with k_i contacts.
 
     Returns
     -------
-    tuple
-        The problem of the k_i contacts, and the solution with their reactions (k_i, dim).
+    The problem of the k_i contacts, and the solution with their reactions (k_i, dim).
     """
     if len(problem.pairs) == 1:
         return problem, solution
     part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
-    apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(r, lam)
+    apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(
+        r, lam
+    )
     own = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
     return own, replace(solution, reactions=r, displacements=None)

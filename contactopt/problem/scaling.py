@@ -19,55 +19,55 @@ class Scales:
     length: float
     multipliers: np.ndarray
 
-    def to_physical(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def to_physical(
+        self, reactions: np.ndarray, multipliers: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Take dimensionless reactions and multipliers to the units of the problem.
 
         Parameters
         ----------
-        reactions, multipliers
-            (k, dim) and (p,) of the dimensionless problem.
+        reactions, multipliers : (k, dim) and (p,) of the dimensionless problem.
 
         Returns
         -------
-        tuple
-            Both in the units of the problem.
+        Both in the units of the problem.
         """
         return reactions * self.force, multipliers * self.multipliers
 
-    def to_dimensionless(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def to_dimensionless(
+        self, reactions: np.ndarray, multipliers: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Take reactions and multipliers to the units of the dimensionless problem.
 
         Parameters
         ----------
-        reactions, multipliers
-            (k, dim) [force] and (p,) in the units of the problem.
+        reactions, multipliers : (k, dim) [force] and (p,) in the units of the problem.
 
         Returns
         -------
-        tuple
-            Both without units.
+        Both without units.
         """
         return reactions / self.force, multipliers / self.multipliers
 
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
-    """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the columns of V have length
+    """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
+    columns of V have length
     one.
 
-    The force scale is the mean force that the balance asks of a node or, without a balance, the force that removes the
-    root-mean-square overlap at one node. Gaps, however wide, do not count. Every change of units of the input gives the
-    same numbers here. A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit
-    compliance there makes that force zero instead of undetermined.
+    The force scale is the mean force that the balance asks of a node or, without a balance, the
+    force that removes the root-mean-square overlap at one node. Gaps, however wide, do not count.
+    Every change of units of the input gives the same numbers here. A component that cannot move (on
+    a symmetry plane, say) carries no force that matters: a unit compliance there makes that force
+    zero instead of undetermined.
 
     Parameters
     ----------
-    problem
-        The interface problem in its own units.
+    problem : The interface problem in its own units.
 
     Returns
     -------
-    tuple
-        The dimensionless problem, and the Scales that take its reactions and multipliers back.
+    The dimensionless problem, and the Scales that take its reactions and multipliers back.
     """
     d, V = diagonal(problem.Q), without_rounding(problem.V)
     columns = np.linalg.norm(V, axis=0)
@@ -110,13 +110,11 @@ def without_rounding(V: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    V
-        (n, p) motions.
+    V : (n, p) motions.
 
     Returns
     -------
-    ndarray
-        (n, p) motions, with zeros in place of rounding.
+    (n, p) motions, with zeros in place of rounding.
     """
     size = np.abs(V)
     return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)
@@ -127,13 +125,11 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
 
     Parameters
     ----------
-    problem
-        The interface problem.
+    problem : The interface problem.
 
     Returns
     -------
-    ndarray
-        (k dim,) mask, True where a component cannot move.
+    (k dim,) mask, True where a component cannot move.
     """
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
@@ -145,7 +141,9 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _closing(problem: InterfaceProblem) -> float:
-    """Root mean square of the overlaps of the contacts that overlap at r = 0; without any, of the least |q_i| > 0."""
+    """Root mean square of the overlaps of the contacts that overlap at r = 0; without any, of the
+    least |q_i| > 0.
+    """
     normal = problem.q[:, 0]
     overlap = np.where(problem.law.lowest < 0, np.abs(normal), -normal)
     overlap = overlap[overlap > 0]

@@ -16,8 +16,14 @@ class Status(Enum):
     """How a solve ended: a word for tables and a sentence for people."""
 
     SOLVED = "solved", "the natural-map residual is at most the tolerance"
-    SETTLED = "settled", "the method ended by its own criterion, but the certificate is above the tolerance"
-    ITERATION_LIMIT = "iteration_limit", "the iterations ran out with the certificate above the tolerance"
+    SETTLED = (
+        "settled",
+        "the method ended by its own criterion, but the certificate is above the tolerance",
+    )
+    ITERATION_LIMIT = (
+        "iteration_limit",
+        "the iterations ran out with the certificate above the tolerance",
+    )
     TIME_LIMIT = "time_limit", "the time ran out with the certificate above the tolerance"
     CYCLING = "cycling", "the iteration came back to an earlier state, so it does not converge"
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
@@ -40,13 +46,16 @@ class Solution:
     reactions    (k, dim) nodal forces on the upper body, normal first [force]
     multipliers  (p,) displacements lambda of the plates [length]
     residual     the certificate: natural_map_residual(problem, reactions, multipliers)
-    history      one mapping per outer iteration: residual, change (of the tangential force), seconds and, where Q is an
-                 operator, products, the method's products with Q so far
-    seconds      phase -> seconds of wall time. "solve": of the method; "certificate": of judging its iterates. Who adds a
-                 phase of their own names it: recovery, the coarse meshes before this one, the phases of a reduction
-    notes        sentences about what the solve did otherwise than expected: a fallback, a stage that failed
+    history      one mapping per outer iteration: residual, change (of the tangential force),
+                 seconds and, where Q is an operator, products, the method's products with Q so far
+    seconds      phase -> seconds of wall time. "solve": of the method; "certificate": of judging
+                 its iterates. Who adds a phase of their own names it: recovery, the coarse meshes
+                 before this one, the phases of a reduction
+    notes        sentences about what the solve did otherwise than expected: a fallback, a stage
+                 that failed
     proof        status `infeasible`: the ray that proves that there is no solution
-    displacements  of the bodies that are solved by iteration, from methods that work on them (the unknowns X of
+    displacements  of the bodies that are solved by iteration, from methods that work on them (the
+                   unknowns X of
                  contactopt.linear.saddle_point) [length]; None from all others
     """
 
@@ -65,7 +74,9 @@ class Solution:
 
     @property
     def products(self) -> int:
-        """Products with Q that the method took, of which the certificate has its own; 0 where Q is an array."""
+        """Products with Q that the method took, of which the certificate has its own; 0 where Q is
+        an array.
+        """
         return int(self.history[-1].get("products", 0)) if self.history else 0
 
     @property
@@ -75,7 +86,14 @@ class Solution:
     def __repr__(self) -> str:
         contacts = count(len(self.reactions), "contact")
         steps = count(self.iterations, "iteration")
-        return line("Solution", self.status.label, f"residual {self.residual:.1e}", steps, self.method, contacts)
+        return line(
+            "Solution",
+            self.status.label,
+            f"residual {self.residual:.1e}",
+            steps,
+            self.method,
+            contacts,
+        )
 
     def _repr_html_(self) -> str:
         rows = {

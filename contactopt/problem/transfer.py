@@ -17,11 +17,13 @@ THIN = 1e-6  # a surface narrower than this fraction of its length is a line
 
 
 def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProblem) -> Solution:
-    """A start for `target`: the tractions of a solution of `source`, interpolated linearly to its contacts.
+    """A start for `target`: the tractions of a solution of `source`, interpolated linearly to its
+    contacts.
 
-    Places are compared in space, so that the answer does not depend on how the bodies are turned or where a chart has its
-    origin: along the polygon of the source's contacts in 2D, in the plane in which they extend most in 3D. Outside of the
-    source's contacts the nearest one counts. The multipliers are taken over.
+    Places are compared in space, so that the answer does not depend on how the bodies are turned or
+    where a chart has its origin: along the polygon of the source's contacts in 2D, in the plane in
+    which they extend most in 3D. Outside of the source's contacts the nearest one counts. The
+    multipliers are taken over.
 
     Parameters
     ----------
@@ -35,11 +37,15 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
 
     Raises
     ------
-    InputError : if the problems differ in dimension, in the number of coordinates or in that of plates
+    InputError : if the problems differ in dimension, in the number of coordinates or in that of
+        plates
     """
     same = (source.dim, len(source.s), len(source.coordinates))
     if same != (target.dim, len(target.s), len(target.coordinates)):
-        raise InputError("a start can be transferred between problems of the same dimension and number of plates only.")
+        raise InputError(
+            "a start can be transferred between problems of the same dimension and number of plates"
+            " only."
+        )
     if len(source.pairs) > 1:
         return _by_pair(source, solution, target)
     traction = solution.reactions / source.areas[:, None]
@@ -60,7 +66,9 @@ def _by_pair(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     """Pairs of surfaces of the same name start from each other."""
     names = [[pair.name for pair in problem.pairs] for problem in (source, target)]
     if names[0] != names[1]:
-        raise InputError("a start can be transferred between problems with the same pairs of surfaces only.")
+        raise InputError(
+            "a start can be transferred between problems with the same pairs of surfaces only."
+        )
     reactions = []
     for old, new in zip(source.pairs, target.pairs):
         own = replace(solution, reactions=solution.reactions[old.contacts])
@@ -69,13 +77,17 @@ def _by_pair(source: InterfaceProblem, solution: Solution, target: InterfaceProb
 
 
 def _plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The two orthonormal directions (d, 2) in which points (d, k) extend most, and their centre (d, 1)."""
+    """The two orthonormal directions (d, 2) in which points (d, k) extend most, and their centre
+    (d, 1).
+    """
     centre = (points.max(axis=1) + points.min(axis=1))[:, None] / 2
     axes = np.linalg.svd(points - centre, full_matrices=False)[0][:, :2]
     return np.pad(axes, ((0, 0), (0, 2 - axes.shape[1]))), centre
 
 
-def _along_a_line(chart: Chart, points: np.ndarray, new: np.ndarray, traction: np.ndarray) -> np.ndarray:
+def _along_a_line(
+    chart: Chart, points: np.ndarray, new: np.ndarray, traction: np.ndarray
+) -> np.ndarray:
     """Values at `new` (d, m) of the polygon through points (d, k) in the order of their chart."""
     order = chart.order()
     order = np.append(order, order[:1]) if chart.closed else order
@@ -99,7 +111,9 @@ def _along_a_line(chart: Chart, points: np.ndarray, new: np.ndarray, traction: n
 
 
 def _over_a_surface(x: np.ndarray, new: np.ndarray, traction: np.ndarray) -> np.ndarray:
-    """Values at `new` (m, 2), linear on the triangles between the points x (k, 2); the nearest value outside of them."""
+    """Values at `new` (m, 2), linear on the triangles between the points x (k, 2); the nearest
+    value outside of them.
+    """
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
     values = LinearNDInterpolator(x, traction)(new)

@@ -1,11 +1,12 @@
 """Loads that no contact forces can balance, told before anything is solved.
 
-Every solution has forces r in the friction cones K with V' r + s = 0. A motion z (p,) of the free bodies that every contact
-lets pass, V z in the dual cone of K, g_n >= mu |g_t| at each contact, has z' V' r >= 0 for all such r. Where it moves the
-loads forward, s' z > 0, this contradicts z' V' r = -s' z: there is no solution, and the bodies fly apart, slide off or
-topple along z. Where forces in the cones are found that balance the loads there is no such motion: nonnegative least squares
-looks for them, or, among many bodies, a sparse linear program. Otherwise the search for the motion is a linear program with a polygon
-inside each cone; what it finds is checked on its own.
+Every solution has forces r in the friction cones K with V' r + s = 0. A motion z (p,) of the free
+bodies that every contact lets pass, V z in the dual cone of K, g_n >= mu |g_t| at each contact, has
+z' V' r >= 0 for all such r. Where it moves the loads forward, s' z > 0, this contradicts z' V' r =
+-s' z: there is no solution, and the bodies fly apart, slide off or topple along z. Where forces in
+the cones are found that balance the loads there is no such motion: nonnegative least squares looks
+for them, or, among many bodies, a sparse linear program. Otherwise the search for the motion is a
+linear program with a polygon inside each cone; what it finds is checked on its own.
 
 Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
@@ -20,21 +21,25 @@ import scipy.sparse as sp
 from contactopt.problem.interface_problem import InterfaceProblem
 
 DIRECTIONS = 16  # of the polygon inside each cone, in 3D
-SURE = 1e-6  # work of the largest load over a motion's displacements from which on the motion counts
+# work of the largest load over a motion's displacements from which on the motion counts
+SURE = 1e-6
 SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the motion at a contact
 BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
 SECONDS = 5.0  # for a linear program
-FEW = 30  # multipliers up to which nonnegative least squares, of cubic cost, is faster than a sparse linear program
+# multipliers up to which nonnegative least squares, of cubic cost, is faster than a sparse linear
+# program
+FEW = 30
 
 
 @dataclass(frozen=True, eq=False)
 class Escape:
-    """A motion z (p,) that moves the loads forward and that no contact resists: the least one, of few bodies.
+    """A motion z (p,) that moves the loads forward and that no contact resists: the least one, of
+    few bodies.
 
-    strongest  number of the multiplier that moves furthest, of the body on which the loads do most work; where it turns
-               without sliding, that of the rotation
+    strongest  number of the multiplier that moves furthest, of the body on which the loads do most
+               work; where it turns without sliding, that of the rotation
     opens      whether no contact slides in it
     """
 
@@ -46,18 +51,16 @@ class Escape:
 def escape(problem: InterfaceProblem) -> Escape | None:
     """Look for a motion along which the loads drive the bodies away from all contacts.
 
-    Looked at are laws under which contacts can only push. Under laws whose friction is no cone, only motions count that
-    do not slide where there is friction.
+    Looked at are laws under which contacts can only push. Under laws whose friction is no cone,
+    only motions count that do not slide where there is friction.
 
     Parameters
     ----------
-    problem
-        The interface problem, with free bodies or plates (V, s).
+    problem : The interface problem, with free bodies or plates (V, s).
 
     Returns
     -------
-    Escape or None
-        The motion; None if none is found.
+    The motion; None if none is found.
     """
     if not problem.law.unilateral or not np.any(problem.s):
         return None
@@ -70,7 +73,10 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     g = (problem.V @ motion).reshape(problem.q.shape)
     opens = bool(np.abs(g[:, 1:]).max(initial=0.0) <= FLAT * np.abs(g).max(initial=0.0))
     owners = [name.partition(":")[0] for name in problem.motions] or ["" for _ in s]
-    work = {owner: sum(s[i] * motion[i] for i, own in enumerate(owners) if own == owner) for owner in owners}
+    work = {
+        owner: sum(s[i] * motion[i] for i, own in enumerate(owners) if own == owner)
+        for owner in owners
+    }
     body = max(work, key=lambda owner: work[owner])
     size = np.abs(motion) * np.array([owner == body for owner in owners])
     turns = size * np.array(["rotation" in name for name in problem.motions] or np.zeros(len(s)))
@@ -92,14 +98,20 @@ def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
     V, (k, d) = sp.csr_array(problem.V), problem.q.shape
     normal = V[np.arange(k) * d]
     slopes = [sum(c * V[np.arange(k) * d + 1 + i] for i, c in enumerate(way)) for way in _ways(d)]
-    edges = [normal + sp.diags_array(problem.mu) @ slope for slope in slopes] if np.any(problem.mu) else [normal]
+    edges = (
+        [normal + sp.diags_array(problem.mu) @ slope for slope in slopes]
+        if np.any(problem.mu)
+        else [normal]
+    )
     A = sp.csc_array(sp.vstack(edges).T)
     sizes = np.sqrt(np.asarray((A * A).sum(axis=1)).ravel())
     if np.any(sizes == 0):
         return False
     A, b = sp.diags_array(1 / sizes) @ A, -s / sizes
     forces = _nonnegative(A, b)
-    return forces is not None and bool(np.linalg.norm(A @ forces - b) <= BALANCED * np.linalg.norm(b))
+    return forces is not None and bool(
+        np.linalg.norm(A @ forces - b) <= BALANCED * np.linalg.norm(b)
+    )
 
 
 def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
@@ -117,7 +129,9 @@ def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
 
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
-    """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if there are none."""
+    """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if
+    there are none.
+    """
     from scipy.optimize import linprog
 
     k, d = problem.q.shape
@@ -142,7 +156,11 @@ def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.nda
         method="highs",
         options={"time_limit": SECONDS},
     )
-    return None if answer.x is None or answer.status != 0 else np.asarray(answer.x[: len(s)] - answer.x[len(s) :])
+    return (
+        None
+        if answer.x is None or answer.status != 0
+        else np.asarray(answer.x[: len(s)] - answer.x[len(s) :])
+    )
 
 
 def _cones(problem: InterfaceProblem) -> np.ndarray:
@@ -155,9 +173,13 @@ def _passes(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> boo
     g = (problem.V @ motion).reshape(problem.q.shape)
     size = np.abs(problem.V) @ np.abs(motion)
     slide = np.linalg.norm(g[:, 1:], axis=1)
-    needed = np.where(_cones(problem), problem.mu * slide, np.where(slide > SLACK * size.max(), np.inf, 0.0))
+    needed = np.where(
+        _cones(problem), problem.mu * slide, np.where(slide > SLACK * size.max(), np.inf, 0.0)
+    )
     work = s * motion
-    return bool(np.all(g[:, 0] - needed >= -SLACK * size.max()) and work.sum() > SURE * np.abs(work).sum())
+    return bool(
+        np.all(g[:, 0] - needed >= -SLACK * size.max()) and work.sum() > SURE * np.abs(work).sum()
+    )
 
 
 def sentence(problem: InterfaceProblem, found: Escape) -> str:
@@ -165,24 +187,29 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
 
     Parameters
     ----------
-    problem
-        The interface problem, whose `motions` name the columns of V.
-    found
-        The motion that `escape` found in it.
+    problem : The interface problem, whose `motions` name the columns of V.
+    found : The motion that `escape` found in it.
 
     Returns
     -------
-    str
-        What happens to which body, and what to change.
+    What happens to which body, and what to change.
     """
-    label = problem.motions[found.strongest] if problem.motions else f"column {found.strongest} of V"
+    label = (
+        problem.motions[found.strongest] if problem.motions else f"column {found.strongest} of V"
+    )
     body, _, motion = label.rpartition(": ")
     body = body or "a body"
     if motion.startswith("rotation"):
-        return f"the load is more than the contacts can hold: {body} tips over ({motion}); change the load or add a support."
+        return (
+            f"the load is more than the contacts can hold: {body} tips over ({motion}); change the"
+            " load or add a support."
+        )
     if found.opens:
-        return f"the load pulls the bodies apart: no contact holds {body} ({motion}); press them together or add a support."
+        return (
+            f"the load pulls the bodies apart: no contact holds {body} ({motion}); press them"
+            " together or add a support."
+        )
     return (
-        f"the load is more than the contacts can hold: {body} slides off ({motion}); press the bodies together, or add "
-        "friction or a support."
+        f"the load is more than the contacts can hold: {body} slides off ({motion}); press the"
+        " bodies together, or add friction or a support."
     )

@@ -1,1 +1,3 @@
-"""What is read off a solved scene: edges, peaks, resultants, stresses at places, fields on the surfaces."""
+"""What is read off a solved scene: edges, peaks, resultants, stresses at places, fields on the
+surfaces.
+"""

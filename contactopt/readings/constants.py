@@ -1,18 +1,23 @@
 """The chosen numbers of this room, all of them, and the commands that show what they are worth.
 
-`python -m experiments.questions.accuracy` measures readings and error estimates against exact solutions.
-`python -m experiments.questions.cost_ratio` measures what the start from a coarse mesh saves.
+`python -m experiments.questions.accuracy` measures readings and error estimates against exact
+solutions. `python -m experiments.questions.cost_ratio` measures what the start from a coarse mesh
+saves.
 """
 
 # Reading edges and peaks (contactopt.readings.edges, contactopt.readings.quantities).
-SMOOTH = 3, 6  # rings of nodes left out and fitted where contact ends by itself: the outermost carry most of the error
+# rings of nodes left out and fitted where contact ends by itself: the outermost carry most of the
+# error
+SMOOTH = 3, 6
 NEAR = 1, 2  # the same where the values are straight only next to the edge
 INNER = 0.3  # share of the half-width from which on the squared pressure on a line is fitted
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
-FITTED = {2: 5, 3: 13}  # nodes to which the square of the pressure is fitted around a peak, by dimension
+# nodes to which the square of the pressure is fitted around a peak, by dimension
+FITTED = {2: 5, 3: 13}
 NEIGHBOURS = {2: 5, 3: 9}  # nodes among which a local maximum is the largest, itself among them
 MOST_PEAKS = 8  # local maxima that are looked at
-WITHIN = 0.05  # least uncertainty of an edge that is read between nodes, over the distance of the nodes
+# least uncertainty of an edge that is read between nodes, over the distance of the nodes
+WITHIN = 0.05
 
 # The zone loop (contactopt.solving.zone).
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
@@ -20,12 +25,15 @@ LOOPS = 10  # rounds after which the last zone is taken
 
 # Starts from coarser meshes (contactopt.solving.solve_scene).
 COARSEST = 4  # elements across the contact half-width of the first of nested meshes
-FACTOR = {2: 8, 3: 4}  # coarser than the next of them, where bodies are factorised: a 64th of the unknowns
+# coarser than the next of them, where bodies are factorised: a 64th of the unknowns
+FACTOR = {2: 8, 3: 4}
 ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 
 # Thin bodies on a ground (contactopt.bodies.thin).
-BALANCED = 1e-8  # share of the forces on a body that its ground may still bear, and misfit of its surfaces
-BEARABLE = 1e-4  # what it may bear where it gets no less; beyond, the body bends by itself and needs no ground
+# share of the forces on a body that its ground may still bear, and misfit of its surfaces
+BALANCED = 1e-8
+# what it may bear where it gets no less; beyond, the body bends by itself and needs no ground
+BEARABLE = 1e-4
 ROUNDS = 12  # of problems with the ground
 SLOW = 0.7  # share of the last round's imbalance from which on a round is of no use
 
@@ -33,8 +41,10 @@ SLOW = 0.7  # share of the last round's imbalance from which on a round is of no
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are
 MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: half a minute
-MOST_MEMORY = 2e9  # bytes that the search may take, by those that its meshes have taken for each unknown so far
-SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
+# bytes that the search may take, by those that its meshes have taken for each unknown so far
+MOST_MEMORY = 2e9
+# least order that is believed: slower ones were noise wherever the exact value was known
+SLOWEST = 0.75
 STUCK = 0.1  # order below which a sequence does not converge
 
 # Patches of a zone (contactopt.readings.patches).

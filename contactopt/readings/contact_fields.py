@@ -1,4 +1,6 @@
-"""Contact quantities as fields: on the surface of every pair, and on the nodes of the bodies, as VTU files."""
+"""Contact quantities as fields: on the surface of every pair, and on the nodes of the bodies, as
+VTU files.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +18,22 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.resultants import space_forces
 from contactopt.scenes.scene import Part
 
-NEAR = 1.5  # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
+# distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
+NEAR = 1.5
 CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
 
 
 @dataclass(frozen=True, eq=False)
 class ContactFields:
-    """The k contacts of a pair of surfaces after the solve. Forces are those on the upper body, vectors those of space.
+    """The k contacts of a pair of surfaces after the solve.
+
+    Forces are those on the upper body, vectors those of space.
 
     points, cells  (dim, k) positions; (v, c) contacts at the corners of the cells
-    pressure       (k,) normal force over area [stress];  traction  (dim, k) whole contact force over area [stress]
-    gap            (k,) what remains of the gap [length];  slip  (dim, k) tangential motion of upper against lower [length]
+    pressure       (k,) normal force over area [stress];  traction  (dim, k) whole contact force
+                   over area [stress]
+    gap            (k,) what remains of the gap [length];  slip  (dim, k) tangential motion of upper
+                   against lower [length]
     status         (k,) 0 open, 1 stick, 2 slip
     """
 
@@ -59,7 +66,9 @@ class ContactFields:
         import meshio
 
         points = np.pad(self.points, ((0, 3 - len(self.points)), (0, 0))).T
-        meshio.Mesh(points, [(CELLS[len(self.cells)], self.cells.T)], self.data).write(path, file_format="vtu")
+        meshio.Mesh(points, [(CELLS[len(self.cells)], self.cells.T)], self.data).write(
+            path, file_format="vtu"
+        )
 
 
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
@@ -67,19 +76,17 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    tuple
-        The ContactFields of each pair, in the order of the pairs.
+    The ContactFields of each pair, in the order of the pairs.
     """
     problem, r = reduction.problem, solution.reactions
     u, areas = problem.displacements(r, solution.multipliers), problem.areas
-    share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)  # the contact on an axis has no area
+    # the contact on an axis has no area
+    share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
     forces, status = space_forces(reduction, solution), contact_status(problem, r)
     slip = np.einsum("kad,ka->dk", reduction.frames[:, 1:], u[:, 1:])
     state = np.where(status.open, 0, np.where(status.stick, 1, 2))
@@ -104,35 +111,39 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
 def on_nodes(
     reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
 ) -> tuple[Fields, ...]:
-    """Put the contact quantities on the nodes of the bodies' contact surfaces. They are zero at all other nodes.
+    """Put the contact quantities on the nodes of the bodies' contact surfaces.
 
-    A node takes the values of the contact nearest to it. Traction and slip of a lower body have the opposite sign.
+    They are zero at all other nodes.
+
+    A node takes the values of the contact nearest to it. Traction and slip of a lower body have the
+    opposite sign.
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    fields
-        The displacements and stresses of the bodies.
-    surfaces
-        The contact quantities of each pair, as `contact_fields` gives them.
+    reduction : The reduction of the scene.
+    fields : The displacements and stresses of the bodies.
+    surfaces : The contact quantities of each pair, as `contact_fields` gives them.
 
     Returns
     -------
-    tuple
-        The fields of the bodies with the contact quantities added.
+    The fields of the bodies with the contact quantities added.
     """
     default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
     made = []
     for body in fields:
-        data = {name: np.zeros((body.mesh.p.shape[1], *value.shape[1:])) for name, value in surfaces[0].data.items()}
+        data = {
+            name: np.zeros((body.mesh.p.shape[1], *value.shape[1:]))
+            for name, value in surfaces[0].data.items()
+        }
         for pair, surface, coupling in zip(reduction.scene.pairs, surfaces, reduction.couplings):
             for side, (name, boundary) in enumerate(zip(pair.bodies, pair.surfaces)):
                 if name != body.name:
                     continue
                 nodes = facet_nodes(body.mesh, body.mesh.boundaries[boundary or default[name]])
                 tree = KDTree(surface.points.T)
-                spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(len(surface.gap), -1)
+                spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(
+                    len(surface.gap), -1
+                )
                 apart, nearest = tree.query(body.mesh.p[:, nodes].T)
                 near = apart <= np.abs(coupling.gap[nearest]) + NEAR * spacing[nearest, -1]
                 for key, value in surface.data.items():

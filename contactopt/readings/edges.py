@@ -1,15 +1,19 @@
-"""Where contact and stick end, below the element size: the one definition of the half-width of a zone.
+"""Where contact and stick end, below the element size: the one definition of the half-width of a
+zone.
 
-Next to an edge at distance c from the centre of a zone, the pressure (where contact ends by itself) and the slack of the
-friction bound (where stick ends) are proportional to sqrt(c^2 - x^2), and the slip beyond c to (x - c)^(3/2). A straight
-line through the squares of values inside, against x^2, or through slip^(2/3), against x, meets zero at the edge.
+Next to an edge at distance c from the centre of a zone, the pressure (where contact ends by itself)
+and the slack of the friction bound (where stick ends) are proportional to sqrt(c^2 - x^2), and the
+slip beyond c to (x - c)^(3/2). A straight line through the squares of values inside, against x^2,
+or through slip^(2/3), against x, meets zero at the edge.
 
-The nodes at the edge of a discrete zone jump as the exact edge moves, and so do the values at the nodes next to it. The
-values an element further hardly do. The lines therefore leave the nearest nodes out: what they read then falls smoothly
-with the element size, as the estimate of an error needs it.
+The nodes at the edge of a discrete zone jump as the exact edge moves, and so do the values at the
+nodes next to it. The values an element further hardly do. The lines therefore leave the nearest
+nodes out: what they read then falls smoothly with the element size, as the estimate of an error
+needs it.
 
-A zone is read at each of its ends (contactopt.readings.patches), wherever it lies on the contact surface. Its half-width is
-that of the strip, or the radius of the disc, with the same area. Where an end cannot be read, the nodal areas are counted.
+A zone is read at each of its ends (contactopt.readings.patches), wherever it lies on the contact
+surface. Its half-width is that of the strip, or the radius of the disc, with the same area. Where
+an end cannot be read, the nodal areas are counted.
 """
 
 from __future__ import annotations
@@ -30,20 +34,18 @@ Reader = Callable[[End], Read | None]
 
 
 def equivalent_half_width(scene: Scene, area: float) -> float:
-    """Compute the half-width of a contact zone from its area, as if the zone were a strip, a disc or a square.
+    """Compute the half-width of a contact zone from its area, as if the zone were a strip, a disc
+    or a square.
 
     Parameters
     ----------
-    scene
-        Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
-        square in space.
-    area
-        The contact area [length^2].
+    scene : Its kind says which: a strip of the scene's thickness in plane strain, a disc in an
+        axisymmetric scene, and a square in space.
+    area : The contact area [length^2].
 
     Returns
     -------
-    float
-        Half the width of the strip or of the square, or the radius of the disc [length].
+    Half the width of the strip or of the square, or the radius of the disc [length].
     """
     if scene.kind == "plane-strain":
         return area / (2 * scene.thickness)
@@ -55,16 +57,13 @@ def contact_area(scene: Scene, half_width: float) -> float:
 
     Parameters
     ----------
-    scene
-        Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
-        square in space.
-    half_width
-        Half the width of the strip or of the square, or the radius of the disc [length].
+    scene : Its kind says which: a strip of the scene's thickness in plane strain, a disc in an
+        axisymmetric scene, and a square in space.
+    half_width : Half the width of the strip or of the square, or the radius of the disc [length].
 
     Returns
     -------
-    float
-        The area [length^2].
+    The area [length^2].
     """
     if scene.kind == "plane-strain":
         return 2 * half_width * scene.thickness
@@ -87,30 +86,29 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     return contact_zone(scene, problem, reactions)[0]
 
 
-def contact_zone(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> tuple[float, float]:
+def contact_zone(
+    scene: Scene, problem: InterfaceProblem, reactions: np.ndarray
+) -> tuple[float, float]:
     """Read the half-width of the contact zone, with its uncertainty.
 
-    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
-    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three
-    nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge.
-    Where every node touches, or where contact ends at a corner, the edge is that of the contact surface. A reading on a
-    surface counts only where the disc of that radius has the area of the zone to within an element. The uncertainty is
-    half of what the parabola and the straight line differ, WITHIN of an element at least. Where areas of nodes are
-    counted, it is that of the nodes at the edge.
+    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against
+    x^2 over the outer part of the half-width, without the last two nodes, weighted by the nodal
+    areas. On a surface, where fewer than three nodes are left, and where the other end is a corner,
+    a straight line goes through the rings of nodes next to the edge. Where every node touches, or
+    where contact ends at a corner, the edge is that of the contact surface. A reading on a surface
+    counts only where the disc of that radius has the area of the zone to within an element. The
+    uncertainty is half of what the parabola and the straight line differ, WITHIN of an element at
+    least. Where areas of nodes are counted, it is that of the nodes at the edge.
 
     Parameters
     ----------
-    scene
-        The scene, which says what symmetry left out.
-    problem
-        Its interface problem, or that of one pair of surfaces.
-    reactions
-        (k, dim) contact forces, normal first [force].
+    scene : The scene, which says what symmetry left out.
+    problem : Its interface problem, or that of one pair of surfaces.
+    reactions : (k, dim) contact forces, normal first [force].
 
     Returns
     -------
-    tuple
-        The half-width and its uncertainty [length]; both are 0 without contact.
+    The half-width and its uncertainty [length]; both are 0 without contact.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
@@ -132,27 +130,23 @@ def stick_edge(
 ) -> tuple[float, float]:
     """Read the half-width of the stick zone, with its uncertainty.
 
-    The slack of the friction bound counts towards the direction in which the nearest slipping node slips. Where contact
-    ends at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The
-    values nearest to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside
-    read; it is as uncertain as they differ. A reading that is off by more than an element is left out, which happens to
-    the slip of small steps of a load path.
+    The slack of the friction bound counts towards the direction in which the nearest slipping node
+    slips. Where contact ends at a corner, the pressure is singular: the slack relative to its bound
+    stays smooth but not straight. The values nearest to the edge then serve best, and the edge is
+    the mean of what the slack inside and the slip outside read; it is as uncertain as they differ.
+    A reading that is off by more than an element is left out, which happens to the slip of small
+    steps of a load path.
 
     Parameters
     ----------
-    scene
-        The scene, which says what symmetry left out.
-    problem
-        Its interface problem, or that of one pair of surfaces.
-    reactions
-        (k, dim) contact forces, normal first [force].
-    slip
-        (k, dim - 1) tangential motion of the step that led to the reactions [length], if known.
+    scene : The scene, which says what symmetry left out.
+    problem : Its interface problem, or that of one pair of surfaces.
+    reactions : (k, dim) contact forces, normal first [force].
+    slip : (k, dim - 1) tangential motion of the step that led to the reactions [length], if known.
 
     Returns
     -------
-    tuple
-        The half-width and its uncertainty [length].
+    The half-width and its uncertainty [length].
     """
     status = contact_status(problem, reactions)
     contact, uncertain = contact_zone(scene, problem, reactions)
@@ -189,14 +183,16 @@ def stick_edge(
 def _half_width(
     scene: Scene, problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray, read: Reader
 ) -> tuple[float, float]:
-    """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its uncertainty [length].
+    """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its
+    uncertainty [length].
 
     weights  (k,) by which the centre of a zone on a surface is averaged
     """
     area = float(problem.areas[inside].sum())
     counted = equivalent_half_width(scene, area)
     nodes = inside.sum() * 2.0 ** sum(problem.chart.mirrored)
-    share = (1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5) if nodes else 0.0  # of the nodes at the edge
+    # of the nodes at the edge
+    share = (1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5) if nodes else 0.0
     coarse = counted, float(counted * min(1.0, share)) if nodes else 0.0
     if inside.all() or not inside.any():
         return coarse
@@ -216,9 +212,11 @@ def _half_width(
 
 
 def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
-    """Where a parabola through p^2 over x^2, over the outer part of the half-width, is first zero; None if it is not.
+    """Where a parabola through p^2 over x^2, over the outer part of the half-width, is first zero;
+    None if it is not.
 
-    With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three nodes leave a line.
+    With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three
+    nodes leave a line.
     """
     x, inside = end.distance, end.inside
     last = x[inside].max()

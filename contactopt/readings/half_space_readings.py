@@ -1,4 +1,6 @@
-"""What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps, stresses below the surface."""
+"""What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps,
+stresses below the surface.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +27,12 @@ class SurfaceContact:
 
     area, fraction      real contact area [length^2] and its share of all cells [-]
     stick_area, slip_area   areas of the sticking and of the slipping contacts [length^2]
-    mean_pressure       normal force over the area of all cells [stress];  contact_pressure  over the real contact area [stress]
+    mean_pressure       normal force over the area of all cells [stress];  contact_pressure  over
+                        the real contact area [stress]
     largest_pressure    [stress];  mean_gap  of the open contacts [length]
-    slip_work           work of friction if the slip happened in this state's step, sum -r_t'u_t [force length]: the dissipated
-                        energy of a state reached in one step from contact without slip. Of a load path it is
+    slip_work           work of friction if the slip happened in this state's step, sum -r_t'u_t
+                        [force length]: the dissipated energy of a state reached in one step from
+                        contact without slip. Of a load path it is
                         PathResult.history["friction_work"]
     """
 
@@ -48,19 +52,20 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
 
     Parameters
     ----------
-    problem
-        The interface problem of the state.
-    solution
-        Its solution.
+    problem : The interface problem of the state.
+    solution : Its solution.
 
     Returns
     -------
-    SurfaceContact
-        Areas, pressures, the mean gap and the work of friction.
+    Areas, pressures, the mean gap and the work of friction.
     """
     r, areas = solution.reactions, problem.areas
     status, u = contact_status(problem, r), problem.displacements(r, solution.multipliers)
-    area, whole, force = float(areas[status.touching].sum()), float(areas.sum()), float(r[:, 0].sum())
+    area, whole, force = (
+        float(areas[status.touching].sum()),
+        float(areas.sum()),
+        float(r[:, 0].sum()),
+    )
     return SurfaceContact(
         area=area,
         fraction=area / whole,
@@ -69,7 +74,11 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
         mean_pressure=force / whole,
         contact_pressure=force / area if area > 0 else 0.0,
         largest_pressure=float((r[:, 0] / areas).max(initial=0.0)),
-        mean_gap=float(np.average(u[status.open, 0], weights=areas[status.open])) if status.open.any() else 0.0,
+        mean_gap=(
+            float(np.average(u[status.open, 0], weights=areas[status.open]))
+            if status.open.any()
+            else 0.0
+        ),
         slip_work=-float(np.sum(r[status.slip, 1:] * u[status.slip, 1:])),
     )
 
@@ -81,17 +90,14 @@ def pressure_distribution(
 
     Parameters
     ----------
-    problem
-        The interface problem of the state.
-    solution
-        Its solution.
-    bins
-        Number of intervals of pressure.
+    problem : The interface problem of the state.
+    solution : Its solution.
+    bins : Number of intervals of pressure.
 
     Returns
     -------
-    tuple
-        The edges (bins + 1,) of the intervals [stress], and the density (bins,) [1 / stress], whose integral is one.
+    The edges (bins + 1,) of the intervals [stress], and the density (bins,) [1 / stress], whose
+    integral is one.
     """
     touching = contact_status(problem, solution.reactions).touching
     pressure = solution.reactions[touching, 0] / problem.areas[touching]
@@ -102,20 +108,17 @@ def pressure_distribution(
 def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
     """Compute the stiffness of the present contacts against relative motions of the bodies.
 
-    It is made of the forces that a small motion adds if no contact opens, closes or changes between stick and slip.
-    Contacts that slip take part with their normal components.
+    It is made of the forces that a small motion adds if no contact opens, closes or changes between
+    stick and slip. Contacts that slip take part with their normal components.
 
     Parameters
     ----------
-    problem
-        The interface problem of the state.
-    solution
-        Its solution.
+    problem : The interface problem of the state.
+    solution : Its solution.
 
     Returns
     -------
-    ndarray
-        (dim, dim), along n, t1[, t2] [force / length]; zeros without contact.
+    (dim, dim), along n, t1[, t2] [force / length]; zeros without contact.
     """
     status = contact_status(problem, solution.reactions)
     takes_part = np.repeat(status.stick[:, None], problem.dim, axis=1)
@@ -127,7 +130,11 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
     motions = np.tile(np.eye(problem.dim), (problem.contacts, 1))[rows]
     system = LinearOperator(Q.shape, matvec=lambda x: Q @ x, dtype=float)
     forces = np.stack(
-        [cg(system, m, rtol=STIFFNESS, maxiter=10 * len(rows))[0] if m.any() else m for m in motions.T], axis=1
+        [
+            cg(system, m, rtol=STIFFNESS, maxiter=10 * len(rows))[0] if m.any() else m
+            for m in motions.T
+        ],
+        axis=1,
     )
     return np.asarray(motions.T @ forces)
 
@@ -137,22 +144,18 @@ def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarr
 
     Parameters
     ----------
-    reduction
-        The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
-    solution
-        A solution of its problem.
+    reduction : The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
+    solution : A solution of its problem.
 
     Returns
     -------
-    dict
-        'pressure' (n0[, n1]) and 'traction' (n0[, n1], dim - 1) on the upper body [stress]; 'gap' (n0[, n1]) and 'slip'
-        (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1 where sticking and 2 where
-        slipping.
+    'pressure' (n0[, n1]) and 'traction' (n0[, n1], dim - 1) on the upper body [stress]; 'gap' (n0[,
+    n1]) and 'slip' (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1
+    where sticking and 2 where slipping.
 
     Raises
     ------
-    InputError
-        If the scene has no half-space.
+    InputError : If the scene has no half-space.
     """
     problem, grid = reduction.problem, _half_space(reduction, None).grid
     r, areas = solution.reactions, problem.areas
@@ -173,24 +176,18 @@ def subsurface_stress(
 
     Parameters
     ----------
-    reduction
-        The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
-    solution
-        A solution of its problem.
-    depths
-        (j,) depths below the surface [length], at least half a spacing of the points.
-    body
-        Name of the half-space; by default the lower one, if both bodies are half-spaces.
+    reduction : The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
+    solution : A solution of its problem.
+    depths : (j,) depths below the surface [length], at least half a spacing of the points.
+    body : Name of the half-space; by default the lower one, if both bodies are half-spaces.
 
     Returns
     -------
-    tuple
-        Stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress].
+    Stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress].
 
     Raises
     ------
-    InputError
-        If there is no such half-space, if it is periodic, or if a depth is too small.
+    InputError : If there is no such half-space, if it is periodic, or if a depth is too small.
     """
     found = _half_space(reduction, body)
     place = reduction.bodies.index(found)
@@ -200,9 +197,16 @@ def subsurface_stress(
 
 
 def _half_space(reduction: Reduction, name: str | None) -> HalfSpaceBody:
-    candidates = [body for body in reduction.bodies if isinstance(body, HalfSpaceBody) and name in (None, body.name)]
+    candidates = [
+        body
+        for body in reduction.bodies
+        if isinstance(body, HalfSpaceBody) and name in (None, body.name)
+    ]
     if not candidates:
         named = "" if name is None else f" named '{name}'"
-        raise InputError(f"scene '{reduction.scene.name}' has no half-space{named}; this is asked of half-spaces only.")
+        raise InputError(
+            f"scene '{reduction.scene.name}' has no half-space{named}; this is asked of half-spaces"
+            " only."
+        )
     found: HalfSpaceBody = candidates[-1]  # type: ignore[assignment]
     return found

@@ -1,7 +1,8 @@
 """The connected patches of a zone on a contact surface, and the ends at which each of them is read.
 
-On a contact line a patch is a run of neighbouring contacts, in general position: off the origin of the chart, reaching the
-end of the surface, across the seam of a closed curve. On a surface it is a disc about its centre, seen as one end.
+On a contact line a patch is a run of neighbouring contacts, in general position: off the origin of
+the chart, reaching the end of the surface, across the seam of a closed curve. On a surface it is a
+disc about its centre, seen as one end.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.chart import ON_PLANE
 from contactopt.readings.constants import RING, ROUNDNESS
 
-SAME = 1e-5  # distances that differ by less than this fraction of an element belong to one ring of nodes
+# distances that differ by less than this fraction of an element belong to one ring of nodes
+SAME = 1e-5
 CENTRE = 1e-12  # relative change of a patch's edges at which its centre is known
 ROUNDS = 20  # of that iteration, which gains about two digits in each
 
-Window = tuple[int, int]  # rings of nodes next to the edge: how many are left out, how many are fitted
+# rings of nodes next to the edge: how many are left out, how many are fitted
+Window = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -41,10 +44,12 @@ class Ends:
 class End:
     """The contacts on one side of a patch's centre, up to the next patch.
 
-    contact   (m,) their indices;  distance  (m,) from the centre [length];  inside  (m,) whether they belong to the patch
+    contact   (m,) their indices;  distance  (m,) from the centre [length];  inside  (m,) whether
+              they belong to the patch
     step      distance of neighbouring nodes next to the edge [length]
-    free      whether the patch ends before the surface does on the other side too: only then are values symmetric about
-              its centre, in the mean, and their squares straight far from the edge
+    free      whether the patch ends before the surface does on the other side too: only then are
+              values symmetric about its centre, in the mean, and their squares straight far from
+              the edge
     """
 
     contact: np.ndarray
@@ -54,27 +59,41 @@ class End:
     free: bool = True
 
     def inner(self, value: np.ndarray, window: Window) -> float | None:
-        """Where value^2, a line in distance^2 through values (k,) inside, is zero [length]; None if it does not fall."""
+        """Where value^2, a line in distance^2 through values (k,) inside, is zero [length]; None if
+        it does not fall.
+        """
         depth = self.distance[self.inside].max() - self.distance
         square = self._zero(self.distance**2, value[self.contact] ** 2, self.inside, depth, window)
         return None if square is None or square <= 0 else float(np.sqrt(square))
 
     def outer(self, value: np.ndarray, window: Window) -> float | None:
-        """Where value^(2/3), a line in the distance through values (k,) outside, is zero [length]; None as in inner()."""
+        """Where value^(2/3), a line in the distance through values (k,) outside, is zero [length];
+        None as in inner().
+        """
         depth = self.distance - self.distance[~self.inside].min()
-        return self._zero(self.distance, value[self.contact] ** (2 / 3), ~self.inside, depth, window)
+        return self._zero(
+            self.distance, value[self.contact] ** (2 / 3), ~self.inside, depth, window
+        )
 
     def clip(self, edge: float) -> float:
         """The edge, brought to less than an element from where the nodes say that it is."""
         last = self.distance[self.inside].max()
         return float(np.clip(edge, last - self.step / 2, last + 1.5 * self.step))
 
-    def _zero(self, x: np.ndarray, y: np.ndarray, side: np.ndarray, depth: np.ndarray, window: Window) -> float | None:
-        """Where the line through y(x) at the rings in the window on one side is zero; None if it does not fall outwards."""
+    def _zero(
+        self, x: np.ndarray, y: np.ndarray, side: np.ndarray, depth: np.ndarray, window: Window
+    ) -> float | None:
+        """Where the line through y(x) at the rings in the window on one side is zero; None if it
+        does not fall outwards.
+        """
         rings = _rings(depth[side], self.step, sum(window))
         skip = max(0, min(window[0], len(rings) - window[1]))
         fitted = rings[skip : skip + window[1]]
-        near = side & (depth >= fitted[0] - SAME * self.step) & (depth <= fitted[-1] + SAME * self.step)
+        near = (
+            side
+            & (depth >= fitted[0] - SAME * self.step)
+            & (depth <= fitted[-1] + SAME * self.step)
+        )
         if np.ptp(depth[near]) <= SAME * self.step:
             return None
         slope, height = np.polyfit(x[near], y[near], 1)
@@ -86,8 +105,10 @@ class End:
 class Patch:
     """A patch with the contacts around it, up to the next patch.
 
-    contact   (m,) indices;  place  (m,) along the line, or from the centre of a disc [length];  inside  (m,) mask
-    centred   whether the centre is at the place 0 for sure: on a plane of symmetry, or that of a disc
+    contact   (m,) indices;  place  (m,) along the line, or from the centre of a disc [length];
+              inside  (m,) mask
+    centred   whether the centre is at the place 0 for sure: on a plane of symmetry, or that of a
+              disc
     copies    how many images of the patch make the whole zone
     points    (dim - 1, k) places of all contacts, from which the distance of neighbours is taken
     """
@@ -102,14 +123,18 @@ class Patch:
     def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
         """The ends of the patch from the readings of each; None where one of them cannot be read.
 
-        An end at the end of the contact surface is the place of the last node. The centre, from which readings count
-        distances, is half-way between the ends, hence the iteration.
+        An end at the end of the contact surface is the place of the last node. The centre, from
+        which readings count distances, is half-way between the ends, hence the iteration.
         """
         x = self.place[self.inside]
         first, last, uncertainty = float(x.min()), float(x.max()), 0.0
         if self.centred:
             found = self._read(1.0, 0.0, read)
-            return None if found is None else Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
+            return (
+                None
+                if found is None
+                else Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
+            )
         for _ in range(ROUNDS):
             centre = (first + last) / 2
             left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
@@ -152,17 +177,14 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
 
     Parameters
     ----------
-    problem
-        The interface problem of one pair of surfaces.
-    inside
-        (k,) mask of the contacts of the zone: some of them, but not all.
-    weights
-        (k,) weights of the contacts in the mean place that is the centre of a disc.
+    problem : The interface problem of one pair of surfaces.
+    inside : (k,) mask of the contacts of the zone: some of them, but not all.
+    weights : (k,) weights of the contacts in the mean place that is the centre of a disc.
 
     Returns
     -------
-    list
-        The patches in their order along a contact line. On a surface one patch, or none where the zone is no disc.
+    The patches in their order along a contact line. On a surface one patch, or none where the zone
+    is no disc.
     """
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)
@@ -170,7 +192,8 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
     chart = problem.chart
     order = chart.order()
     place, within = chart.places[0, order], inside[order]
-    if chart.period is not None:  # the line begins where the longest way leads through contacts outside
+    # the line begins where the longest way leads through contacts outside
+    if chart.period is not None:
         begin = _longest_run(~within)
         place = np.concatenate([place[begin:], place[:begin] + chart.period])
         order, within = np.roll(order, -begin), np.roll(within, -begin)
@@ -178,7 +201,9 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
     stops = np.flatnonzero(within & ~np.append(within[1:], False))
     found = []
     for i in range(len(starts)):
-        part = slice(stops[i - 1] + 1 if i else 0, starts[i + 1] if i + 1 < len(starts) else len(order))
+        part = slice(
+            stops[i - 1] + 1 if i else 0, starts[i + 1] if i + 1 < len(starts) else len(order)
+        )
         reaches = chart.mirrored[0] and _reaches_origin(place, place[starts[i] : stops[i] + 1])
         copies = 1 if reaches or not chart.mirrored[0] else 2
         found.append(Patch(order[part], place[part], within[part], reaches, copies, chart.places))
@@ -186,14 +211,18 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
 
 
 def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
-    """Whether a patch and its mirror image are one: no contact lies between them, but for one on the plane itself.
+    """Whether a patch and its mirror image are one: no contact lies between them, but for one on
+    the plane itself.
 
-    The contact on an axis of revolution has no area, hence perhaps no force, and does not divide them.
+    The contact on an axis of revolution has no area, hence perhaps no force, and does not divide
+    them.
     """
     plane = ON_PLANE * np.abs(place).max()
     off_plane = np.abs(place[np.abs(place) > plane])
     touches = np.abs(place).min() <= plane
-    return bool(touches and (np.abs(patch).min() <= plane or np.abs(patch).min() <= off_plane.min()))
+    return bool(
+        touches and (np.abs(patch).min() <= plane or np.abs(patch).min() <= off_plane.min())
+    )
 
 
 def _longest_run(mask: np.ndarray) -> int:
@@ -215,7 +244,9 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
     distance = np.linalg.norm(x - centre[:, None], axis=0)
     disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, x)
     step = disc.step(disc.contact, distance, float(distance[inside].max()))
-    return disc if abs(distance[~inside].min() - distance[inside].max()) <= ROUNDNESS * step else None
+    return (
+        disc if abs(distance[~inside].min() - distance[inside].max()) <= ROUNDNESS * step else None
+    )
 
 
 def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:

@@ -1,15 +1,19 @@
-"""Quantities at a place that the user names: stress at a point or its maximum in a region, pressure at a point.
+"""Quantities at a place that the user names: stress at a point or its maximum in a region, pressure
+at a point.
 
     von_mises:BODY                     largest von Mises stress in a body [stress]
     von_mises:BODY:BOUNDARY            on one of its named boundaries, such as a fillet
     von_mises:BODY@X,Y,radius=R        in the circle or ball around a point
     von_mises:BODY@X,Y                 at a point, in space @X,Y,Z
-    stress_xx:BODY@X,Y                 a component there: stress_xx, stress_xy, ..., named as in the VTU files
-    pressure@X,Y, pressure:PAIR@X,Y    contact pressure at the place of a surface that is nearest to the point
+    stress_xx:BODY@X,Y                 a component there: stress_xx, stress_xy, ..., named as in the
+                                       VTU files
+    pressure@X,Y, pressure:PAIR@X,Y    contact pressure at the place of a surface that is nearest to
+                                       the point
 
-Stresses are recovered ones (contactopt.bodies.stress_recovery). The largest one is that at the vertices of the mesh and, in a circle,
-at its centre. Near a place a pressure is the linear function that fits the nearest contacts best, with their areas as weights.
-Each reading comes with its slopes, the derivatives by what it was read from.
+Stresses are recovered ones (contactopt.bodies.stress_recovery). The largest one is that at the
+vertices of the mesh and, in a circle, at its centre. Near a place a pressure is the linear function
+that fits the nearest contacts best, with their areas as weights. Each reading comes with its
+slopes, the derivatives by what it was read from.
 """
 
 from __future__ import annotations
@@ -32,19 +36,27 @@ if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
 
 LARGEST = "von_mises"
-OUTSIDE = 0.05  # how far beyond the coordinates of a body a point may lie before anything is solved, over its size
+# how far beyond the coordinates of a body a point may lie before anything is solved, over its size
+OUTSIDE = 0.05
 DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
 RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
 AROUND = {2: 9, 3: 17}  # vertices among which a local maximum is the largest, itself among them
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
-PLACED = ("von_mises:BODY", "von_mises:BODY:BOUNDARY", "von_mises:BODY@X,Y", "stress_xx:BODY@X,Y", "pressure@X,Y")
+PLACED = (
+    "von_mises:BODY",
+    "von_mises:BODY:BOUNDARY",
+    "von_mises:BODY@X,Y",
+    "stress_xx:BODY@X,Y",
+    "pressure@X,Y",
+)
 
 
 @dataclass(frozen=True)
 class Place:
     """A quantity at a place, by the parts of its name.
 
-    kind  'von_mises', 'pressure', or the component of a stress;   owner  body, or pair of surfaces;   region  where
+    kind  'von_mises', 'pressure', or the component of a stress;   owner  body, or pair of surfaces;
+          region  where
     """
 
     name: str
@@ -59,9 +71,10 @@ class StressReading:
 
     value  [stress]
     uncertainty  by how much it may be off because stresses scatter from element to element [stress]
-    peaks  where it is, with the elements where the stress may be larger than the value or is as uncertain as it; of a
-           largest stress then its other local maxima
-    body   its number among the parts of the scene;   map, slopes (m, 4 or 6)  of the recovered stress, for its derivative
+    peaks  where it is, with the elements where the stress may be larger than the value or is as
+           uncertain as it; of a largest stress then its other local maxima
+    body   its number among the parts of the scene;   map, slopes (m, 4 or 6)  of the recovered
+           stress, for its derivative
     """
 
     value: float
@@ -77,20 +90,16 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
     Parameters
     ----------
-    name
-        The name of any quantity.
-    scene
-        The scene that is asked.
+    name : The name of any quantity.
+    scene : The scene that is asked.
 
     Returns
     -------
-    Place or None
-        None for the names of other quantities.
+    None for the names of other quantities.
 
     Raises
     ------
-    InputError
-        For a body, pair, component or point that the scene does not have.
+    InputError : For a body, pair, component or point that the scene does not have.
     """
     from contactopt.bodies.fields import STRESSES
 
@@ -101,7 +110,9 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     if kind == "pressure" and at:
         pairs = [pair.name for pair in scene.pairs]
         if rest not in pairs and (rest or len(pairs) > 1):
-            raise InputError(f"quantity {name!r}: name one pair of surfaces, as in 'pressure:{pairs[0]}@...'.")
+            raise InputError(
+                f"quantity {name!r}: name one pair of surfaces, as in 'pressure:{pairs[0]}@...'."
+            )
         return Place(name, kind, rest, _around(name, where, scene))
     stress = kind.removeprefix("stress_")
     if kind != LARGEST and stress == kind:
@@ -110,14 +121,20 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     known = [part.name for part in scene.parts if isinstance(part, Part)]
     if body not in known:
         raise InputError(
-            f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from {', '.join(known)}."
+            f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from"
+            f" {', '.join(known)}."
         )
     if kind != LARGEST and stress not in STRESSES[scene.kind]:
         names = ", ".join(f"stress_{own}" for own in STRESSES[scene.kind])
-        raise InputError(f"quantity {name!r}: there is no stress {kind!r}; choose from {names} and von_mises.")
+        raise InputError(
+            f"quantity {name!r}: there is no stress {kind!r}; choose from {names} and von_mises."
+        )
     region = _around(name, where, scene) if at else Region(boundary)
     if kind != LARGEST and (not at or region.radius is not None):
-        raise InputError(f"quantity {name!r}: a component of the stress is read at a point, as in '{kind}:{body}@1,2'.")
+        raise InputError(
+            f"quantity {name!r}: a component of the stress is read at a point, as in"
+            f" '{kind}:{body}@1,2'."
+        )
     if boundary and at:
         raise InputError(f"quantity {name!r}: give either a boundary or a point.")
     part = next(part for part in scene.parts if isinstance(part, Part) and part.name == body)
@@ -126,14 +143,17 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
 
 def _check_there(part: Part, region: Region, scene: Scene) -> None:
-    """InputError for a boundary that the first mesh of a body does not have, and for a point far outside it."""
+    """InputError for a boundary that the first mesh of a body does not have, and for a point far
+    outside it.
+    """
     if not region.boundary and not region.point:
         return
     mesh = part.build_mesh(scene.elements, scene.zone)
     known = mesh.boundaries or {}
     if region.boundary and region.boundary not in known:
         raise InputError(
-            f"body '{part.name}' has no boundary {region.boundary!r}; it has {', '.join(sorted(known)) or 'none'}."
+            f"body '{part.name}' has no boundary {region.boundary!r}; it has"
+            f" {', '.join(sorted(known)) or 'none'}."
         )
     if region.point:
         from contactopt.meshes.cells import straight
@@ -144,7 +164,8 @@ def _check_there(part: Part, region: Region, scene: Scene) -> None:
         if np.any(region.point < low - slack) or np.any(region.point > high + slack):
             place = ", ".join(f"{x:g}" for x in region.point)
             raise InputError(
-                f"the point ({place}) lies outside body '{part.name}'; give one inside it or on its surface."
+                f"the point ({place}) lies outside body '{part.name}'; give one inside it or on its"
+                " surface."
             )
 
 
@@ -152,37 +173,45 @@ def _around(name: str, where: str, scene: Scene) -> Region:
     """The point, or the circle around it, that stands behind the @ of a quantity."""
     texts = where.split(",")
     try:
-        radius = float(texts.pop().strip().removeprefix("radius=")) if texts[-1].strip().startswith("radius=") else None
+        radius = (
+            float(texts.pop().strip().removeprefix("radius="))
+            if texts[-1].strip().startswith("radius=")
+            else None
+        )
         point = tuple(float(text) for text in texts)
     except ValueError:
         point, radius = (), None
-    if len(point) != scene.dim or not np.all(np.isfinite(point)) or (radius is not None and not 0 < radius < np.inf):
+    if (
+        len(point) != scene.dim
+        or not np.all(np.isfinite(point))
+        or (radius is not None and not 0 < radius < np.inf)
+    ):
         example = ",".join(scene.components)
-        raise InputError(f"quantity {name!r}: a place needs {scene.dim} numbers, @{example} or @{example},radius=R.")
+        raise InputError(
+            f"quantity {name!r}: a place needs {scene.dim} numbers, @{example} or"
+            f" @{example},radius=R."
+        )
     return Region(point=point, radius=radius)
 
 
-def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray, ...]) -> StressReading:
+def read_stress(
+    place: Place, reduction: Reduction, displaced: tuple[np.ndarray, ...]
+) -> StressReading:
     """Read the stress that a quantity names.
 
     Parameters
     ----------
-    place
-        The quantity.
-    reduction
-        The reduced scene.
-    displaced
-        For each body its displacement U (n,) [length].
+    place : The quantity.
+    reduction : The reduced scene.
+    displaced : For each body its displacement U (n,) [length].
 
     Returns
     -------
-    StressReading
-        The value, where it is, and by how much it may be off.
+    The value, where it is, and by how much it may be off.
 
     Raises
     ------
-    InputError
-        For a boundary that the body does not have, and a point outside the body.
+    InputError : For a boundary that the body does not have, and a point outside the body.
     """
     from contactopt.bodies.fields import STRESSES
     from contactopt.bodies.stress_recovery import von_mises, von_mises_slopes
@@ -202,7 +231,9 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
     doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
     slopes[np.arange(len(slopes)) != top] = 0.0
     uncertainty = float(above.max())
-    others = [i for i in _tops(recovered.places, sizes) if i != top] if place.kind == LARGEST else []
+    others = (
+        [i for i in _tops(recovered.places, sizes) if i != top] if place.kind == LARGEST else []
+    )
     nothing = np.empty(0, dtype=int)
     peaks = [
         Peak(
@@ -220,7 +251,9 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
 
 
 def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
-    """Numbers of the places (dim, m) where a size (m,) is that of no neighbour exceeded, the largest of them first."""
+    """Numbers of the places (dim, m) where a size (m,) is that of no neighbour exceeded, the
+    largest of them first.
+    """
     count = min(AROUND[len(places)], len(sizes))
     near = cKDTree(places.T).query(places.T, k=count)[1].reshape(len(sizes), count)
     chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
@@ -233,27 +266,24 @@ def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> Stre
 
     Parameters
     ----------
-    place
-        The quantity.
-    reduction
-        The reduced scene.
-    by_poisson
-        Whether the derivative of the map by Poisson's ratio is wanted instead.
+    place : The quantity.
+    reduction : The reduced scene.
+    by_poisson : Whether the derivative of the map by Poisson's ratio is wanted instead.
 
     Returns
     -------
-    StressMap
-        The map.
+    The map.
 
     Raises
     ------
-    InputError
-        Where the stress of the body cannot be read.
+    InputError : Where the stress of the body cannot be read.
     """
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = reduction.bodies[number].stress_map(place.region, by_poisson)
     if recovered is None:
-        raise InputError(f"quantity {place.name!r}: the stress inside body '{place.owner}' cannot be read here.")
+        raise InputError(
+            f"quantity {place.name!r}: the stress inside body '{place.owner}' cannot be read here."
+        )
     return recovered
 
 
@@ -262,15 +292,12 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
 
     Parameters
     ----------
-    place
-        The quantity.
-    reduction
-        The reduced scene.
+    place : The quantity.
+    reduction : The reduced scene.
 
     Returns
     -------
-    (k, dim) array
-        The contributions [1 / length^2].
+    (k, dim) array : The contributions [1 / length^2].
     """
     problem = reduction.problem
     pairs = {pair.name: pair for pair in problem.pairs}
@@ -285,33 +312,32 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
     terms = np.concatenate([np.ones((1, len(near))), along / (np.abs(along).max() or 1.0)])
     root = np.sqrt(problem.areas[chosen[near]])
     weights = np.zeros(problem.q.shape)
-    weights[chosen[near], 0] = np.linalg.pinv((terms * root).T)[0] * root / problem.areas[chosen[near]]
+    weights[chosen[near], 0] = (
+        np.linalg.pinv((terms * root).T)[0] * root / problem.areas[chosen[near]]
+    )
     return weights
 
 
 def read_place(place: Place, reduction: Reduction, solution: Solution) -> Reading:
     """Read a quantity at a place, with its uncertainty [stress].
 
-    The uncertainty of a pressure is what the nodal values scatter about the linear function through them.
+    The uncertainty of a pressure is what the nodal values scatter about the linear function through
+    them.
 
     Parameters
     ----------
-    place
-        The quantity.
-    reduction
-        The reduced scene.
-    solution
-        Of its problem.
+    place : The quantity.
+    reduction : The reduced scene.
+    solution : Of its problem.
 
     Returns
     -------
-    Reading
-        The stress or the pressure. Where no contact near the place touches, it says that there is no pressure.
+    The stress or the pressure. Where no contact near the place touches, it says that there is no
+    pressure.
 
     Raises
     ------
-    InputError
-        As read_stress() and pressure_weights().
+    InputError : As read_stress() and pressure_weights().
     """
     if place.kind != "pressure":
         found = read_stress(place, reduction, reduction.displaced(solution))
@@ -329,9 +355,13 @@ def read_place(place: Place, reduction: Reduction, solution: Solution) -> Readin
     scatter = (
         float(np.abs(pressure - value) @ np.abs(share))
         if len(near) < 3
-        else float(np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2)))
+        else float(
+            np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2))
+        )
     )
-    noise = solution.residual * float(np.linalg.norm(solution.reactions) / problem.areas[near].min())
+    noise = solution.residual * float(
+        np.linalg.norm(solution.reactions) / problem.areas[near].min()
+    )
     at = problem.coordinates[:, near[0]]
     size = float(np.ptp(problem.coordinates[:, near], axis=1).max())
     return Reading(value, scatter + noise, (Peak(value, scatter, at, size, near),), missing)

@@ -1,8 +1,9 @@
-"""Numbers that people ask of a contact, by name, each read so that its error falls smoothly with the mesh.
+"""Numbers that people ask of a contact, by name, each read so that its error falls smoothly with
+the mesh.
 
-A single node, or a count of nodes, jumps from mesh to mesh, and the estimate of an error lives on differences between
-meshes: values at an edge or a peak come from fits through several nodes, weighted by the nodal areas. Every reading says
-how uncertain it is.
+A single node, or a count of nodes, jumps from mesh to mesh, and the estimate of an error lives on
+differences between meshes: values at an edge or a peak come from fits through several nodes,
+weighted by the nodal areas. Every reading says how uncertain it is.
 """
 
 from __future__ import annotations
@@ -33,20 +34,20 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
     Parameters
     ----------
-    problem
-        An interface problem.
-    solution
-        Of the problem.
+    problem : An interface problem.
+    solution : Of the problem.
 
     Returns
     -------
-    float or None
-        [length]; None without a plate, and where the surface surrounds a body, so that its normals have no mean.
+    [length]; None without a plate, and where the surface surrounds a body, so that its normals have
+    no mean.
     """
     if len(solution.multipliers) == 0:
         return None
     normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
-    mean, size = (float(np.average(motion, weights=problem.areas)) for motion in (normal, np.abs(normal)))
+    mean, size = (
+        float(np.average(motion, weights=problem.areas)) for motion in (normal, np.abs(normal))
+    )
     return None if size > 0 and abs(mean) < CLOSED * size else -mean
 
 
@@ -55,15 +56,12 @@ def elastic_energy(reduction: Reduction, solution: Solution) -> float:
 
     Parameters
     ----------
-    reduction
-        A reduced scene.
-    solution
-        Of its problem.
+    reduction : A reduced scene.
+    solution : Of its problem.
 
     Returns
     -------
-    float
-        [force length].
+    [force length].
     """
     displaced = reduction.displaced(solution)
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
@@ -93,7 +91,8 @@ class Reading:
     """A quantity as it is read from one solution.
 
     value        [its unit];   uncertainty  of the reading alone, not of the solution [its unit]
-    peaks        of a largest value: its local maxima, the largest first; of an edge, the contacts next to it
+    peaks        of a largest value: its local maxima, the largest first; of an edge, the contacts
+                 next to it
     missing      one sentence if the quantity does not exist in this solution
     """
 
@@ -111,29 +110,26 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
 def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     """Read the largest pressure from a local fit around the node where it is largest.
 
-    The square of the pressure is quadratic under Hertz's ellipse, and near the top of any smooth pressure. A
-    quadratic polynomial is fitted to it through the few nodes around every local maximum of the nodal pressures, with
-    the nodal areas as weights. What the nodes scatter about the fit is the uncertainty, so that the reading agrees
-    with the nodal values within its own error. Nodes on the axis of an axisymmetric mesh are left out: the strain
-    u_r / r is poorly resolved there, on a ring without area. At the rim of the contact surface the nodal value is
+    The square of the pressure is quadratic under Hertz's ellipse, and near the top of any smooth
+    pressure. A quadratic polynomial is fitted to it through the few nodes around every local
+    maximum of the nodal pressures, with the nodal areas as weights. What the nodes scatter about
+    the fit is the uncertainty, so that the reading agrees with the nodal values within its own
+    error. Nodes on the axis of an axisymmetric mesh are left out: the strain u_r / r is poorly
+    resolved there, on a ring without area. At the rim of the contact surface the nodal value is
     returned.
 
     Parameters
     ----------
-    reduction
-        A reduced scene with one pair of surfaces.
-    solution
-        Of its problem.
+    reduction : A reduced scene with one pair of surfaces.
+    solution : Of its problem.
 
     Returns
     -------
-    Reading
-        The largest pressure with its local maxima [stress].
+    The largest pressure with its local maxima [stress].
 
     Raises
     ------
-    InputError
-        If the scene has several pairs of surfaces.
+    InputError : If the scene has several pairs of surfaces.
     """
     _one_pair(reduction)
     problem = reduction.problem
@@ -171,17 +167,23 @@ def nodal_pressure(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
 
 
 def _maxima(problem: InterfaceProblem, pressure: np.ndarray) -> np.ndarray:
-    """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them first, MOST_PEAKS at most."""
+    """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them
+    first, MOST_PEAKS at most.
+    """
     places, node = _surroundings(problem)
     count = min(NEIGHBOURS[problem.dim], len(node))
-    near = node[cKDTree(places.T).query(problem.chart.places.T, k=count)[1].reshape(problem.contacts, count)]
+    near = node[
+        cKDTree(places.T).query(problem.chart.places.T, k=count)[1].reshape(problem.contacts, count)
+    ]
     top = (pressure > 0) & (pressure >= pressure[near].max(axis=1))
     chosen = np.flatnonzero(top)
     return chosen[np.argsort(-pressure[chosen], kind="stable")[:MOST_PEAKS]]
 
 
 def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Places (dim - 1, m) of the whole surface with all mirror images and once around closed lines, and the contact of each."""
+    """Places (dim - 1, m) of the whole surface with all mirror images and once around closed lines,
+    and the contact of each.
+    """
     chart = problem.chart
     if chart.period is None:
         return chart.images()
@@ -193,10 +195,12 @@ def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 def _fitted_top(
     problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
 ) -> tuple[float, float, np.ndarray, float]:
-    """Value and uncertainty of the pressure near a node, the contacts next to it, and their distance.
+    """Value and uncertainty of the pressure near a node, the contacts next to it, and their
+    distance.
 
-    Beside an axis the value is that of the widest fit that agrees with all narrower ones within their uncertainties
-    (after Lepski): the nodes next to the axis are poor, and those farther away mend a smooth pressure.
+    Beside an axis the value is that of the widest fit that agrees with all narrower ones within
+    their uncertainties (after Lepski): the nodes next to the axis are poor, and those farther away
+    mend a smooth pressure.
     """
     count, widest = FITTED[problem.dim], 0
     if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
@@ -204,7 +208,9 @@ def _fitted_top(
     narrowest = _fit_to(count, problem, pressure, usable, top)
     found: list[tuple[float, float]] = []
     value, doubt = narrowest[:2]
-    while np.isfinite(doubt) and all(abs(value - other) <= doubt + around for other, around in found):
+    while np.isfinite(doubt) and all(
+        abs(value - other) <= doubt + around for other, around in found
+    ):
         found.append((value, doubt))
         count *= 2
         if count > widest:
@@ -226,18 +232,28 @@ def _fit_to(
     near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
     own, nodal = np.unique(node[near]), float(pressure[top])
     reach = float(distance[near].max(initial=0.0))
-    size = reach / max(len(near) / 2, 1) ** (1 / len(places)) or float(problem.areas[top] ** (1 / len(places)))
-    powers = list(combinations_with_replacement(range(len(places) + 1), 2))  # with a first coordinate of 1
+    size = reach / max(len(near) / 2, 1) ** (1 / len(places)) or float(
+        problem.areas[top] ** (1 / len(places))
+    )
+    # with a first coordinate of 1
+    powers = list(combinations_with_replacement(range(len(places) + 1), 2))
     if len(near) <= len(powers) or not np.all(pressure[node[near]] > 0):
         return nodal, np.inf, own, size  # too few contacts to know
     terms = np.concatenate([np.ones((1, len(near))), offset[:, near] / reach])
     terms = np.array([terms[i] * terms[j] for i, j in powers]).T
-    square, root = pressure[node[near]] ** 2, np.sqrt(problem.areas[node[near]] / problem.areas[node[near]].mean())
+    square, root = (
+        pressure[node[near]] ** 2,
+        np.sqrt(problem.areas[node[near]] / problem.areas[node[near]].mean()),
+    )
     fit = np.linalg.lstsq(terms * root[:, None], square * root, rcond=None)[0]
     left = (terms @ fit - square) * root
     inner = terms[distance[near] <= reach / 2]
     value = float(np.sqrt(max((inner @ fit).max(), 0.0)))
-    value = max(value, _stationary(fit, powers, len(places)) or 0.0) if not _outermost(offset[:, near]) else nodal
+    value = (
+        max(value, _stationary(fit, powers, len(places)) or 0.0)
+        if not _outermost(offset[:, near])
+        else nodal
+    )
     scatter = float(np.sqrt(np.sum(left**2) / (len(near) - len(powers))))
     at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
     at_top *= min(
@@ -247,7 +263,9 @@ def _fit_to(
 
 
 def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> float | None:
-    """The root of a quadratic polynomial at its top, if it has one within half the fitted nodes; powers as in _fitted_top()."""
+    """The root of a quadratic polynomial at its top, if it has one within half the fitted nodes;
+    powers as in _fitted_top().
+    """
     H = np.zeros((dim + 1, dim + 1))
     for coefficient, (i, j) in zip(fit, powers):
         H[i, j] += coefficient / 2
@@ -260,16 +278,15 @@ def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> flo
 
 
 def at_rim(reduction: Reduction, solution: Solution) -> bool:
-    """Whether the largest pressure is at the rim of the candidate surface, where it may be infinite.
+    """Whether the largest pressure is at the rim of the candidate surface, where it may be
+    infinite.
 
     A node inside has neighbours in all directions.
 
     Parameters
     ----------
-    reduction
-        A reduced scene with one pair of surfaces.
-    solution
-        Of its problem.
+    reduction : A reduced scene with one pair of surfaces.
+    solution : Of its problem.
 
     Returns
     -------
@@ -287,11 +304,14 @@ def _outermost(offsets: np.ndarray) -> bool:
         return bool((offsets > 0).any() != (offsets < 0).any())
     near = offsets[:, np.any(offsets != 0, axis=0)]
     angles = np.sort(np.arctan2(near[1], near[0]))
-    return bool(np.max(np.diff(np.append(angles, angles[:1] + 2 * np.pi)), initial=0.0) > 0.8 * np.pi)
+    return bool(
+        np.max(np.diff(np.append(angles, angles[:1] + 2 * np.pi)), initial=0.0) > 0.8 * np.pi
+    )
 
 
 def width(reduction: Reduction, solution: Solution) -> float:
-    """Half-width of the contact zone of a scene with one pair of surfaces, as contact_zone() reads it [length].
+    """Half-width of the contact zone of a scene with one pair of surfaces, as contact_zone() reads
+    it [length].
 
     Parameters
     ----------
@@ -310,33 +330,35 @@ def width_reading(reduction: Reduction, solution: Solution) -> Reading:
 
     Parameters
     ----------
-    reduction
-        A reduced scene with one pair of surfaces.
-    solution
-        Of its problem.
+    reduction : A reduced scene with one pair of surfaces.
+    solution : Of its problem.
 
     Returns
     -------
-    Reading
-        The half-width [length].
+    The half-width [length].
 
     Raises
     ------
-    InputError
-        If the scene has several pairs of surfaces.
+    InputError : If the scene has several pairs of surfaces.
     """
     _one_pair(reduction)
     problem, r = reduction.problem, solution.reactions
     touching = contact_status(problem, r).touching
     missing = "" if touching.any() else "nothing touches, so that the zone of contact has no width"
-    return Reading(*contact_zone(reduction.scene, problem, r), _edges_of(problem, touching), missing)
+    return Reading(
+        *contact_zone(reduction.scene, problem, r), _edges_of(problem, touching), missing
+    )
 
 
 def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]:
-    """The contacts on both sides of the edge of a zone, as one peak; none where the zone has no edge."""
+    """The contacts on both sides of the edge of a zone, as one peak; none where the zone has no
+    edge.
+    """
     places, node = _surroundings(problem)
     count = min(NEIGHBOURS[problem.dim], len(node))
-    near = node[cKDTree(places.T).query(problem.chart.places.T, k=count)[1].reshape(problem.contacts, count)]
+    near = node[
+        cKDTree(places.T).query(problem.chart.places.T, k=count)[1].reshape(problem.contacts, count)
+    ]
     edge = np.flatnonzero(np.any(inside[near] != inside[:, None], axis=1))
     if not len(edge):
         return ()
@@ -344,7 +366,8 @@ def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]
 
 
 def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """Half-width of the stick zone of a scene with one pair of surfaces, and its uncertainty, as stick_edge() reads them [length].
+    """Half-width of the stick zone of a scene with one pair of surfaces, and its uncertainty, as
+    stick_edge() reads them [length].
 
     Parameters
     ----------
@@ -366,20 +389,16 @@ def stick_reading(reduction: Reduction, solution: Solution) -> Reading:
 
     Parameters
     ----------
-    reduction
-        A reduced scene with one pair of surfaces.
-    solution
-        Of its problem.
+    reduction : A reduced scene with one pair of surfaces.
+    solution : Of its problem.
 
     Returns
     -------
-    Reading
-        The ratio [-].
+    The ratio [-].
 
     Raises
     ------
-    InputError
-        If the scene has several pairs of surfaces.
+    InputError : If the scene has several pairs of surfaces.
     """
     edge = width_reading(reduction, solution)
     if edge.missing:
@@ -396,8 +415,8 @@ def _one_pair(reduction: Reduction) -> None:
     """InputError if a scene has several pairs of surfaces, each with numbers of its own."""
     if len(reduction.problem.pairs) > 1:
         raise InputError(
-            f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces, each with its own pressure and "
-            "half-widths; name the pair, as in 'pressure:"
+            f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces,"
+            " each with its own pressure and half-widths; name the pair, as in 'pressure:"
             + reduction.problem.pairs[0].name
             + "', or ask for the energy."
         )
@@ -406,7 +425,10 @@ def _one_pair(reduction: Reduction) -> None:
 def _approach(reduction: Reduction, solution: Solution) -> Reading:
     value = approach(reduction.problem, solution)
     if value is None:
-        raise InputError(f"scene '{reduction.scene.name}' has no plate, hence no approach; ask for another quantity.")
+        raise InputError(
+            f"scene '{reduction.scene.name}' has no plate, hence no approach; ask for another"
+            " quantity."
+        )
     return Reading(value)
 
 
@@ -418,7 +440,8 @@ READINGS: dict[str, Callable[[Reduction, Solution], Reading]] = {
     "stick": stick_reading,
     "energy": lambda *solved: Reading(elastic_energy(*solved)),
 }
-OF_ONE_PAIR = ("pressure", "width", "stick")  # these belong to a surface, not to the scene as a whole
+# these belong to a surface, not to the scene as a whole
+OF_ONE_PAIR = ("pressure", "width", "stick")
 
 
 def value_of(name: str, reduction: Reduction, solution: Solution) -> float:

@@ -1,4 +1,6 @@
-"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate says nothing of the mesh."""
+"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate
+says nothing of the mesh.
+"""
 
 from __future__ import annotations
 
@@ -10,42 +12,44 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.resultants import views
 
 FEWEST = (
-    4  # elements across the half-width of contact; with so few the largest pressure is some percent off (reports/hertz)
+    # elements across the half-width of contact; with so few the largest pressure is some percent
+    # off (reports/hertz)
+    4
 )
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Tell of zones of contact that are smaller than the mesh can show, or reach the other surface's rim.
+    """Tell of zones of contact that are smaller than the mesh can show, or reach the other
+    surface's rim.
 
-    A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across its half-width is told.
-    A surface that touches as a whole has no such zone. Contacts at the
-    rim of the other surface are told, since only a part of their faces bears the force.
+    A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across
+    its half-width is told. A surface that touches as a whole has no such zone. Contacts at the rim
+    of the other surface are told, since only a part of their faces bears the force.
 
     Parameters
     ----------
-    reduction
-        A reduced scene.
-    solution
-        Of its problem.
+    reduction : A reduced scene.
+    solution : Of its problem.
 
     Returns
     -------
-    tuple of str
-        Full sentences; empty if every zone is resolved, and for solutions that are not certified.
+    Full sentences; empty if every zone is resolved, and for solutions that are not certified.
     """
     if not solution.solved:
         return ()
     few = [
-        f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is distributed: "
-        "refine the meshes there, or ask for an accuracy."
+        f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is"
+        " distributed: refine the meshes there, or ask for an accuracy."
         for (name, count), own in coarse(reduction, solution)
     ]
     return (*few, *_at_rims(reduction, solution))
 
 
 def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on contacts that touch where the other surface ends and covers a part of their faces."""
+    """Sentences on contacts that touch where the other surface ends and covers a part of their
+    faces.
+    """
     found = []
     for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
         touches = contact_status(view.problem, own.reactions).touching
@@ -54,9 +58,10 @@ def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
         least = np.argmin(np.where(rim, coupling.share, 1.0))
         where = ", ".join(f"{c:.4g}" for c in coupling.positions[:, least])
         found.append(
-            f"{rim.sum()} contacts of '{view.problem.pairs[0].name}' touch at the rim of the other surface, "
-            f"which covers only a part of their faces, as little as {coupling.share[least]:.0%} near ({where}): "
-            "their pressure is the force over that part."
+            f"{rim.sum()} contacts of '{view.problem.pairs[0].name}' touch at the rim of the other"
+            " surface, which covers only a part of their faces, as little as"
+            f" {coupling.share[least]:.0%} near ({where}): their pressure is the force over that"
+            " part."
         )
     return found
 
@@ -66,15 +71,12 @@ def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, in
 
     Parameters
     ----------
-    reduction
-        A reduced scene.
-    solution
-        Of its problem.
+    reduction : A reduced scene.
+    solution : Of its problem.
 
     Returns
     -------
-    list
-        Name and number of contacts of each such pair, with the numbers of those that touch.
+    Name and number of contacts of each such pair, with the numbers of those that touch.
     """
     found = []
     for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):

@@ -1,4 +1,6 @@
-"""Resultant forces and moments of every pair of surfaces, support and plate, in the coordinates of space."""
+"""Resultant forces and moments of every pair of surfaces, support and plate, in the coordinates of
+space.
+"""
 
 from __future__ import annotations
 
@@ -36,25 +38,19 @@ def _resultant(
 ) -> Resultant:
     """Compute the resultant of nodal forces, those of all mirror images together or of whole rings.
 
-    Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and
-    along
-    the axis.
+    Mirror images across `planes` and the parts of a ring balance each other but for what acts along
+    the planes and along the axis.
 
     Parameters
     ----------
-    points
-        (dim, m) where the forces act [length].
-    forces
-        (dim, m) nodal forces, those of all mirror images together or of whole rings [force].
-    axisymmetric
-        Whether the points stand for rings, with components r and z.
-    planes
-        The planes of symmetry.
+    points : (dim, m) where the forces act [length].
+    forces : (dim, m) nodal forces, those of all mirror images together or of whole rings [force].
+    axisymmetric : Whether the points stand for rings, with components r and z.
+    planes : The planes of symmetry.
 
     Returns
     -------
-    Resultant
-        The force and its moment about the origin.
+    The force and its moment about the origin.
     """
     if axisymmetric:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
@@ -72,14 +68,13 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
 
     Parameters
     ----------
-    reduction
-        A reduced scene.
+    reduction : A reduced scene.
 
     Returns
     -------
-    list of dict
-        {"axis": name of a coordinate, "place": [length]} for every plane. The axis of revolution counts as one in its
-        section. The list is empty where the bodies are whole, and where a plane does not lie across an axis.
+    {"axis": name of a coordinate, "place": [length]} for every plane. The axis of revolution counts
+    as one in its section. The list is empty where the bodies are whole, and where a plane does not
+    lie across an axis.
     """
     scene = reduction.scene
     if scene.kind == "axisymmetric":
@@ -89,7 +84,12 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
         axis = int(np.argmax(np.abs(plane.inward)))
         if abs(plane.inward[axis]) < 1 - ALONG:
             return []
-        made.append({"axis": scene.components[axis], "place": float(plane.offset / plane.inward[axis]) + 0.0})
+        made.append(
+            {
+                "axis": scene.components[axis],
+                "place": float(plane.offset / plane.inward[axis]) + 0.0,
+            }
+        )
     return made if 2 ** len(made) == scene.copies else []
 
 
@@ -98,15 +98,12 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene, with the frames of its k contacts.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene, with the frames of its k contacts.
+    solution : A solution of its problem.
 
     Returns
     -------
-    ndarray
-        (dim, k) contact forces [force].
+    (dim, k) contact forces [force].
     """
     return np.asarray(np.einsum("kad,ka->dk", reduction.frames, solution.reactions))
 
@@ -116,15 +113,12 @@ def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resul
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    dict
-        The resultants by the names of the pairs.
+    The resultants by the names of the pairs.
     """
     forces, points = space_forces(reduction, solution), reduction.problem.coordinates
     ring, planes = reduction.scene.kind == "axisymmetric", reduction.planes
@@ -139,15 +133,12 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    dict
-        The resultants by names such as "body 'block', support 'bottom'".
+    The resultants by names such as "body 'block', support 'bottom'".
     """
     ring, planes = reduction.scene.kind == "axisymmetric", reduction.planes
     found = {}
@@ -159,21 +150,20 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """Take the reduction and solution of every pair of surfaces by itself, for readers of its surface.
+    """Take the reduction and solution of every pair of surfaces by itself, for readers of its
+    surface.
 
     A view has no displacements of the bodies, since these need the forces of all pairs.
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    list
-        A reduction and a solution for each pair. Where there is one pair only, they are those of the scene.
+    A reduction and a solution for each pair. Where there is one pair only, they are those of the
+    scene.
     """
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]
@@ -185,23 +175,24 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
 
 
 def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
-    """Put the contact force of every pair into words: normal forces of a curved surface add up to more than it.
+    """Put the contact force of every pair into words: normal forces of a curved surface add up to
+    more than it.
 
     Parameters
     ----------
-    summary
-        Of a result, with its `kind` and `pairs`.
+    summary : Of a result, with its `kind` and `pairs`.
 
     Returns
     -------
-    dict
-        For the name of each pair the components of the force on its upper body, without their unit.
+    For the name of each pair the components of the force on its upper body, without their unit.
     """
     axes = COMPONENTS[summary["kind"]]
     words = {}
     for name, pair in summary["pairs"].items():
         least = ROUNDING * max(map(abs, (*pair["force"], pair["normal_force"])))
-        words[name] = ", ".join(f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, pair["force"]))
+        words[name] = ", ".join(
+            f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, pair["force"])
+        )
     return words
 
 
@@ -210,19 +201,19 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
 
     Parameters
     ----------
-    reduction
-        The reduction of the scene.
-    solution
-        A solution of its problem.
+    reduction : The reduction of the scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    dict
-        'pairs': for each pair of surfaces its resultant, normal force [force], largest pressure [stress], half-widths
-        [length], coupling and counts of contacts. 'holders': the resultant of each support and plate.
+    'pairs': for each pair of surfaces its resultant, normal force [force], largest pressure
+    [stress], half-widths [length], coupling and counts of contacts. 'holders': the resultant of
+    each support and plate.
     """
     pairs = {}
-    for (view, own), (name, found) in zip(views(reduction, solution), pair_resultants(reduction, solution).items()):
+    for (view, own), (name, found) in zip(
+        views(reduction, solution), pair_resultants(reduction, solution).items()
+    ):
         problem, r = view.problem, own.reactions
         status, loaded = contact_status(problem, r), problem.areas > 0
         pairs[name] = found.table | {

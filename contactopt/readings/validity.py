@@ -1,7 +1,8 @@
 """Whether an answer lies within what is assumed: small displacements, and bodies in equilibrium.
 
-The certificate says that the forces solve the interface problem. What is compared here with the bounds of the table below is
-computed from the displacements of the bodies alone, without the factors that made the interface problem.
+The certificate says that the forces solve the interface problem. What is compared here with the
+bounds of the table below is computed from the displacements of the bodies alone, without the
+factors that made the interface problem.
 """
 
 from __future__ import annotations
@@ -17,13 +18,16 @@ from contactopt.problem.contact_status import contact_status
 # The largest values that draw no remark.
 BOUNDS = {
     "strain": 0.05,  # of an element, beyond which a stiffness of small strains is some percent off
-    "rotation": 0.1,  # of an element [rad]: its square, half a percent, is the strain that it seems to make
+    # of an element [rad]: its square, half a percent, is the strain that it seems to make
+    "rotation": 0.1,
     "slip": 1.0,  # over the size of the facets there: contacts have moved past their partners
     "closure": 1.0,  # of the gap, over the size of the facets there
     "imbalance": 1e-6,  # of a body, relative to the forces on it
-    "misfit": 1e-3,  # of the surfaces of the displaced bodies where they touch, relative to their displacement
+    # of the surfaces of the displaced bodies where they touch, relative to their displacement
+    "misfit": 1e-3,
 }
-SHARE = 0.02  # of the extent of a surface, up to which a closed gap is small, however fine its facets are
+# of the extent of a surface, up to which a closed gap is small, however fine its facets are
+SHARE = 0.02
 UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facets"}
 
 
@@ -42,17 +46,14 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
 
     Parameters
     ----------
-    reduction
-        A reduced scene.
-    solution
-        A solution of its problem.
+    reduction : A reduced scene.
+    solution : A solution of its problem.
 
     Returns
     -------
-    tuple
-        The table `bodies` of a summary, with the imbalance, strain and rotation of every body, and that of the pairs,
-        with slip and closure over the size of the facets and the misfit; and one sentence for every value beyond its
-        bound.
+    The table `bodies` of a summary, with the imbalance, strain and rotation of every body, and that
+    of the pairs, with slip and closure over the size of the facets and the misfit; and one sentence
+    for every value beyond its bound.
     """
     displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
     bodies: dict[str, dict[str, float]] = {}
@@ -61,13 +62,16 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     scale = np.zeros(len(moved))
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
         known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
-        remarks += [_beyond(key, f"body '{body.name}'", known[key]) for key in ("strain", "rotation")]
+        remarks += [
+            _beyond(key, f"body '{body.name}'", known[key]) for key in ("strain", "rotation")
+        ]
         if known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
-                f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces on it are left over; it is "
-                "so thin or so weakly held that rounding moves it."
+                f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces"
+                " on it are left over; it is so thin or so weakly held that rounding moves it."
             )
-        near = np.diff(B.indptr).reshape(moved.shape).any(axis=1)  # the contacts that the body takes part in
+        # the contacts that the body takes part in
+        near = np.diff(B.indptr).reshape(moved.shape).any(axis=1)
         size = np.linalg.norm(body.seen(B, U).reshape(moved.shape), axis=1)
         scale = np.maximum(scale, np.where(near, np.maximum(size, known["moved"]), 0.0))
     status, pairs = contact_status(reduction.problem, solution.reactions), {}
@@ -77,16 +81,24 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         extent = float(np.ptp(made.positions, axis=1).max(initial=0.0))
         slip = np.linalg.norm(moved[own, 1:], axis=1) / size
         closure = np.where(made.gap > SHARE * extent, made.gap / size, 0.0)
-        close = status.stick[own] if reduction.problem.law.dilatant else touching  # the others open as they slip
-        misfit = np.abs(moved[own, 0])[close].max(initial=0.0) / max(scale[own].max(initial=0.0), 1e-300)
+        # the others open as they slip
+        close = status.stick[own] if reduction.problem.law.dilatant else touching
+        misfit = np.abs(moved[own, 0])[close].max(initial=0.0) / max(
+            scale[own].max(initial=0.0), 1e-300
+        )
         found = {"slip": slip, "closure": closure}
-        pairs[pair.name] = {key: float(value[touching].max(initial=0.0)) for key, value in found.items()}
-        remarks += [_beyond(key, f"pair '{pair.name}'", value) for key, value in pairs[pair.name].items()]
+        pairs[pair.name] = {
+            key: float(value[touching].max(initial=0.0)) for key, value in found.items()
+        }
+        remarks += [
+            _beyond(key, f"pair '{pair.name}'", value) for key, value in pairs[pair.name].items()
+        ]
         pairs[pair.name]["misfit"] = float(misfit)
         if solution.solved and misfit > BOUNDS["misfit"]:
             remarks.append(
-                f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other by {misfit:.1e} of their "
-                "displacement: a body is so thin or so weakly held that rounding moves it."
+                f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other"
+                f" by {misfit:.1e} of their displacement: a body is so thin or so weakly held that"
+                " rounding moves it."
             )
     return {"bodies": bodies, "pairs": pairs}, [remark for remark in remarks if remark]
 
@@ -95,8 +107,10 @@ def _beyond(key: str, where: str, value: float) -> str:
     """The sentence for a value beyond its bound, or an empty text."""
     if value <= BOUNDS[key]:
         return ""
-    what = {"slip": "slips by up to", "closure": "closes a gap of up to"}.get(key, f"has a {key} of up to")
+    what = {"slip": "slips by up to", "closure": "closes a gap of up to"}.get(
+        key, f"has a {key} of up to"
+    )
     return (
-        f"displacements are assumed to be small, but {where} {what} {value:.3g}{UNITS[key]}, more than "
-        f"{BOUNDS[key]:g}: read the answer as a first step at most."
+        f"displacements are assumed to be small, but {where} {what} {value:.3g}{UNITS[key]}, more"
+        f" than {BOUNDS[key]:g}: read the answer as a first step at most."
     )

@@ -1,7 +1,9 @@
-"""The named scenes, in N, mm and MPa: the paper's three (section 6), and those with exact solutions.
+"""The named scenes, in N, mm and MPa: the paper's three (section 6), and those with exact
+solutions.
 
-The paper gives E = 5 MPa, nu = .3, mu = .5 and 100 N but no sizes; ours are the defaults of the functions below, and
-only there. A load path is a tuple of scenes that differ in their loads alone; contactopt.follow() solves it.
+The paper gives E = 5 MPa, nu = .3, mu = .5 and 100 N but no sizes; ours are the defaults of the
+functions below, and only there. A load path is a tuple of scenes that differ in their loads alone;
+contactopt.follow() solves it.
 """
 
 from __future__ import annotations
@@ -18,34 +20,103 @@ from contactopt.scenes.scene import Scene
 if TYPE_CHECKING:
     from contactopt.scenes.assemblies import arch, pin_in_bush, press_fit, stack
     from contactopt.scenes.flat import flat_punch, rigid_punch
-    from contactopt.scenes.half_spaces import cattaneo_half_space, hertz_half_space, rough, rough_sliding
+    from contactopt.scenes.half_spaces import (
+        cattaneo_half_space,
+        hertz_half_space,
+        rough,
+        rough_sliding,
+    )
     from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
     from contactopt.scenes.sliding import cattaneo, shear_cycle
 
-# name -> (module, function that makes the scene from keyword arguments, what it is[, arguments that the name fixes])
+# name -> (module, function that makes the scene from keyword arguments, what it is[, arguments that
+# the name fixes])
 SCENES: dict[str, tuple[Any, ...]] = {
-    "punch-2d": ("flat", "flat_punch", "flat punch on a foundation, plane strain, half model", {"dim": 2}),
-    "punch-3d": ("flat", "flat_punch", "square flat punch on a foundation, quarter model", {"dim": 3}),
+    "punch-2d": (
+        "flat",
+        "flat_punch",
+        "flat punch on a foundation, plane strain, half model",
+        {"dim": 2},
+    ),
+    "punch-3d": (
+        "flat",
+        "flat_punch",
+        "square flat punch on a foundation, quarter model",
+        {"dim": 3},
+    ),
     "sphere": ("round", "sphere", "half sphere on a foundation, axisymmetric, contact-zone loop"),
-    "cylinder-2d": ("round", "cylinder", "half cylinder on a foundation, plane strain, contact-zone loop"),
-    "pin-in-bush": ("assemblies", "pin_in_bush", "pin in a bush with clearance, held by contact alone, half model"),
-    "press-fit": ("assemblies", "press_fit", "hollow shaft in a hub that is too narrow for it, quarter model"),
-    "stack": ("assemblies", "stack", "blocks that rest on each other, tilted, under their weight, plane strain"),
-    "arch": ("assemblies", "arch", "half circle of stones that rest on each other, under its weight, plane strain"),
-    "rigid-punch-2d": ("flat", "rigid_punch", "rigid flat punch on a half-plane", {"kind": "plane-strain"}),
-    "rigid-punch-axisymmetric": ("flat", "rigid_punch", "rigid flat disc on a half-space", {"kind": "axisymmetric"}),
-    "hertz-dissimilar": ("round", "indentation", "rigid sphere on a half-space, axisymmetric; path: growing force"),
-    "cattaneo-2d": ("sliding", "cattaneo", "two cylinders pressed and sheared; path: shear cycle", {"dim": 2}),
-    "cattaneo-3d": ("sliding", "cattaneo", "two spheres pressed and sheared; path: shear cycle", {"dim": 3}),
+    "cylinder-2d": (
+        "round",
+        "cylinder",
+        "half cylinder on a foundation, plane strain, contact-zone loop",
+    ),
+    "pin-in-bush": (
+        "assemblies",
+        "pin_in_bush",
+        "pin in a bush with clearance, held by contact alone, half model",
+    ),
+    "press-fit": (
+        "assemblies",
+        "press_fit",
+        "hollow shaft in a hub that is too narrow for it, quarter model",
+    ),
+    "stack": (
+        "assemblies",
+        "stack",
+        "blocks that rest on each other, tilted, under their weight, plane strain",
+    ),
+    "arch": (
+        "assemblies",
+        "arch",
+        "half circle of stones that rest on each other, under its weight, plane strain",
+    ),
+    "rigid-punch-2d": (
+        "flat",
+        "rigid_punch",
+        "rigid flat punch on a half-plane",
+        {"kind": "plane-strain"},
+    ),
+    "rigid-punch-axisymmetric": (
+        "flat",
+        "rigid_punch",
+        "rigid flat disc on a half-space",
+        {"kind": "axisymmetric"},
+    ),
+    "hertz-dissimilar": (
+        "round",
+        "indentation",
+        "rigid sphere on a half-space, axisymmetric; path: growing force",
+    ),
+    "cattaneo-2d": (
+        "sliding",
+        "cattaneo",
+        "two cylinders pressed and sheared; path: shear cycle",
+        {"dim": 2},
+    ),
+    "cattaneo-3d": (
+        "sliding",
+        "cattaneo",
+        "two spheres pressed and sheared; path: shear cycle",
+        {"dim": 3},
+    ),
     "hertz-half-space": (
         "half_spaces",
         "hertz_half_space",
         "rigid sphere on a half-space without a mesh, frictionless",
     ),
-    "cattaneo-half-space": ("half_spaces", "cattaneo_half_space", "two spheres as half-spaces, pressed and sheared"),
-    "rough": ("half_spaces", "rough", "rigid rough surface on a half-space; path: shear to full sliding"),
+    "cattaneo-half-space": (
+        "half_spaces",
+        "cattaneo_half_space",
+        "two spheres as half-spaces, pressed and sheared",
+    ),
+    "rough": (
+        "half_spaces",
+        "rough",
+        "rigid rough surface on a half-space; path: shear to full sliding",
+    ),
 }
-# the scenes whose answer depends on how the load is applied: name -> (module, function that makes the states in their
+# the scenes whose answer depends on how the load is applied: name -> (module, function that makes
+# the states in their
 # order[, arguments that the name fixes])
 PATHS: dict[str, tuple[Any, ...]] = {
     "hertz-dissimilar": ("round", "growing_indentation"),
@@ -86,14 +157,17 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'contactopt.scenes' has no attribute {name!r}")
 
 
-def make_scene(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> Scene:
+def make_scene(
+    name: str, *, degree: int | None = None, simplices: bool = False, **changes: object
+) -> Scene:
     """Make a named scene.
 
     Parameters
     ----------
     name : a key of SCENES
     degree : of the displacement in every element, 1 or 2; None: the scene's own
-    simplices : whether the meshes have triangles or tetrahedra instead of quadrilaterals or hexahedra
+    simplices : whether the meshes have triangles or tetrahedra instead of quadrilaterals or
+        hexahedra
     changes : other values of the arguments of the function that makes the scene
 
     Returns
@@ -109,7 +183,9 @@ def make_scene(name: str, *, degree: int | None = None, simplices: bool = False,
     return with_elements(_made(name, SCENES[name], changes), degree, simplices)
 
 
-def make_path(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
+def make_path(
+    name: str, *, degree: int | None = None, simplices: bool = False, **changes: object
+) -> tuple[Scene, ...]:
     """Make the load path of a named scene.
 
     Parameters
@@ -127,13 +203,19 @@ def make_path(name: str, *, degree: int | None = None, simplices: bool = False, 
     """
     if name not in PATHS:
         raise InputError(f"scene {name!r} has no load path; choose from {', '.join(PATHS)}.")
-    return tuple(with_elements(scene, degree, simplices) for scene in _made(name, PATHS[name], changes))
+    return tuple(
+        with_elements(scene, degree, simplices) for scene in _made(name, PATHS[name], changes)
+    )
 
 
 def _arguments(name: str, make: Callable[..., Any]) -> list[str]:
-    """The arguments of a function that makes a scene; one that hands `**changes` on takes those of the scene's own function."""
+    """The arguments of a function that makes a scene; one that hands `**changes` on takes those of
+    the scene's own function.
+    """
     parameters = signature(make).parameters.values()
-    own = [parameter.name for parameter in parameters if parameter.kind is not Parameter.VAR_KEYWORD]
+    own = [
+        parameter.name for parameter in parameters if parameter.kind is not Parameter.VAR_KEYWORD
+    ]
     if len(own) == len(parameters):
         return own
     module, function = SCENES[name][:2]
@@ -150,8 +232,8 @@ def _made(name: str, entry: tuple[Any, ...], changes: dict[str, object]) -> Any:
     for argument in changes:
         if argument not in known:
             raise InputError(
-                f"scene '{name}' has no argument {argument!r}; its arguments are {', '.join(known)}, and degree and simplices "
-                "of every scene."
+                f"scene '{name}' has no argument {argument!r}; its arguments are"
+                f" {', '.join(known)}, and degree and simplices of every scene."
             )
     try:
         return make(**fixed, **changes)

@@ -11,9 +11,19 @@ import numpy as np
 from contactopt.files.toml_table import Table
 
 # names of units of length -> metres
-LENGTHS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
+LENGTHS = {
+    "nm": 1e-9,
+    "um": 1e-6,
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "m": 1.0,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+}
 SHAPES = ("mesh", "block", "ring", "disc")
-FAR = 1e6  # distance from the origin over the size of a body, beyond which rounding deforms its elements
+# distance from the origin over the size of a body, beyond which rounding deforms its elements
+FAR = 1e6
 MOST_ELEMENTS = 2_000_000  # elements of a structured body
 
 
@@ -22,25 +32,19 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
 
     Parameters
     ----------
-    body
-        The table of the body in a scene file.
-    folder
-        The folder to which names of mesh files are relative. Without one no mesh is made, and the entries are only
-        marked as known.
-    components
-        Names of the components of the scene, such as ('x', 'y').
-    length
-        The scene's unit of length, to which a mesh file's unit is converted.
+    body : The table of the body in a scene file.
+    folder : The folder to which names of mesh files are relative. Without one no mesh is made, and
+        the entries are only marked as known.
+    components : Names of the components of the scene, such as ('x', 'y').
+    length : The scene's unit of length, to which a mesh file's unit is converted.
 
     Returns
     -------
-    Mesh or None
-        The scikit-fem mesh, or None without a folder.
+    The scikit-fem mesh, or None without a folder.
 
     Raises
     ------
-    InputError
-        With the line of the table, where the shape is missing or does not fit the scene.
+    InputError : With the line of the table, where the shape is missing or does not fit the scene.
     """
     group, move, places = body.text("group"), body.table("move"), body.table("boundaries")
     unit, shapes = body.text("unit"), [shape for shape in SHAPES if body.has(shape)]
@@ -49,7 +53,8 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         return None
     if len(shapes) != 1:
         raise body.fail(
-            f"a body needs exactly one of mesh, block, ring, disc and rigid; this one has {' and '.join(shapes) or 'none'}."
+            "a body needs exactly one of mesh, block, ring, disc and rigid; this one has"
+            f" {' and '.join(shapes) or 'none'}."
         )
     if shapes[0] == "mesh":
         mesh = _from_file(body, folder, group, _scale(body, unit, length))
@@ -67,7 +72,10 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         move.close()
         mesh = replace(mesh, doflocs=mesh.doflocs + np.array(step)[:, None])
         if np.abs(mesh.doflocs).max() > FAR * np.ptp(mesh.doflocs, axis=1).min():
-            raise body.fail("the body is moved so far that rounding deforms it; keep it nearer to the origin.", "move")
+            raise body.fail(
+                "the body is moved so far that rounding deforms it; keep it nearer to the origin.",
+                "move",
+            )
     return mesh if places is None else _named(mesh, places, components)
 
 
@@ -75,10 +83,14 @@ def _scale(body: Table, unit: str | None, length: str) -> float:
     """The unit of the file in that of the scene."""
     if unit is None:
         return 1.0
-    for name, where in ((unit, "this body"), (length, "the scene (units = { length = ..., stress = ... })")):
+    for name, where in (
+        (unit, "this body"),
+        (length, "the scene (units = { length = ..., stress = ... })"),
+    ):
         if name not in LENGTHS:
             raise body.fail(
-                f"the unit of length of {where} is {name!r}; to convert it, it must be one of {', '.join(LENGTHS)}.",
+                f"the unit of length of {where} is {name!r}; to convert it, it must be one of"
+                f" {', '.join(LENGTHS)}.",
                 "unit",
             )
     return LENGTHS[unit] / LENGTHS[length]
@@ -106,7 +118,9 @@ def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
         or np.prod(counts, dtype=float) > MOST_ELEMENTS
     ):
         raise table.fail(
-            f"'elements' must be whole numbers of at least 1, at most {MOST_ELEMENTS} elements in all.", "elements"
+            f"'elements' must be whole numbers of at least 1, at most {MOST_ELEMENTS} elements in"
+            " all.",
+            "elements",
         )
     return [int(count) for count in counts]
 
@@ -119,7 +133,11 @@ def _block(table: Table, components: tuple[str, ...]) -> Any:
     mesh = tensor_mesh(*(np.linspace(*side, count + 1) for side, count in zip(sides, counts)))
     own = {f"{new}{sign}": f"{old}{sign}" for new, old in zip(components, "xyz") for sign in "-+"}
     boundaries = {new: mesh.boundaries[old] for new, old in own.items()}
-    return replace(mesh, _boundaries=boundaries) if boundaries.keys() != mesh.boundaries.keys() else rename(mesh)
+    return (
+        replace(mesh, _boundaries=boundaries)
+        if boundaries.keys() != mesh.boundaries.keys()
+        else rename(mesh)
+    )
 
 
 def _ring(table: Table, components: tuple[str, ...]) -> Any:
@@ -127,10 +145,14 @@ def _ring(table: Table, components: tuple[str, ...]) -> Any:
 
     radii = _grid(table, "radii", "two radii, [inner, outer]")
     first, last = (
-        _grid(table, "angles", "two angles in degrees, [first, last]") if table.has("angles") else (0.0, 360.0)
+        _grid(table, "angles", "two angles in degrees, [first, last]")
+        if table.has("angles")
+        else (0.0, 360.0)
     )
     if radii[0] <= 0 or last - first > 360:
-        raise table.fail("the inner radius must be positive, and the angles at most 360 degrees apart.")
+        raise table.fail(
+            "the inner radius must be positive, and the angles at most 360 degrees apart."
+        )
     across, around = _counts(table, ("across", "around"))
     if last - first == 360 and around < 3:
         raise table.fail("a whole ring needs at least 3 elements around.", "elements")
@@ -147,7 +169,9 @@ def _disc(table: Table, components: tuple[str, ...]) -> Any:
         else [table.take("elements", int, "a whole number", needed=True)]
     )
     if around < 8 or around % 8 or around > 10_000:
-        raise table.fail("'elements' around a disc must be a multiple of 8, at most 10000.", "elements")
+        raise table.fail(
+            "'elements' around a disc must be a multiple of 8, at most 10000.", "elements"
+        )
     return disc(radius, around // 8)
 
 

@@ -19,17 +19,13 @@ def with_elements(scene: Scene, degree: int | None = None, simplices: bool = Fal
 
     Parameters
     ----------
-    scene
-        The scene, which stays as it is.
-    degree
-        Degree of the displacement, 1 or 2; by default the scene's own.
-    simplices
-        Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
+    scene : The scene, which stays as it is.
+    degree : Degree of the displacement, 1 or 2; by default the scene's own.
+    simplices : Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
 
     Returns
     -------
-    Scene
-        The scene with these elements.
+    The scene with these elements.
     """
 
     def cut(part: Any) -> Any:

@@ -19,16 +19,20 @@ SIDES = ("upper", "lower")
 class Contact:
     """A pair of surfaces that may touch: `upper` is pressed on `lower`.
 
-    The contact normal is the outward normal of the lower surface; a positive normal reaction pushes the upper body away
-    from it. A surface may belong to several pairs. A node in two pairs has two contacts, one in each.
+    The contact normal is the outward normal of the lower surface; a positive normal reaction pushes
+    the upper body away from it. A surface may belong to several pairs. A node in two pairs has two
+    contacts, one in each.
 
-    upper, lower  a body's name, or 'name:surface' for another surface than the contact boundary of its Part
-    mu            what the law reads: the friction coefficient, for 'tresca' a bound of the tangential traction [stress]; a
-                  number >= 0, one per contact (k,), or a function of the contacts' positions (dim, k) that gives either
+    upper, lower  a body's name, or 'name:surface' for another surface than the contact boundary of
+                  its Part
+    mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
+                  tangential traction [stress]; a number >= 0, one per contact (k,), or a function
+                  of the contacts' positions (dim, k) that gives either
     law           a name in contactopt.problem.laws.LAWS
-    coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits the surfaces
-    carrier       the side whose nodes carry the contacts, 'upper' or 'lower', for couplings that can choose; None: the
-                  coupling chooses
+    coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
+                  the surfaces
+    carrier       the side whose nodes carry the contacts, 'upper' or 'lower', for couplings that
+                  can choose; None: the coupling chooses
     """
 
     upper: str
@@ -41,11 +45,15 @@ class Contact:
     def __post_init__(self) -> None:
         for side in (self.upper, self.lower):
             if not isinstance(side, str):
-                raise InputError(f"a contact names its bodies by text, 'body' or 'body:surface'; got {side!r}.")
+                raise InputError(
+                    f"a contact names its bodies by text, 'body' or 'body:surface'; got {side!r}."
+                )
         if self.bodies[0] == self.bodies[1]:
             raise InputError(f"a contact joins two bodies; '{self.bodies[0]}' cannot touch itself.")
         if self.carrier not in (None, *SIDES):
-            raise InputError(f"the carrier of contact '{self.name}' must be 'upper', 'lower' or None.")
+            raise InputError(
+                f"the carrier of contact '{self.name}' must be 'upper', 'lower' or None."
+            )
         find_law(self.law)
         if not callable(self.mu):
             _check_friction(self.mu)
@@ -57,7 +65,9 @@ class Contact:
 
     @property
     def surfaces(self) -> tuple[str | None, str | None]:
-        """Names of the surfaces of the upper and the lower body; None for the contact boundary of the Part."""
+        """Names of the surfaces of the upper and the lower body; None for the contact boundary of
+        the Part.
+        """
         return self.upper.partition(":")[2] or None, self.lower.partition(":")[2] or None
 
     @property

@@ -20,7 +20,8 @@ from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 
 EDGE = 1e-3  # first element at the edge of the rigid punch, over its half-width
 RATIO = 1.4  # of its neighbouring elements: a mesh for quadratic displacements
-LARGE = {"plane-strain": 10000.0, "axisymmetric": 1000.0}  # half-space: size of the foundation over the half-width
+# half-space: size of the foundation over the half-width
+LARGE = {"plane-strain": 10000.0, "axisymmetric": 1000.0}
 
 
 def flat_punch(
@@ -39,56 +40,52 @@ def flat_punch(
     rigid: str | None = None,
     bilateral: bool = False,
 ) -> Scene:
-    """A block pressed on a foundation by a rigid plate glued to its top. The foundation is clamped below.
+    """A block pressed on a foundation by a rigid plate glued to its top.
+
+    The foundation is clamped below.
 
     Lengths are in mm, forces in N and Young's moduli in MPa.
 
     Parameters
     ----------
-    dim
-        2 for plane strain, of which half is modelled; 3 for a square block on a square foundation, of which a quarter
-        is modelled.
-    width, height
-        Of the block.
-    foundation_width, foundation_height
-        Of the foundation.
-    depth
-        Length of both bodies along the direction without strain, in plane strain.
-    upper, lower
-        Materials of the block and of the foundation.
-    mu
-        Friction coefficient.
-    force
-        Total force on the plate, positive in compression.
-    elements
-        Number of elements across the contact half-width.
-    rigid
-        None, 'punch' or 'foundation': that body is rigid.
-    bilateral
-        Whether contact cannot open.
+    dim : 2 for plane strain, of which half is modelled; 3 for a square block on a square
+        foundation, of which a quarter is modelled.
+    width, height : Of the block.
+    foundation_width, foundation_height : Of the foundation.
+    depth : Length of both bodies along the direction without strain, in plane strain.
+    upper, lower : Materials of the block and of the foundation.
+    mu : Friction coefficient.
+    force : Total force on the plate, positive in compression.
+    elements : Number of elements across the contact half-width.
+    rigid : None, 'punch' or 'foundation': that body is rigid.
+    bilateral : Whether contact cannot open.
 
     Returns
     -------
-    Scene
-        Named 'punch-2d' or 'punch-3d'. In plane strain with a rigid punch it carries the frictionless solution for a
-        half-plane.
+    Named 'punch-2d' or 'punch-3d'. In plane strain with a rigid punch it carries the frictionless
+    solution for a half-plane.
 
     Raises
     ------
-    InputError
-        If a size is not positive, the foundation is narrower than the block, or a choice is unknown.
+    InputError : If a size is not positive, the foundation is narrower than the block, or a choice
+        is unknown.
     """
     if dim not in (2, 3):
         raise InputError(f"dim must be 2 or 3; got {dim!r}.")
     if rigid not in (None, "punch", "foundation"):
         raise InputError(f"rigid must be None, 'punch' or 'foundation'; got {rigid!r}.")
     check_positive(
-        width=width, height=height, foundation_width=foundation_width, foundation_height=foundation_height, depth=depth
+        width=width,
+        height=height,
+        foundation_width=foundation_width,
+        foundation_height=foundation_height,
+        depth=depth,
     )
     check_number("force", force, low=0.0)
     if foundation_width < width:
         raise InputError(
-            f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch ({width:g})."
+            f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch"
+            f" ({width:g})."
         )
     a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
 
@@ -98,7 +95,12 @@ def flat_punch(
         rise = graded(height, a / elements, growth)
         across = contact_grid(a, elements, a, growth)
         mesh = tensor_mesh(*[across] * (dim - 1), rise)
-        return rename(mesh, contact=f"{up}-", top=f"{up}+", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+        return rename(
+            mesh,
+            contact=f"{up}-",
+            top=f"{up}+",
+            **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]},
+        )
 
     def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
         from contactopt.meshes.structured import contact_grid, graded, patch, rename, tensor_mesh
@@ -106,7 +108,12 @@ def flat_punch(
         depth_grid = -graded(foundation_height, a / elements, growth)[::-1]
         across = contact_grid(a, elements, foundation_width / 2, growth)
         mesh = tensor_mesh(*[across] * (dim - 1), depth_grid)
-        mesh = rename(mesh, top=f"{up}+", bottom=f"{up}-", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+        mesh = rename(
+            mesh,
+            top=f"{up}+",
+            bottom=f"{up}-",
+            **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]},
+        )
         return patch(mesh, "top", "contact", [a] * (dim - 1))
 
     symmetry = tuple(Support(f"symmetry {c}", {c: 0.0}) for c in "xy"[: dim - 1])
@@ -144,53 +151,49 @@ def rigid_punch(
     elements: int = 64,
     bilateral: bool = False,
 ) -> Scene:
-    """A rigid flat punch, strip or disc, pressed on a half-space. This is Spence's problem where friction acts.
+    """A rigid flat punch, strip or disc, pressed on a half-space.
 
-    The solution is self-similar as the load grows, so that one static step from the unloaded state is exact. The
-    half-space is a block that is clamped below. Its elements shrink to 1e-3 of the half-width towards the edge of the
-    punch, where the tractions are singular, and displacements are quadratic. With linear ones and as many unknowns,
-    the stick zone has three times the error (reports/accuracy/report.md). Lengths are in mm, forces in N and Young's moduli
-    in MPa.
+    This is Spence's problem where friction acts.
+
+    The solution is self-similar as the load grows, so that one static step from the unloaded state
+    is exact. The half-space is a block that is clamped below. Its elements shrink to 1e-3 of the
+    half-width towards the edge of the punch, where the tractions are singular, and displacements
+    are quadratic. With linear ones and as many unknowns, the stick zone has three times the error
+    (reports/accuracy/report.md). Lengths are in mm, forces in N and Young's moduli in MPa.
 
     Parameters
     ----------
-    kind
-        'plane-strain' for a strip, 'axisymmetric' for a disc.
-    half_width
-        Of the strip, or radius of the disc.
-    foundation
-        Height of the block and its width from the axis. By default 10,000 half-widths in plane strain, where the size
-        stretches the contact by a strain of about half_width / foundation, and 1,000 radii of a disc, which makes the
-        approach .2 % too small.
-    depth
-        Length of the strip.
-    lower
-        Material of the half-space.
-    mu
-        Friction coefficient.
-    force
-        Total force on the punch, positive in compression.
-    elements
-        Number of elements across the half-width.
-    bilateral
-        Whether contact cannot open.
+    kind : 'plane-strain' for a strip, 'axisymmetric' for a disc.
+    half_width : Of the strip, or radius of the disc.
+    foundation : Height of the block and its width from the axis. By default 10,000 half-widths in
+        plane strain, where the size stretches the contact by a strain of about half_width /
+        foundation, and 1,000 radii of a disc, which makes the approach .2 % too small.
+    depth : Length of the strip.
+    lower : Material of the half-space.
+    mu : Friction coefficient.
+    force : Total force on the punch, positive in compression.
+    elements : Number of elements across the half-width.
+    bilateral : Whether contact cannot open.
 
     Returns
     -------
-    Scene
-        Named 'rigid-punch-2d' or 'rigid-punch-axisymmetric', with the exact solution unless contact is bilateral.
+    Named 'rigid-punch-2d' or 'rigid-punch-axisymmetric', with the exact solution unless contact is
+    bilateral.
 
     Raises
     ------
-    InputError
-        If a size is not positive, the foundation is smaller than two half-widths, or the kind is unknown.
+    InputError : If a size is not positive, the foundation is smaller than two half-widths, or the
+        kind is unknown.
     """
     if kind not in LARGE:
         raise InputError(f"kind must be one of {', '.join(LARGE)}; got {kind!r}.")
     size = LARGE[kind] * half_width if foundation is None else foundation
     check_positive(half_width=half_width, foundation=size, depth=depth, force=force)
     if size < 2 * half_width:
-        raise InputError(f"the foundation ({size:g}) must be at least two half-widths ({2 * half_width:g}) large.")
+        raise InputError(
+            f"the foundation ({size:g}) must be at least two half-widths ({2 * half_width:g})"
+            " large."
+        )
     across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
 
     def mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
@@ -220,7 +223,9 @@ def rigid_punch(
     )
 
 
-def _exact(kind: str, force: float, half_width: float, depth: float, lower: Material, mu: float) -> Reference:
+def _exact(
+    kind: str, force: float, half_width: float, depth: float, lower: Material, mu: float
+) -> Reference:
     beta = dundurs(None, lower)[1]
     if kind == "plane-strain":
         return flat_punch_line_friction(force / depth, half_width, mu, beta)
@@ -228,7 +233,9 @@ def _exact(kind: str, force: float, half_width: float, depth: float, lower: Mate
 
 
 def _towards_edge(half_width: float, elements: int, first: float) -> np.ndarray:
-    """Grid from 0 to half_width: even spacing half_width / elements at most, falling to `first` at the edge."""
+    """Grid from 0 to half_width: even spacing half_width / elements at most, falling to `first` at
+    the edge.
+    """
     h = half_width / elements
     steps = first * RATIO ** np.arange(max(0.0, np.floor(np.log(h / first) / np.log(RATIO)) + 1))
     steps = steps[np.cumsum(steps) < half_width - h / 2]  # leaves room for an even one

@@ -20,17 +20,13 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
 
     Parameters
     ----------
-    scene
-        The scene, which stays as it is.
-    elements
-        Number across the contact half-width, for which the meshes are made.
-    splits
-        How often they are halved.
+    scene : The scene, which stays as it is.
+    elements : Number across the contact half-width, for which the meshes are made.
+    splits : How often they are halved.
 
     Returns
     -------
-    Scene
-        The scene with these meshes, whatever number of elements it is asked for.
+    The scene with these meshes, whatever number of elements it is asked for.
     """
 
     def finer(part: Any) -> Any:
@@ -41,7 +37,8 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
             made = part.build_mesh(elements, zone)
             curves: dict[str, Function] = dict(part_curves(part, made))
             touching = {name: curves[name] for name in scene.surfaces_of(part) if name in curves}
-            if callable(part.mesh):  # what moves first stays where it is on other boundaries of the same curve
+            # what moves first stays where it is on other boundaries of the same curve
+            if callable(part.mesh):
                 kept = {name: _kept_partners(curve, made, name) for name, curve in touching.items()}
                 curves = kept | {name: curve for name, curve in curves.items() if name not in kept}
             for _ in range(splits):
@@ -58,16 +55,13 @@ def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
 
     Parameters
     ----------
-    part
-        The part.
-    mesh
-        Its mesh.
+    part : The part.
+    mesh : Its mesh.
 
     Returns
     -------
-    dict
-        By the name of a boundary its curve: the one that the part gives, or that of the mesh. The name '' stands for
-        what has no name.
+    By the name of a boundary its curve: the one that the part gives, or that of the mesh. The name
+    '' stands for what has no name.
     """
     found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
     return {name: curve for name, curve in found.items() if curve is not None}
@@ -76,7 +70,8 @@ def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
 def _kept_partners(curve: Function, mesh: Any, name: str) -> Function:
     """A curve along which points keep one coordinate, so that the nodes of two bodies match.
 
-    Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it is.
+    Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it
+    is.
     """
     if len(mesh.p) != 2:
         return curve

@@ -1,7 +1,8 @@
 """Scenes from files in TOML: bodies, materials, supports, loads, contacts, and how to solve them.
 
-`contactopt new FILE` writes a commented example (contactopt.scenes.example). A number that supports, loads and plates prescribe may be
-an array: its values are those in the states of a load path, one after the other. Every mistake is named with its line.
+`contactopt new FILE` writes a commented example (contactopt.scenes.example). A number that
+supports, loads and plates prescribe may be an array: its values are those in the states of a load
+path, one after the other. Every mistake is named with its line.
 """
 
 from __future__ import annotations
@@ -19,9 +20,19 @@ from contactopt.material import Material
 from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.expressions import Expression
-from contactopt.scenes.scene import COMPONENTS, BodyForce, Part, Plate, Rigid, Scene, Support, Traction
+from contactopt.scenes.scene import (
+    COMPONENTS,
+    BodyForce,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+)
 
-SOLVE = ("method", "normal", "tangential", "preconditioner", "Q", "solver", "quantity")  # texts, as for contactopt.run
+# texts, as for contactopt.run
+SOLVE = ("method", "normal", "tangential", "preconditioner", "Q", "solver", "quantity")
 
 BOUNDS = ("tol", "accuracy", "time_limit", "max_memory")  # positive numbers, as for contactopt.run
 
@@ -46,13 +57,11 @@ class SceneFile:
 
         Parameters
         ----------
-        error
-            An error that may name a body or contact.
+        error : An error that may name a body or contact.
 
         Returns
         -------
-        InputError
-            The error with the name of the file, and with the line of the body or contact that it names.
+        The error with the name of the file, and with the line of the body or contact that it names.
         """
         for name, line in self.lines.items():
             if f"'{name}'" in str(error):
@@ -86,18 +95,15 @@ def read_scene_file(path: str | Path) -> SceneFile:
 
     Parameters
     ----------
-    path
-        A TOML file. The names of mesh files in it are relative to its folder.
+    path : A TOML file. The names of mesh files in it are relative to its folder.
 
     Returns
     -------
-    SceneFile
-        The states of the scene, one unless it is a load path, and how they are solved.
+    The states of the scene, one unless it is a load path, and how they are solved.
 
     Raises
     ------
-    InputError
-        With the line of the first mistake and what to write instead.
+    InputError : With the line of the first mistake and what to write instead.
     """
     path = Path(path)
     table = read_table(path)
@@ -105,24 +111,36 @@ def read_scene_file(path: str | Path) -> SceneFile:
     count = max((length for length, _, _ in reading.lengths), default=1)
     for length, at, key in reading.lengths:
         if length not in (1, count):
-            raise at.fail(f"{key!r} has values for {length} states of the load path, other numbers for {count}.", key)
+            raise at.fail(
+                f"{key!r} has values for {length} states of the load path, other numbers for"
+                f" {count}.",
+                key,
+            )
     states = [first]
     for state in range(1, count):
         reading.state = state
         states.append(_scene(path, read_table(path), reading)[0])
     if count > 1 and "accuracy" in solve:
-        raise table.fail("an accuracy can be asked for only without a load path.", "solve", "accuracy")
+        raise table.fail(
+            "an accuracy can be asked for only without a load path.", "solve", "accuracy"
+        )
     lines = {pair.name: table.lines["contacts", i] for i, pair in enumerate(first.contacts)}
     lines |= {part.name: table.lines["bodies", part.name] for part in first.bodies}
     return SceneFile(tuple(states), solve, path.name, lines)
 
 
-def _scene(path: Path, top: Table, reading: _Reading | None) -> tuple[Scene, dict[str, Any], _Reading]:
+def _scene(
+    path: Path, top: Table, reading: _Reading | None
+) -> tuple[Scene, dict[str, Any], _Reading]:
     kind = top.text("kind", "plane-strain")
     if kind not in COMPONENTS:
         raise top.fail(f"there is no kind {kind!r}; choose from {', '.join(COMPONENTS)}.", "kind")
     units = top.table("units")
-    length, stress = (units.text(key, needed=True) for key in ("length", "stress")) if units else ("length", "stress")
+    length, stress = (
+        (units.text(key, needed=True) for key in ("length", "stress"))
+        if units
+        else ("length", "stress")
+    )
     if units:
         units.close()
     reading = reading or _Reading(path.parent, kind, length)
@@ -132,19 +150,33 @@ def _scene(path: Path, top: Table, reading: _Reading | None) -> tuple[Scene, dic
     parts = [_body(bodies, name, reading) for name in bodies.data]
     pairs = top.tables("contacts")
     if not pairs:
-        raise top.fail("there are no contacts; add a table [[contacts]] for each pair of surfaces that may touch.")
+        raise top.fail(
+            "there are no contacts; add a table [[contacts]] for each pair of surfaces that may"
+            " touch."
+        )
     contacts = tuple(_contact(pair, parts, reading) for pair in pairs)
-    curved = any(isinstance(part, Part) and part.mesh.p.shape[1] != part.mesh.nvertices for part in parts)
-    changes = {"thickness": top.number("thickness", 1.0, low=0.0), "name": top.text("name", path.stem)}
+    curved = any(
+        isinstance(part, Part) and part.mesh.p.shape[1] != part.mesh.nvertices for part in parts
+    )
+    changes = {
+        "thickness": top.number("thickness", 1.0, low=0.0),
+        "name": top.text("name", path.stem),
+    }
     for key, usual in (("copies", 1), ("degree", 2 if curved else 1)):
         changes[key] = top.take(key, int, "a whole number", usual)
         if not 1 <= changes[key] <= (2 if key == "degree" else 1000):
-            raise top.fail(f"{key} must be {'1 or 2' if key == 'degree' else 'at least 1'}; got {changes[key]}.", key)
+            raise top.fail(
+                f"{key} must be {'1 or 2' if key == 'degree' else 'at least 1'}; got"
+                f" {changes[key]}.",
+                key,
+            )
     changes["mirror"] = top.text("mirror", "") or None
     solve = _solve(top.table("solve"))
     top.close()
     with top.about():
-        scene = Scene(kind=kind, units=(length, stress), bodies=tuple(parts), contacts=contacts, **changes)
+        scene = Scene(
+            kind=kind, units=(length, stress), bodies=tuple(parts), contacts=contacts, **changes
+        )
     return scene, solve, reading
 
 
@@ -188,7 +220,9 @@ def _rigid(name: str, table: Table, reading: _Reading) -> Rigid:
     normal, force = table.table("normal"), table.table("force")
     values = None if normal is None else _components(normal, reading)
     if values is not None and not any(values.values()):
-        raise table.fail("the normal is zero; give the direction that points out of the rigid body.", "normal")
+        raise table.fail(
+            "the normal is zero; give the direction that points out of the rigid body.", "normal"
+        )
     gap = _function(table, "gap", reading)
     table.close()
     return Rigid(
@@ -210,7 +244,9 @@ def _traction(table: Table, mesh: Any, reading: _Reading) -> Traction:
     boundary = _boundary(table, "boundary", mesh)
     values = _components(table, reading)
     if not values:
-        raise table.fail(f"a traction needs a value for at least one of {', '.join(reading.components)}.")
+        raise table.fail(
+            f"a traction needs a value for at least one of {', '.join(reading.components)}."
+        )
     table.close()
     return Traction(boundary, tuple(values.get(c, 0.0) for c in reading.components))
 
@@ -220,7 +256,8 @@ def _plate(table: Table, mesh: Any, reading: _Reading) -> Plate:
     force = table.table("force")
     if force is None:
         raise table.fail(
-            f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the whole body."
+            f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the"
+            " whole body."
         )
     glued = table.take("glued", bool, "true or false", True)
     table.close()
@@ -228,13 +265,20 @@ def _plate(table: Table, mesh: Any, reading: _Reading) -> Plate:
 
 
 def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[str, float]:
-    """The numbers that a table holds for components, each of the present state; `whole`: it holds nothing else."""
+    """The numbers that a table holds for components, each of the present state; `whole`: it holds
+    nothing else.
+    """
     found = {}
     for key in reading.components:
         if isinstance(table.data.get(key), list):
-            values = table.numbers(key, None, "a number, or an array of the numbers in the states of a load path")
+            values = table.numbers(
+                key, None, "a number, or an array of the numbers in the states of a load path"
+            )
             if not values:
-                raise table.fail(f"{key!r} is an empty array; give a number for every state of the load path.", key)
+                raise table.fail(
+                    f"{key!r} is an empty array; give a number for every state of the load path.",
+                    key,
+                )
             if reading.state == 0:
                 reading.lengths.append((len(values), table, key))
             found[key] = values[min(reading.state, len(values) - 1)]
@@ -249,7 +293,9 @@ def _boundary(table: Table, key: str, mesh: Any) -> str:
     name = table.text(key, needed=True)
     known = mesh.boundaries or {}
     if name not in known:
-        raise table.fail(f"the body has no boundary {name!r}; it has {', '.join(sorted(known)) or 'none'}.", key)
+        raise table.fail(
+            f"the body has no boundary {name!r}; it has {', '.join(sorted(known)) or 'none'}.", key
+        )
     return str(name)
 
 
@@ -258,7 +304,11 @@ def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.
     if table is None:
         return None
     radius, place = table.number("radius", needed=True, low=0.0), table.table("centre")
-    centre = dict.fromkeys(reading.components, 0.0) if place is None else _components(place, reading, whole=True)
+    centre = (
+        dict.fromkeys(reading.components, 0.0)
+        if place is None
+        else _components(place, reading, whole=True)
+    )
     table.close()
     axes = [reading.components.index(c) for c in centre]
     middle = np.array(list(centre.values()))[:, None]
@@ -274,7 +324,9 @@ def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.
 
 def _function(table: Table, key: str, reading: _Reading, needed: bool = False) -> Any:
     """A number, or a function of the place from an expression; None if there is none."""
-    value = table.take(key, (int, float, str), 'a number, or a text like "0.3 + 0.1 * x"', needed=needed)
+    value = table.take(
+        key, (int, float, str), 'a number, or a text like "0.3 + 0.1 * x"', needed=needed
+    )
     if isinstance(value, str):
         with table.about(key):
             return Expression(value, reading.components)
@@ -292,8 +344,8 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
             boundaries = part.mesh.boundaries or {}
             if (surface or part.contact) not in boundaries:
                 raise table.fail(
-                    f"body '{body}' has no boundary {surface or part.contact!r}; name its surface as '{body}:NAME', one of "
-                    f"{', '.join(sorted(boundaries)) or 'none'}.",
+                    f"body '{body}' has no boundary {surface or part.contact!r}; name its surface"
+                    f" as '{body}:NAME', one of {', '.join(sorted(boundaries)) or 'none'}.",
                     side,
                 )
     mu = _function(table, "mu", reading, needed=True)
@@ -308,11 +360,15 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
 def _solve(table: Table | None) -> dict[str, Any]:
     if table is None:
         return {}
-    found = {key: table.text(key) for key in SOLVE} | {key: table.number(key, low=0.0) for key in BOUNDS}
+    found = {key: table.text(key) for key in SOLVE} | {
+        key: table.number(key, low=0.0) for key in BOUNDS
+    }
     found["max_unknowns"] = table.take("max_unknowns", int, "a whole number")
     found["adaptive"] = table.take("adaptive", bool, "true or false")
     if (found["accuracy"] is None) != (found["quantity"] is None):
-        raise table.fail("'accuracy' and 'quantity' belong together: the bound, and the name of what it bounds.")
+        raise table.fail(
+            "'accuracy' and 'quantity' belong together: the bound, and the name of what it bounds."
+        )
     table.close()
     return {key: value for key, value in found.items() if value is not None}
 
@@ -322,22 +378,21 @@ def with_degree(file: SceneFile, changes: dict[str, Any]) -> tuple[Scene, ...]:
 
     Parameters
     ----------
-    file
-        The scene file.
-    changes
-        {'degree': 1 or 2}, or nothing.
+    file : The scene file.
+    changes : {'degree': 1 or 2}, or nothing.
 
     Returns
     -------
-    tuple
-        The states with the changes.
+    The states with the changes.
 
     Raises
     ------
-    InputError
-        For any other change: a scene file says everything itself.
+    InputError : For any other change: a scene file says everything itself.
     """
     for key in changes:
         if key != "degree":
-            raise InputError(f"a scene file says everything itself; change {key!r} there, or give the degree alone.")
+            raise InputError(
+                f"a scene file says everything itself; change {key!r} there, or give the degree"
+                " alone."
+            )
     return tuple(replace(state, **changes) for state in file.states)

@@ -1,4 +1,6 @@
-"""One large body cut into slices that are tied to each other, so that each can live on its own rank."""
+"""One large body cut into slices that are tied to each other, so that each can live on its own
+rank.
+"""
 
 from __future__ import annotations
 
@@ -16,37 +18,39 @@ PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
 def sliced(scene: Scene, name: str, count: int, axis: int = -1) -> Scene:
-    """The scene with one elastic body cut into slices of about as many elements, across a coordinate axis.
+    """The scene with one elastic body cut into slices of about as many elements, across a
+    coordinate axis.
 
-    Neighbouring slices are bodies of their own, tied by a pair of surfaces with the law 'tied' and matching nodes. The
-    answer is that of the whole body. The slices are called 'name-1', 'name-2', ... along the axis.
+    Neighbouring slices are bodies of their own, tied by a pair of surfaces with the law 'tied' and
+    matching nodes. The answer is that of the whole body. The slices are called 'name-1', 'name-2',
+    ... along the axis.
 
     Parameters
     ----------
-    scene
-        A scene with that body. Its mesh must have layers of elements across the axis, as structured meshes have.
-    name
-        The name of the body.
-    count
-        Number of slices.
-    axis
-        Number of the coordinate, from 0; -1 is the last one. Every surface of the body that contacts or plates use must lie in
-        one slice.
+    scene : A scene with that body. Its mesh must have layers of elements across the axis, as
+        structured meshes have.
+    name : The name of the body.
+    count : Number of slices.
+    axis : Number of the coordinate, from 0; -1 is the last one. Every surface of the body that
+        contacts or plates use must lie in one slice.
 
     Raises
     ------
-    InputError
-        For a body that is not there, not elastic, or cannot be cut like this.
+    InputError : For a body that is not there, not elastic, or cannot be cut like this.
     """
     check_count("the number of slices", count)
-    part = next((part for part in scene.parts if part.name == name and isinstance(part, Part)), None)
+    part = next(
+        (part for part in scene.parts if part.name == name and isinstance(part, Part)), None
+    )
     if part is None:
         raise InputError(f"scene '{scene.name}' has no elastic body named '{name}' to be sliced.")
     if count == 1:
         return scene
     meshes = [_slice(part, count, axis, i)(scene.elements, scene.zone) for i in range(count)]
     slices = tuple(_sliced_part(part, count, axis, i, mesh) for i, mesh in enumerate(meshes))
-    used = {load.boundary for load in part.loads if isinstance(load, Plate)} | set(scene.surfaces_of(part))
+    used = {load.boundary for load in part.loads if isinstance(load, Plate)} | set(
+        scene.surfaces_of(part)
+    )
     home = {boundary: _home(name, boundary, meshes) for boundary in used}
 
     def renamed(side: str) -> str:
@@ -54,14 +58,24 @@ def sliced(scene: Scene, name: str, count: int, axis: int = -1) -> Scene:
         boundary = surface or part.contact
         return side if body != name else f"{slices[home[boundary]].name}:{boundary}"
 
-    pairs = tuple(replace(pair, upper=renamed(pair.upper), lower=renamed(pair.lower)) for pair in scene.pairs)
+    pairs = tuple(
+        replace(pair, upper=renamed(pair.upper), lower=renamed(pair.lower)) for pair in scene.pairs
+    )
     ties = tuple(
-        Contact(f"{slices[i].name}:cut {i}", f"{slices[i - 1].name}:cut {i}", 0.0, "tied", "matching")
+        Contact(
+            f"{slices[i].name}:cut {i}", f"{slices[i - 1].name}:cut {i}", 0.0, "tied", "matching"
+        )
         for i in range(1, count)
     )
     bodies = [own for other in scene.parts for own in (slices if other is part else (other,))]
     return replace(
-        scene, upper=None, lower=None, mu=None, law="coulomb", bodies=tuple(bodies), contacts=(*pairs, *ties)
+        scene,
+        upper=None,
+        lower=None,
+        mu=None,
+        law="coulomb",
+        bodies=tuple(bodies),
+        contacts=(*pairs, *ties),
     )
 
 
@@ -70,8 +84,8 @@ def _home(body: str, boundary: str, meshes: list[Any]) -> int:
     found = [i for i, mesh in enumerate(meshes) if len(mesh.boundaries.get(boundary, ()))]
     if len(found) != 1:
         raise InputError(
-            f"body '{body}' cannot be sliced along this axis: its boundary {boundary!r} lies in {len(found)} slices; "
-            "choose another axis, or fewer slices."
+            f"body '{body}' cannot be sliced along this axis: its boundary {boundary!r} lies in"
+            f" {len(found)} slices; choose another axis, or fewer slices."
         )
     return found[0]
 
@@ -83,14 +97,23 @@ def _sliced_part(part: Part, count: int, axis: int, number: int, mesh: Any) -> P
     supports = tuple(item for item in part.supports if there(item))
     loads = tuple(item for item in part.loads if there(item))
     name = f"{part.name}-{number + 1}"
-    contact = part.contact if len(mesh.boundaries.get(part.contact, ())) else f"cut {max(number, 1)}"
+    contact = (
+        part.contact if len(mesh.boundaries.get(part.contact, ())) else f"cut {max(number, 1)}"
+    )
     return replace(
-        part, name=name, mesh=_slice(part, count, axis, number), supports=supports, loads=loads, contact=contact
+        part,
+        name=name,
+        mesh=_slice(part, count, axis, number),
+        supports=supports,
+        loads=loads,
+        contact=contact,
     )
 
 
 def _slice(part: Part, count: int, axis: int, number: int) -> Any:
-    """The function (elements, zone) -> mesh of a slice, with the boundaries 'cut i' towards its neighbours."""
+    """The function (elements, zone) -> mesh of a slice, with the boundaries 'cut i' towards its
+    neighbours.
+    """
 
     def mesh(elements: int, zone: float | None) -> Any:
         whole = part.build_mesh(elements, zone)
@@ -99,7 +122,9 @@ def _slice(part: Part, count: int, axis: int, number: int) -> Any:
         own = whole.restrict(np.flatnonzero((layer >= ends[number]) & (layer < ends[number + 1])))
         near = PLANE * (planes[-1] - planes[0])
         cuts = {
-            f"cut {i}": own.facets_satisfying(lambda x, at=planes[ends[i]]: np.abs(x[axis] - at) < near, True)
+            f"cut {i}": own.facets_satisfying(
+                lambda x, at=planes[ends[i]]: np.abs(x[axis] - at) < near, True
+            )
             for i in (number, number + 1)
             if 0 < i < count
         }
@@ -110,7 +135,8 @@ def _slice(part: Part, count: int, axis: int, number: int) -> Any:
 
 
 def _layers(name: str, mesh: Any, axis: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The layer (elements,) of each element across the axis, and the coordinates of the planes between layers.
+    """The layer (elements,) of each element across the axis, and the coordinates of the planes
+    between layers.
 
     Raises InputError unless every element lies between two neighbouring planes of nodes.
     """
@@ -122,7 +148,7 @@ def _layers(name: str, mesh: Any, axis: int, count: int) -> tuple[np.ndarray, np
     layer = np.searchsorted(planes, low + near) - 1
     if np.any(np.abs(planes[layer + 1] - high) > near) or len(planes) <= count:
         raise InputError(
-            f"body '{name}' cannot be sliced: its mesh needs at least {count} layers of elements across the axis, "
-            "divided by planes of nodes."
+            f"body '{name}' cannot be sliced: its mesh needs at least {count} layers of elements"
+            " across the axis, divided by planes of nodes."
         )
     return layer, planes

@@ -1,4 +1,6 @@
-"""Tangential loading: a round body pressed on a flat one of the same material, then pushed to and fro."""
+"""Tangential loading: a round body pressed on a flat one of the same material, then pushed to and
+fro.
+"""
 
 from __future__ import annotations
 
@@ -43,43 +45,35 @@ def cattaneo(
 ) -> Scene:
     """A cylinder or sphere pressed on a flat body of the same material, then pushed sideways.
 
-    The upper body hangs on a plate that carries both loads and does not tilt, and the lower one is clamped below.
-    Their meshes are mirror images but for the round surface, a parabola, so that normal and tangential loads hardly
-    disturb each other. Put on at once, the loads give the same answer as one after the other, because slip never
-    turns back. Unloading needs a path: shear_cycle(). Lengths are in mm, forces in N and Young's moduli in MPa.
+    The upper body hangs on a plate that carries both loads and does not tilt, and the lower one is
+    clamped below. Their meshes are mirror images but for the round surface, a parabola, so that
+    normal and tangential loads hardly disturb each other. Put on at once, the loads give the same
+    answer as one after the other, because slip never turns back. Unloading needs a path:
+    shear_cycle(). Lengths are in mm, forces in N and Young's moduli in MPa.
 
     Parameters
     ----------
-    dim
-        2 for plane strain; 3 for a sphere, of which the half with y >= 0 is modelled.
-    radius
-        Of the round body. By default it is so large that the contact is small.
-    size
-        Height and half-width of each body. By default 50 contact half-widths, or 8 in 3D, which disturbs the
-        tractions less than the mesh does. The shift depends on the size; the energy lost in a cycle does not.
-    depth
-        Length of the cylinder along its axis.
-    material
-        Of both bodies. In 3D it has nu = 0 by default, for which the tractions of Cattaneo and Mindlin are exact.
-    mu
-        Friction coefficient.
-    force
-        Total normal force, positive in compression.
-    shear
-        Total tangential force.
-    elements
-        Number of elements across the contact half-width.
+    dim : 2 for plane strain; 3 for a sphere, of which the half with y >= 0 is modelled.
+    radius : Of the round body. By default it is so large that the contact is small.
+    size : Height and half-width of each body. By default 50 contact half-widths, or 8 in 3D, which
+        disturbs the tractions less than the mesh does. The shift depends on the size; the energy
+        lost in a cycle does not.
+    depth : Length of the cylinder along its axis.
+    material : Of both bodies. In 3D it has nu = 0 by default, for which the tractions of Cattaneo
+        and Mindlin are exact.
+    mu : Friction coefficient.
+    force : Total normal force, positive in compression.
+    shear : Total tangential force.
+    elements : Number of elements across the contact half-width.
 
     Returns
     -------
-    Scene
-        Named 'cattaneo-2d' or 'cattaneo-3d', with the solution of Cattaneo and Mindlin.
+    Named 'cattaneo-2d' or 'cattaneo-3d', with the solution of Cattaneo and Mindlin.
 
     Raises
     ------
-    InputError
-        If a size is not positive, the contact would be too wide for the bodies, or the shear is beyond the friction
-        bound.
+    InputError : If a size is not positive, the contact would be too wide for the bodies, or the
+        shear is beyond the friction bound.
     """
     if dim not in (2, 3):
         raise InputError(f"dim must be 2 or 3; got {dim!r}.")
@@ -88,16 +82,23 @@ def cattaneo(
     check_positive(radius=radius, depth=depth, force=force)
     check_number("shear", shear)
     if shear != 0 and abs(shear) >= mu * force:
-        raise InputError(f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies slide off.")
+        raise InputError(
+            f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies slide"
+            " off."
+        )
     modulus = contact_modulus(material, material)
-    hertz = hertz_line(force / depth, radius, modulus) if dim == 2 else hertz_point(force, radius, modulus)
+    hertz = (
+        hertz_line(force / depth, radius, modulus)
+        if dim == 2
+        else hertz_point(force, radius, modulus)
+    )
     a, growth = hertz.half_width, GROWTH[dim]
     size = LARGE[dim] * a if size is None else size
     check_positive(size=size)
     if size < 2 * a or a > radius / 4:
         raise InputError(
-            f"the contact half-width would be {a:.3g}: too much for bodies of radius {radius:g} and size {size:g}; "
-            "lower the force or take stiffer or larger bodies."
+            f"the contact half-width would be {a:.3g}: too much for bodies of radius {radius:g} and"
+            f" size {size:g}; lower the force or take stiffer or larger bodies."
         )
 
     reference = _exact(dim, force, radius, depth, material, mu, [shear]) if shear else hertz
@@ -109,7 +110,9 @@ def cattaneo(
 
         contact = _towards_edges(stick, a, elements, growth)
         reach, h = contact[-1], a / elements
-        half = np.concatenate([contact, reach + graded(size - reach, reach - contact[-2], growth)[1:]])
+        half = np.concatenate(
+            [contact, reach + graded(size - reach, reach - contact[-2], growth)[1:]]
+        )
         rise = graded(size, h, growth)
         rise = rise if sign > 0 else -rise[::-1]
         if dim == 2:
@@ -139,8 +142,20 @@ def cattaneo(
     plate = Plate("far", {"x": shear, up: -force})
     return Scene(
         f"cattaneo-{dim}d",
-        Part("upper", lambda elements, zone: mesh(elements, 1.0), material, symmetry, (plate,), curve=paraboloid),
-        Part("lower", lambda elements, zone: mesh(elements, -1.0), material, (*symmetry, Support("far"))),
+        Part(
+            "upper",
+            lambda elements, zone: mesh(elements, 1.0),
+            material,
+            symmetry,
+            (plate,),
+            curve=paraboloid,
+        ),
+        Part(
+            "lower",
+            lambda elements, zone: mesh(elements, -1.0),
+            material,
+            (*symmetry, Support("far")),
+        ),
         mu,
         kind="plane-strain" if dim == 2 else "solid",
         thickness=depth if dim == 2 else 1.0,
@@ -152,22 +167,19 @@ def cattaneo(
 
 
 def shear_cycle(dim: int = 2, *, steps: int = 8, **changes: object) -> tuple[Scene, ...]:
-    """The states of cattaneo() under a cycle of shear: the normal force alone, shear up to its value, to the negative
+    """The states of cattaneo() under a cycle of shear: the normal force alone, shear up to its
+    value, to the negative
     of it, and back.
 
     Parameters
     ----------
-    dim
-        2 or 3, as for cattaneo().
-    steps
-        Number of states from zero to the largest shear. The whole path has 5 steps + 1 states.
-    changes
-        Arguments of cattaneo().
+    dim : 2 or 3, as for cattaneo().
+    steps : Number of states from zero to the largest shear. The whole path has 5 steps + 1 states.
+    changes : Arguments of cattaneo().
 
     Returns
     -------
-    tuple of Scene
-        The states in their order.
+    The states in their order.
     """
     check_count("steps", steps)
     scene = cattaneo(dim, **changes)  # type: ignore[arg-type]
@@ -185,18 +197,30 @@ def _sheared(scene: Scene, share: float) -> Scene:
 
 
 def _exact(
-    dim: int, force: float, radius: float, depth: float, material: Material, mu: float, shears: list[float]
+    dim: int,
+    force: float,
+    radius: float,
+    depth: float,
+    material: Material,
+    mu: float,
+    shears: list[float],
 ) -> Reference:
     modulus = contact_modulus(material, material)
     if dim == 2:
-        return hertz_line_tangential(force / depth, radius, modulus, mu, [shear / depth for shear in shears])
-    return hertz_point_tangential(force, radius, modulus, tangential_modulus(material, material), mu, shears)
+        return hertz_line_tangential(
+            force / depth, radius, modulus, mu, [shear / depth for shear in shears]
+        )
+    return hertz_point_tangential(
+        force, radius, modulus, tangential_modulus(material, material), mu, shears
+    )
 
 
 def _towards_edges(stick: float, half_width: float, elements: int, growth: float) -> np.ndarray:
-    """Grid of the candidate contact nodes, finer at the edges of stick and contact, where the tractions are steep.
+    """Grid of the candidate contact nodes, finer at the edges of stick and contact, where the
+    tractions are steep.
 
-    Elements of half_width / elements but for the edges; a stick zone too small for that has no grading of its own.
+    Elements of half_width / elements but for the edges; a stick zone too small for that has no
+    grading of its own.
     """
     largest = half_width / elements
 
@@ -212,4 +236,6 @@ def _towards_edges(stick: float, half_width: float, elements: int, growth: float
     if not 2 * SECTORS * largest + band < stick < half_width - largest:
         return np.concatenate([half_width - fine_end(half_width)[:0:-1], beyond])
     middle = fine_end((half_width - stick) / 2)
-    return np.concatenate([stick - fine_end(stick)[:0:-1], stick + middle, half_width - middle[-2:0:-1], beyond])
+    return np.concatenate(
+        [stick - fine_end(stick)[:0:-1], stick + middle, half_width - middle[-2:0:-1], beyond]
+    )

@@ -20,16 +20,20 @@ ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 class Simplification:
     """Something that may be left out of a scene.
 
-    name      'plane strain', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
+    name      'plane strain', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless
+              contacts'
     what      one sentence that says what is left out
     why       one or two sentences that say why, and how the error is known
-    before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and of the simplified one, counted from their meshes
+    before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and
+                    of the simplified one, counted from their meshes
     scene     the simplified scene
-    folds     how the scene that it is applied to lies on the simplified one, where both have the same answer; else empty
-    proof     certificate of the whole with what the simplified scene says of it; None where it was not computed
+    folds     how the scene that it is applied to lies on the simplified one, where both have the
+              same answer; else empty
+    proof     certificate of the whole with what the simplified scene says of it; None where it was
+              not computed
     error     relative error of a simplification that is not exact
-    check     function of the solved simplified scene that says in a sentence whether what was assumed holds; None where
-              nothing was assumed
+    check     function of the solved simplified scene that says in a sentence whether what was
+              assumed holds; None where nothing was assumed
     """
 
     name: str
@@ -56,7 +60,11 @@ class Simplification:
         elif self.folds:
             error = "no error, but not proved"
         else:
-            error = f"error about {self.error:.1e}" if self.error > ROUNDING else "no error on the coarse mesh"
+            error = (
+                f"error about {self.error:.1e}"
+                if self.error > ROUNDING
+                else "no error on the coarse mesh"
+            )
         (n, k), (m, c) = self.before, self.after
         return f"{n} -> {count(m, 'unknown')}, {k} -> {count(c, 'contact')}, {error}"
 
@@ -69,10 +77,11 @@ class Simplified:
     """What simplify() found.
 
     given    the scene that was asked about
-    scene    the scene after all simplifications that are exact, one after the other; the given one if there are none. Where no
-             proof was asked for, these are the simplifications that await it
-    found    the simplifications; the exact ones come first, and each begins with the scene that the one before leaves. The
-             others begin with `scene`
+    scene    the scene after all simplifications that are exact, one after the other; the given one
+             if there are none. Where no proof was asked for, these are the simplifications that
+             await it
+    found    the simplifications; the exact ones come first, and each begins with the scene that the
+             one before leaves. The others begin with `scene`
     notes    sentences about what nearly was a simplification, and what spoils it
     """
 
@@ -87,19 +96,25 @@ class Simplified:
             if each.name == name:
                 return each
         known = ", ".join(dict.fromkeys(each.name for each in self.found)) or "none"
-        raise InputError(f"scene '{self.given.name}' has no simplification {name!r}; found were: {known}.")
+        raise InputError(
+            f"scene '{self.given.name}' has no simplification {name!r}; found were: {known}."
+        )
 
     @property
     def needs(self) -> str:
         """One sentence: what is enough for this scene."""
         used = [each for each in self.found if each.folds]
         if not used:
-            return f"Scene '{self.given.name}' needs all of its model: nothing can be left out exactly."
+            return (
+                f"Scene '{self.given.name}' needs all of its model: nothing can be left out"
+                " exactly."
+            )
         (unknowns, contacts), first = used[-1].after, used[0].before
         doubt = "" if used[-1].exact else ", if the proof holds, which takes its solution"
         return (
-            f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}{doubt}: "
-            f"{count(unknowns, 'unknown')} instead of {first[0]}, {count(contacts, 'contact')} instead of {first[1]}."
+            f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}{doubt}:"
+            f" {count(unknowns, 'unknown')} instead of {first[0]}, {count(contacts, 'contact')}"
+            f" instead of {first[1]}."
         )
 
     def __str__(self) -> str:
@@ -109,7 +124,9 @@ class Simplified:
         return "\n".join([*lines, *(["", *self.notes] if self.notes else [])])
 
     def __repr__(self) -> str:
-        return line("Simplified", self.given.name, *(f"{each.name} ({each.price})" for each in self.found))
+        return line(
+            "Simplified", self.given.name, *(f"{each.name} ({each.price})" for each in self.found)
+        )
 
     def _repr_html_(self) -> str:
         rows: dict[str, object] = {}

@@ -31,7 +31,11 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
     scene, near = whole.scene, NEAR * whole.size
     component = scene.components[int(np.argmax(np.abs(plane.normal)))]
     heights = {name: float(np.mean(plane.height(mesh.p))) for name, mesh in whole.meshes.items()}
-    kept = {name for name, image in images.bodies.items() if name in heights and (image == name or heights[name] > 0)}
+    kept = {
+        name
+        for name, image in images.bodies.items()
+        if name in heights and (image == name or heights[name] > 0)
+    }
     pairs = tuple(pair for pair in scene.pairs if _keeps(pair, whole, images, kept, plane))
     rigid = {name for pair in pairs for name in pair.bodies if name in whole.rigid}
     bodies: list[Any] = []
@@ -41,7 +45,15 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
         elif isinstance(part, Rigid) and part.name in rigid:
             bodies.append(_half_rigid(images, part, component))
     if scene.contacts or len(pairs) != 1 or len(bodies) != 2:
-        made = replace(scene, upper=None, lower=None, mu=None, law="coulomb", bodies=tuple(bodies), contacts=pairs)
+        made = replace(
+            scene,
+            upper=None,
+            lower=None,
+            mu=None,
+            law="coulomb",
+            bodies=tuple(bodies),
+            contacts=pairs,
+        )
     else:
         made = with_pairs(replace(scene, upper=bodies[0], lower=bodies[1]), pairs)
     there = {("body", name) for name in kept | rigid} | {("pair", pair.name) for pair in pairs}
@@ -65,7 +77,9 @@ def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
         near = NEAR * float(np.ptp(mesh.p, axis=1).max())
         height = plane.height(mesh.p)[mesh.t]
         if np.any((height.min(axis=0) < -near) & (height.max(axis=0) > near)):
-            raise InputError("the plane of symmetry runs through elements; make meshes with edges in it.")
+            raise InputError(
+                "the plane of symmetry runs through elements; make meshes with edges in it."
+            )
         elements = np.flatnonzero(height.mean(axis=0) > 0)
         own = _restricted(mesh, elements)
         kept = {name: facets for name, facets in (own.boundaries or {}).items() if len(facets)}
@@ -95,12 +109,16 @@ def roller(whole: Whole) -> str:
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]
-        surfaces = [mesh.facets[:, mesh.boundaries[s]].ravel() for s in whole.scene.surfaces_of(part)]
+        surfaces = [
+            mesh.facets[:, mesh.boundaries[s]].ravel() for s in whole.scene.surfaces_of(part)
+        ]
         for support in part.supports:
             nodes = np.unique(mesh.facets[:, mesh.boundaries[support.boundary]])
             for component in support.displacement or {}:
                 row = mesh.p[whole.scene.components.index(component), nodes]
-                if np.ptp(row) < NEAR * whole.size and len(np.intersect1d(nodes, np.concatenate(surfaces))):
+                if np.ptp(row) < NEAR * whole.size and len(
+                    np.intersect1d(nodes, np.concatenate(surfaces))
+                ):
                     return f"the support on {support.boundary!r} of body '{name}'"
     return ""
 
@@ -112,20 +130,34 @@ def _keeps(pair: Any, whole: Whole, images: Images, kept: set[str], plane: Plane
         return False
     if images.pairs[pair.name] == pair.name or any(images.bodies[name] != name for name in elastic):
         return True  # cut by the plane, or the image is a pair of the body on the other side
-    corners = [whole.corners(pair.bodies[i], whole.surface_of(pair, i)) for i in (0, 1) if whole.surface_of(pair, i)]
+    corners = [
+        whole.corners(pair.bodies[i], whole.surface_of(pair, i))
+        for i in (0, 1)
+        if whole.surface_of(pair, i)
+    ]
     farthest = max((float(plane.height(c).mean()) for c in corners), key=abs)
-    return farthest > 0 if abs(farthest) > NEAR * whole.size else bool(pair.name < images.pairs[pair.name])
+    return (
+        farthest > 0
+        if abs(farthest) > NEAR * whole.size
+        else bool(pair.name < images.pairs[pair.name])
+    )
 
 
 def _half_rigid(images: Images, part: Rigid, component: str) -> Rigid:
     """Held along the normal if the plane cuts it, with both forces if it stands for two."""
     if images.bodies[part.name] != part.name:
         return replace(part, force=_doubled(part.force))
-    return replace(part, force=_without(part.force, component), displacement=_without(part.displacement, component))
+    return replace(
+        part,
+        force=_without(part.force, component),
+        displacement=_without(part.displacement, component),
+    )
 
 
 def _without(values: Any, component: str) -> Any:
-    return {name: value for name, value in values.items() if name != component} if values else values
+    return (
+        {name: value for name, value in values.items() if name != component} if values else values
+    )
 
 
 def _doubled(values: Any) -> Any:
@@ -135,7 +167,10 @@ def _doubled(values: Any) -> Any:
 def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component: str) -> Part:
     name, own = part.name, whole.meshes[part.name].boundaries or {}
     if images.bodies[name] != name:
-        loads = [replace(load, force=_doubled(load.force)) if isinstance(load, Plate) else load for load in part.loads]
+        loads = [
+            replace(load, force=_doubled(load.force)) if isinstance(load, Plate) else load
+            for load in part.loads
+        ]
         return replace(part, loads=tuple(loads))
     cut = f"symmetry {component}"
     while cut in own:
@@ -144,7 +179,9 @@ def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component
     def there(boundary: str) -> bool:
         return bool(plane.height(whole.corners(name, boundary)).max() > NEAR * whole.size)
 
-    supports = [item for item in part.supports if there(item.boundary)] + [Support(cut, {component: 0.0})]
+    supports = [item for item in part.supports if there(item.boundary)] + [
+        Support(cut, {component: 0.0})
+    ]
     made: list[Any] = []
     for number, load in enumerate(part.loads):
         if not isinstance(load, Plate):

@@ -88,7 +88,9 @@ def equal_functions(one: Any, other: Any, here: np.ndarray, there: np.ndarray) -
     return bool(np.all(np.abs(a - b) <= EQUAL * size + ROUNDED * size.max(initial=0.0)))
 
 
-def held_space(components: tuple[str, ...], values: Mapping[str, float] | None) -> tuple[np.ndarray, np.ndarray]:
+def held_space(
+    components: tuple[str, ...], values: Mapping[str, float] | None
+) -> tuple[np.ndarray, np.ndarray]:
     """The projection (dim, dim) on the components that have values, and these values (dim,)."""
     values = dict.fromkeys(components, 0.0) if values is None else values
     mask = np.array([component in values for component in components])
@@ -167,7 +169,9 @@ class _Comparison:
         for name, (image, _) in self.nodes.items():
             part, other = self.whole.parts[name], self.whole.parts[image]
             for surface in self.whole.scene.surfaces_of(part):
-                if not any(self.fits(name, surface, s) for s in self.whole.scene.surfaces_of(other)):
+                if not any(
+                    self.fits(name, surface, s) for s in self.whole.scene.surfaces_of(other)
+                ):
                     return None
             if part.material != other.material:
                 return f"the bodies '{name}' and '{image}' have different materials"
@@ -183,8 +187,14 @@ class _Comparison:
         for kind, where, P, v, item in _conditions(part, components):
             for other_kind, there, Q, w, other in others:
                 size = max(np.abs(v).max(), np.abs(w).max())
-                same = np.allclose(H @ P @ H, Q, atol=EQUAL) and np.all(np.abs(H @ v - w) <= EQUAL * size)
-                if kind == other_kind and same and (not where or self.fits(part.name, where, there)):
+                same = np.allclose(H @ P @ H, Q, atol=EQUAL) and np.all(
+                    np.abs(H @ v - w) <= EQUAL * size
+                )
+                if (
+                    kind == other_kind
+                    and same
+                    and (not where or self.fits(part.name, where, there))
+                ):
                     if item is other and isinstance(item, Plate):
                         own.add((part.name, part.loads.index(item)))
                     break
@@ -213,14 +223,19 @@ class _Comparison:
         swapped: set[str] = set()
         for pair in self.whole.scene.pairs:
             if images.get(pair.bodies[0]) == pair.bodies[1]:
-                return f"the contact '{pair.name}' lies in this plane itself, between a body and its own mirror image"
+                return (
+                    f"the contact '{pair.name}' lies in this plane itself, between a body and its"
+                    " own mirror image"
+                )
             reasons = [f"the contact '{pair.name}' has no mirror image"]
             for other in (pair, *self.whole.scene.pairs):
                 order = self._facing(pair, other, images)
                 reason = "" if order is None else self._pair_differs(pair, other, order)
                 if order is not None and not reason:
                     found[pair.name] = other.name
-                    images |= {pair.bodies[side]: other.bodies[there] for side, there in enumerate(order)}
+                    images |= {
+                        pair.bodies[side]: other.bodies[there] for side, there in enumerate(order)
+                    }
                     swapped |= {pair.name} if order == (1, 0) else set()
                     break
                 reasons = [reason, *reasons] if reason and len(reasons) == 1 else reasons
@@ -230,12 +245,16 @@ class _Comparison:
             return "rigid bodies are not each other's images"
         return Images(images, found, frozenset(own), frozenset(swapped))
 
-    def _facing(self, pair: Contact, other: Contact, images: Mapping[str, str]) -> tuple[int, int] | None:
+    def _facing(
+        self, pair: Contact, other: Contact, images: Mapping[str, str]
+    ) -> tuple[int, int] | None:
         """Which sides of the other pair are the images of the upper and the lower one."""
         for order in ((0, 1), (1, 0)):
             for side, there in enumerate(order):
                 body, image = pair.bodies[side], other.bodies[there]
-                if images.get(body, image) != image or (body in self.nodes) != (image in self.nodes):
+                if images.get(body, image) != image or (body in self.nodes) != (
+                    image in self.nodes
+                ):
                     break
                 surfaces = self.whole.surface_of(pair, side), self.whole.surface_of(other, there)
                 if body in self.nodes and not self.fits(body, *surfaces):
@@ -248,7 +267,9 @@ class _Comparison:
         """Half a sentence if two pairs have different laws, friction, gaps or rigid bodies."""
         if (pair.law, pair.coupling) != (other.law, other.coupling):
             return f"the contact '{pair.name}' has another law or coupling than its mirror image"
-        functions: list[tuple[str, Any, Any]] = [(f"friction of contact '{pair.name}'", pair.mu, other.mu)]
+        functions: list[tuple[str, Any, Any]] = [
+            (f"friction of contact '{pair.name}'", pair.mu, other.mu)
+        ]
         for side, there in enumerate(order):
             one = self.whole.rigid.get(pair.bodies[side])
             two = self.whole.rigid.get(other.bodies[there])
@@ -258,10 +279,14 @@ class _Comparison:
                     return reason
                 gap, image = (0.0 if each.gap is None else each.gap for each in (one, two))
                 functions.append((f"gap of rigid body '{one.name}'", gap, image))
-        x = np.concatenate([self.whole.acting(*surface) for surface in self.whole.surfaces(pair)], axis=1)
+        x = np.concatenate(
+            [self.whole.acting(*surface) for surface in self.whole.surfaces(pair)], axis=1
+        )
         for what, here, there_too in functions:
             if any(np.ndim(each) for each in (here, there_too) if not callable(each)):
-                return f"the {what} is no function of the place, and has no image to compare it with"
+                return (
+                    f"the {what} is no function of the place, and has no image to compare it with"
+                )
             if not equal_functions(here, there_too, x, self.plane.image(x)):
                 return f"the {what} is not symmetric"
         return ""

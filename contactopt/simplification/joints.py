@@ -66,15 +66,23 @@ def _offer(
     other = coarse(made)
     if not other.solution.solved:
         return None
-    listed = ("contact " if len(names) == 1 else "contacts ") + ", ".join(f"'{each}'" for each in names)
+    listed = ("contact " if len(names) == 1 else "contacts ") + ", ".join(
+        f"'{each}'" for each in names
+    )
     why = (
-        f"On a coarse mesh {why}. The error is the largest change of energy, contact forces and largest "
-        "pressures on that mesh."
+        f"On a coarse mesh {why}. The error is the largest change of energy, contact forces and"
+        " largest pressures on that mesh."
     )
     check: Callable[[Solved], str] = lambda simple: verdict(names, simple)  # noqa: E731
     sizes = sizes_of(scene), sizes_of(made)
     return Simplification(
-        f"{law} contacts", what.format(listed), why, *sizes, made, error=_change(solved, other), check=check
+        f"{law} contacts",
+        what.format(listed),
+        why,
+        *sizes,
+        made,
+        error=_change(solved, other),
+        check=check,
     )
 
 
@@ -84,7 +92,9 @@ def _use_of_friction(solved: Solved, pair: Pair, value: Any) -> float:
     mu = value(solved.reduction.problem.coordinates[:, pair.contacts]) if callable(value) else value
     if np.any(r[:, 0] <= 1e-6 * np.abs(r[:, 0]).max(initial=0.0)):
         return float("inf")
-    used = np.linalg.norm(r[:, 1:], axis=1) / np.maximum(np.asarray(mu, dtype=float) * r[:, 0], 1e-300)
+    used = np.linalg.norm(r[:, 1:], axis=1) / np.maximum(
+        np.asarray(mu, dtype=float) * r[:, 0], 1e-300
+    )
     return float(used.max(initial=0.0))
 
 
@@ -125,12 +135,16 @@ def _verdict_on_ties(friction: Mapping[str, Any]) -> Callable[[list[str], Solved
     def verdict(names: list[str], solved: Solved) -> str:
         broken = []
         for pair in solved.reduction.problem.pairs:
-            used = _use_of_friction(solved, pair, friction[pair.name]) if pair.name in names else 0.0
+            used = (
+                _use_of_friction(solved, pair, friction[pair.name]) if pair.name in names else 0.0
+            )
             if used > 1:
                 broken.append(f"'{pair.name}' would {'open' if np.isinf(used) else 'slip'}")
         if not broken:
             return "The tied contacts stay closed and below their friction bound, as was assumed."
-        return f"The assumption is violated: {', '.join(broken)}; solve the scene with friction there."
+        return (
+            f"The assumption is violated: {', '.join(broken)}; solve the scene with friction there."
+        )
 
     return verdict
 

@@ -29,7 +29,8 @@ RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial fo
 FEWEST = 4  # contacts inside the contact for its shape to be known
 ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
 SMALL = 1e-6  # tangential force over the normal one that counts as none
-AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
+# cosine to the normal of the contact from which on a side belongs to the surface about it
+AROUND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +39,11 @@ class Spot:
 
     half_width  of the contact [length];   force  total normal force
     shear       total tangential forces (dim - 1,) on the upper body, along the tangents
-    gap         the initial gap as a function of the distance from the middle (in 2D the place along the line)
+    gap         the initial gap as a function of the distance from the middle (in 2D the place along
+                the line)
     size        distance from the contact to the nearest end of an elastic body [length]
-    slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation [-]
+    slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation
+                [-]
     """
 
     half_width: float
@@ -59,20 +62,23 @@ class Spot:
 
 def offered_half_spaces(scene: Scene, solved: Solved) -> Found:
     """Half-spaces for the bodies of a scene, as a solution on a coarse mesh shows the contact."""
-    if scene.kind == "axisymmetric":  # a section costs less than the square of points of a half-space
+    # a section costs less than the square of points of a half-space
+    if scene.kind == "axisymmetric":
         return [], []
     spot = spot_of(solved)
     if isinstance(spot, str):
-        return [], [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
+        return [], (
+            [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
+        )
     size = f"{spot.size / spot.half_width:.3g} half-widths from the contact"
     if spot.error > WORST:
         error = f"{spot.error:.0%} in the peak pressure: the bodies end {size}"
         return [], [f"Half-spaces would make an error of about {error}."]
     made = as_half_spaces(scene, spot)
     why = (
-        f"The bodies end no nearer than {size}, and the gap rises by at most {spot.slope:.2g} per length "
-        "inside it. The error is that of the peak pressure and the half-width; the approach is another "
-        "one, because it depends on the whole bodies."
+        f"The bodies end no nearer than {size}, and the gap rises by at most {spot.slope:.2g} per"
+        " length inside it. The error is that of the peak pressure and the half-width; the"
+        " approach is another one, because it depends on the whole bodies."
     )
     what = "Half-spaces without a mesh stand for the bodies; their frame is the contact's own."
     sizes = sizes_of(scene), sizes_of(made)
@@ -107,8 +113,11 @@ def spot_of(solved: Solved) -> Spot | str:
     if isinstance(fitted, str):
         return fitted
     gap, slope, misfit = fitted
-    shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))  # that of mirror images cancels
-    return Spot(half_width, float(r[:, 0].sum()), shear, gap, _size(solved, touching), slope, misfit)
+    # that of mirror images cancels
+    shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))
+    return Spot(
+        half_width, float(r[:, 0].sum()), shear, gap, _size(solved, touching), slope, misfit
+    )
 
 
 def _gap(

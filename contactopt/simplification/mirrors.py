@@ -19,8 +19,8 @@ from contactopt.simplification.whole import Whole, sizes_of, whole_of
 ACROSS = 1e-6  # cosine below which two normals are across each other
 UNIQUE = "Exact wherever the solution is unique."
 NONE = (
-    "No plane makes the meshes their own mirror images. To use a symmetry of the bodies, mesh one half of them, hold it in the "
-    "plane along its normal, and set copies = 2."
+    "No plane makes the meshes their own mirror images. To use a symmetry of the bodies, mesh one"
+    " half of them, hold it in the plane along its normal, and set copies = 2."
 )
 
 
@@ -31,8 +31,11 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
     if planes and whole.scene.copies == 1 and (name := roller(whole)):
         return [], [
             *notes,
-            f"The scene is symmetric across the plane {planes[0].words(components)}, but is not cut: in a part of the bodies "
-            f"{name}, which holds a contact along one axis, would count as a plane of symmetry, too.",
+            (
+                f"The scene is symmetric across the plane {planes[0].words(components)}, but is not"
+                f" cut: in a part of the bodies {name}, which holds a contact along one axis, would"
+                " count as a plane of symmetry, too."
+            ),
         ]
     if not planes and not notes and whole.scene.copies == 1 and whole.scene.kind != "axisymmetric":
         notes.append(NONE)
@@ -44,17 +47,23 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
         if np.count_nonzero(plane.normal) > 1:
             if not found and whole.scene.copies == 1:
                 notes.append(
-                    f"The scene is symmetric across the plane {where}; turn it so that this is across an axis."
+                    f"The scene is symmetric across the plane {where}; turn it so that this is"
+                    " across an axis."
                 )
             continue
         try:
             scene, fold = half_of(whole, plane, images)
             made = whole_of(scene)
         except InputError as error:
-            notes.append(f"The scene is symmetric across the plane {where}, but is not cut: {error}")
+            notes.append(
+                f"The scene is symmetric across the plane {where}, but is not cut: {error}"
+            )
             continue
         assert made is not None
-        what = f"The {PARTS[2 ** (len(found) + 1)]} on one side of the plane {where} stands for the whole."
+        what = (
+            f"The {PARTS[2 ** (len(found) + 1)]} on one side of the plane {where} stands for the"
+            " whole."
+        )
         sizes = sizes_of(whole.scene), sizes_of(scene)
         found.append(Simplification("mirror symmetry", what, _why(images), *sizes, scene, (fold,)))
         whole = made
@@ -63,7 +72,10 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
 
 def _why(images: Images) -> str:
     """Why one half is enough, and what the numbers of the half stand for."""
-    text = f"Meshes, supports, loads, gaps and laws are their own mirror images. {UNIQUE} Forces and areas stay those of the whole"
+    text = (
+        f"Meshes, supports, loads, gaps and laws are their own mirror images. {UNIQUE} Forces and"
+        " areas stay those of the whole"
+    )
     if any(name != image for name, image in images.pairs.items()):
         return f"{text}; a contact that stands for itself and its image carries the forces of both."
     return f"{text}."

@@ -4,14 +4,15 @@ The part is solved. Its displacements and its contact tractions are mirrored, tu
 all nodes and contacts of the whole, which is assembled on its own meshes, with its own loads, gaps
 and friction. What is computed then contains nothing of the part but these numbers:
 
-    equilibrium   |A U - f - B' r| on unknowns that are free and the total forces of plates and rigid bodies, over the largest
-                  force on a node or plate
+    equilibrium   |A U - f - B' r| on unknowns that are free and the total forces of plates and
+                  rigid bodies, over the largest force on a node or plate
     supports      |U - g| on unknowns that are held, over the largest displacement of the body
-    contact       |r_i - P(r_i - rho_i u_i)| / F, the natural map at every contact, as in contactopt.problem.certificate
+    contact       |r_i - P(r_i - rho_i u_i)| / F, the natural map at every contact, as in
+                  contactopt.problem.certificate
 
-This takes products with the stiffness of the whole and no solve. In space it costs much less than the
-part saves. In the plane, where assembling is most of the work, a part pays if it is solved more than
-once, as in a search for an accuracy.
+This takes products with the stiffness of the whole and no solve. In space it costs much less than
+the part saves. In the plane, where assembling is most of the work, a part pays if it is solved more
+than once, as in a search for an accuracy.
 """
 
 from __future__ import annotations
@@ -33,31 +34,32 @@ from contactopt.simplification.constants import NEAR
 from contactopt.solving.solve_scene import Solved
 
 Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
-# ("body" or "pair", name), points (dim, k) of the larger scene -> the same of the smaller one, and matrices (k, dim, dim')
+# ("body" or "pair", name), points (dim, k) of the larger scene -> the same of the smaller one, and
+# matrices (k, dim, dim')
 # that take vectors there back to vectors here
 Fold = Callable[[Key, np.ndarray], tuple[Key, np.ndarray, np.ndarray]]
 
 
-def certificate_of_whole(whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]) -> float:
+def certificate_of_whole(
+    whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]
+) -> float:
     """How far the whole is from solved by what the part's solution says of it.
 
     Parameters
     ----------
-    whole
-        The scene that the part stands for, of elastic and rigid bodies.
-    elements, zone
-        The numbers for which the meshes of both were made.
-    part
-        The part, solved.
-    folds
-        How the whole lies on the part, one step after the other.
+    whole : The scene that the part stands for, of elastic and rigid bodies.
+    elements, zone : The numbers for which the meshes of both were made.
+    part : The part, solved.
+    folds : How the whole lies on the part, one step after the other.
 
     Returns
     -------
-    The largest of the errors in the head of this module [-]; infinite where nodes or contacts of the
-    whole have no place in the part.
+    The largest of the errors in the head of this module [-]; infinite where nodes or contacts of
+    the whole have no place in the part.
     """
-    bodies: dict[str, Any] = {each.name: assemble(whole, each, elements, zone) for each in whole.parts}
+    bodies: dict[str, Any] = {
+        each.name: assemble(whole, each, elements, zone) for each in whole.parts
+    }
     spread = Spread(part, folds)
     errors = [0.0]
     try:
@@ -79,7 +81,9 @@ def certificate_of_whole(whole: Scene, elements: int, zone: float | None, part: 
     for each in whole.parts:
         U, F = moves[each.name], forces[each.name]
         rigid = isinstance(each, Rigid)
-        errors.append(_rigid(whole, each, U, F) if rigid else _elastic(bodies[each.name].body, U, F))
+        errors.append(
+            _rigid(whole, each, U, F) if rigid else _elastic(bodies[each.name].body, U, F)
+        )
     return max(errors) if np.all(np.isfinite(errors)) else np.inf
 
 
@@ -89,7 +93,9 @@ class Spread:
     def __init__(self, part: Solved, folds: Sequence[Fold]):
         self.part, self.folds = part, folds
         reduction, solution = part.reduction, part.solution
-        self.displaced = {body.name: U for body, U in zip(reduction.bodies, reduction.displaced(solution))}
+        self.displaced = {
+            body.name: U for body, U in zip(reduction.bodies, reduction.displaced(solution))
+        }
         self.bodies: dict[str, Any] = {body.name: body for body in reduction.bodies}
         u = reduction.problem.displacements(solution.reactions, solution.multipliers)
         d = np.asarray(reduction.problem.Q @ solution.reactions.ravel()).reshape(u.shape)
@@ -147,14 +153,19 @@ def _elastic(body: Assembly, U: np.ndarray, force: np.ndarray) -> float:
     inner = body.A @ U
     missing = inner - body.load - force
     plates = body.motion.T @ missing - body.plate_forces
-    scale = max(float(np.abs(each).max(initial=0.0)) for each in (inner, body.load, force, body.plate_forces))
+    scale = max(
+        float(np.abs(each).max(initial=0.0))
+        for each in (inner, body.load, force, body.plate_forces)
+    )
     driven = body.motion / np.maximum(body.motion.sum(axis=0), 1.0)
     beyond = U - body.prescribed
     beyond = beyond - body.motion @ (driven.T @ beyond)
     beyond[body.free] = 0.0
     left = np.abs(np.concatenate([missing[body.free], plates])).max(initial=0.0)
     size = float(np.abs(U).max(initial=0.0))
-    return float(max(left / max(scale, 1e-300), np.abs(beyond).max(initial=0.0) / max(size, 1e-300)))
+    return float(
+        max(left / max(scale, 1e-300), np.abs(beyond).max(initial=0.0) / max(size, 1e-300))
+    )
 
 
 def _rigid(whole: Scene, body: Any, U: np.ndarray, force: np.ndarray) -> float:
@@ -162,7 +173,11 @@ def _rigid(whole: Scene, body: Any, U: np.ndarray, force: np.ndarray) -> float:
     errors = [0.0]
     for number, name in enumerate(whole.components):
         if name in (body.force or {}):
-            asked, wrong, own = body.force[name], force[number] + body.force[name], force[: whole.dim]
+            asked, wrong, own = (
+                body.force[name],
+                force[number] + body.force[name],
+                force[: whole.dim],
+            )
         else:
             asked = (body.displacement or {}).get(name, 0.0)
             wrong, own = U[number] - asked, U[: whole.dim]

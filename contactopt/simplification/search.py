@@ -24,24 +24,20 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
 
     Parameters
     ----------
-    scene
-        Of elastic and rigid bodies. Scenes of half-spaces are returned as they are.
-    solve
-        Whether to solve the part that stands for the scene, which proves that it does
+    scene : Of elastic and rigid bodies. Scenes of half-spaces are returned as they are.
+    solve : Whether to solve the part that stands for the scene, which proves that it does
         (contactopt.simplification.proof), and to solve the scene once on a coarse mesh, which shows
-        contacts that neither open nor slip, contacts whose friction hardly acts, and contacts that are
-        small beside their bodies. Without it only symmetries are looked for, and nothing is called
-        exact. A mesh that is given is not made coarser.
+        contacts that neither open nor slip, contacts whose friction hardly acts, and contacts that
+        are small beside their bodies. Without it only symmetries are looked for, and nothing is
+        called exact. A mesh that is given is not made coarser.
 
     Returns
     -------
-    Simplified
-        A report that prints as text, with the simplified scenes.
+    A report that prints as text, with the simplified scenes.
 
     Raises
     ------
-    InputError
-        For something else than a scene, and for a scene that cannot be modelled.
+    InputError : For something else than a scene, and for a scene that cannot be modelled.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
@@ -55,7 +51,10 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
     if part is None or not scene.given:
         part = coarse(made.scene)
     if not part.solution.solved:
-        told = f"The scene was not solved on a coarse mesh ({part.solution.message}); contacts were not looked at."
+        told = (
+            f"The scene was not solved on a coarse mesh ({part.solution.message}); contacts were"
+            " not looked at."
+        )
         return replace(made, notes=(*made.notes, told))
     more = offered_joints(made.scene, part)
     spot, notes = offered_half_spaces(made.scene, part)
@@ -67,21 +66,17 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
 
     Parameters
     ----------
-    scene
-        What to solve.
-    options
-        How to solve it; its `note` is told what was found.
+    scene : What to solve.
+    options : How to solve it; its `note` is told what was found.
 
     Returns
     -------
-    tuple
-        The report, whose `scene` is the given one where nothing was proved, and the solution of that
-        part on its own mesh; None in place of it where nothing was proved.
+    The report, whose `scene` is the given one where nothing was proved, and the solution of that
+    part on its own mesh; None in place of it where nothing was proved.
 
     Raises
     ------
-    InputError
-        As simplify().
+    InputError : As simplify().
     """
     notes: list[str] = []
     chain: list[Simplification] = []
@@ -121,8 +116,8 @@ def _proved(
         part = solve_zone(last.scene, options=options)
         if unknowns > MOST:
             text = (
-                f"The whole has {unknowns} unknowns, too many to be assembled: that the part stands "
-                "for it is not proved."
+                f"The whole has {unknowns} unknowns, too many to be assembled: that the part stands"
+                " for it is not proved."
             )
             return chain, [*notes, text], part
         why = f"the part was not solved ({part.solution.message})"

@@ -79,7 +79,9 @@ def _prisms(whole: Whole) -> Iterator[_Prism]:
     if any(mesh.refdom.__name__ != "RefHex" for mesh in whole.meshes.values()):
         return
     for axis in range(3):
-        prism = _Prism(whole, axis, (float(whole.points[axis].min()), float(whole.points[axis].max())))
+        prism = _Prism(
+            whole, axis, (float(whole.points[axis].min()), float(whole.points[axis].max()))
+        )
         for mesh in whole.meshes.values():
             first, last = (np.unique(mesh.facets[:, prism.on_end(mesh, end)]) for end in prism.ends)
             if not len(first) or len(first) != len(last):
@@ -105,7 +107,9 @@ def _spoils(prism: _Prism) -> str:
         for load in part.loads:
             if load.force.get(component) if isinstance(load, Plate) else load.value[prism.axis]:
                 where = "" if isinstance(load, BodyForce) else f" on {load.boundary!r}"
-                return f"the {type(load).__name__.lower()}{where} of body '{name}' acts along the axis"
+                return (
+                    f"the {type(load).__name__.lower()}{where} of body '{name}' acts along the axis"
+                )
     for pair in whole.scene.pairs:
         gaps = [whole.rigid[name].gap for name in pair.bodies if name in whole.rigid]
         functions = [function for function in (pair.mu, *gaps) if function is not None]
@@ -131,8 +135,8 @@ def _simplification(prism: _Prism, component: str) -> Simplification:
 
     what = "A section in plane strain stands for the bodies."
     why = (
-        f"The bodies are prisms along {component}, their ends are held along it, and nothing changes or "
-        "acts along it. Exact wherever the solution is unique."
+        f"The bodies are prisms along {component}, their ends are held along it, and nothing"
+        " changes or acts along it. Exact wherever the solution is unique."
     )
     sizes = sizes_of(prism.whole.scene), sizes_of(scene)
     return Simplification("plane strain", what, why, *sizes, scene, (fold,))
@@ -164,9 +168,11 @@ def _flattened(prism: _Prism) -> Scene:
             if support.boundary in there and values(support.displacement) != {}
         ]
         loads = [
-            replace(load, force=values(load.force))
-            if isinstance(load, Plate)
-            else replace(load, value=tuple(load.value[axis] for axis in axes))
+            (
+                replace(load, force=values(load.force))
+                if isinstance(load, Plate)
+                else replace(load, value=tuple(load.value[axis] for axis in axes))
+            )
             for load in part.loads
             if isinstance(load, BodyForce) or load.boundary in there
         ]

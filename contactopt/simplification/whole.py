@@ -64,7 +64,11 @@ class Whole:
         if (body, boundary) not in self._acting:
             corners, curve = self.corners(body, boundary), self.parts[body].curve_of(boundary)
             x = lattice_points(corners)
-            on = x if curve is None else np.concatenate([x, np.asarray(curve(x), dtype=float)], axis=1)
+            on = (
+                x
+                if curve is None
+                else np.concatenate([x, np.asarray(curve(x), dtype=float)], axis=1)
+            )
             self._acting[body, boundary] = on
         return self._acting[body, boundary]
 
@@ -109,14 +113,19 @@ def sizes_of(scene: Scene) -> tuple[int, int]:
             numbers = skfem.Dofs(mesh, SHAPES[mesh.refdom.__name__][1][scene.degree]())
             unknowns += scene.dim * int(numbers.N)
             for name in scene.surfaces_of(part):
-                nodes[part.name, name] = len(numbers.get_facet_dofs(mesh.boundaries[name]).flatten())
+                nodes[part.name, name] = len(
+                    numbers.get_facet_dofs(mesh.boundaries[name]).flatten()
+                )
         elif isinstance(part, HalfSpace):
             grid = [len(row) for row in part.ticks(scene.elements, scene.zone, scene.dim - 1)]
             unknowns += scene.dim * int(np.prod(grid))
             nodes[part.name, "contact"] = int(np.prod(grid))
     usual = {part.name: getattr(part, "contact", "contact") for part in scene.parts}
     counts = [
-        max(nodes.get((body, name or usual[body]), 0) for body, name in zip(pair.bodies, pair.surfaces))
+        max(
+            nodes.get((body, name or usual[body]), 0)
+            for body, name in zip(pair.bodies, pair.surfaces)
+        )
         for pair in scene.pairs
         if pair.law != "tied"
     ]
@@ -126,7 +135,15 @@ def sizes_of(scene: Scene) -> tuple[int, int]:
 def with_pairs(scene: Scene, pairs: tuple[Contact, ...]) -> Scene:
     """The scene with other pairs of surfaces, in its short form if it has one and they fit."""
     if scene.contacts or len(pairs) != 1:
-        return replace(scene, upper=None, lower=None, mu=None, law="coulomb", bodies=scene.parts, contacts=pairs)
+        return replace(
+            scene,
+            upper=None,
+            lower=None,
+            mu=None,
+            law="coulomb",
+            bodies=scene.parts,
+            contacts=pairs,
+        )
     return replace(scene, mu=pairs[0].mu, law=pairs[0].law)
 
 

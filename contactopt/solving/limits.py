@@ -1,4 +1,6 @@
-"""Bounds on what a search for an accuracy may take, and the sentences that say which of them ended it."""
+"""Bounds on what a search for an accuracy may take, and the sentences that say which of them ended
+it.
+"""
 
 from __future__ import annotations
 
@@ -37,25 +39,26 @@ class Limits:
 
         Parameters
         ----------
-        unknowns
-            Unknowns that it would have.
-        usual
-            The bound on them where none was given.
-        seconds
-            Time that the search would have taken at its end [s].
-        memory
-            Memory that would be held at its end [bytes].
+        unknowns : Unknowns that it would have.
+        usual : The bound on them where none was given.
+        seconds : Time that the search would have taken at its end [s].
+        memory : Memory that would be held at its end [bytes].
 
         Returns
         -------
-        str
-            One sentence; an empty text if the mesh passes no bound.
+        One sentence; an empty text if the mesh passes no bound.
         """
         most = usual if self.unknowns is None else self.unknowns
         if unknowns > most:
             return f"to go on would take up to {unknowns:,.0f} unknowns, more than {most:,}"
         if seconds > self.seconds:
-            return f"to go on would take about {seconds:.2g} s in all, more than the time limit of {self.seconds:g} s"
+            return (
+                f"to go on would take about {seconds:.2g} s in all, more than the time limit of"
+                f" {self.seconds:g} s"
+            )
         if memory > self.memory * GIGABYTE:
-            return f"to go on would take about {memory / GIGABYTE:.2g} GB of memory, more than {self.memory:g} GB"
+            return (
+                f"to go on would take about {memory / GIGABYTE:.2g} GB of memory, more than"
+                f" {self.memory:g} GB"
+            )
         return ""

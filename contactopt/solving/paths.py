@@ -1,17 +1,22 @@
-"""Load paths: a sequence of load states, slip measured from the last converged state (the paper's 'quasistatic').
+"""Load paths: a sequence of load states, slip measured from the last converged state (the paper's
+'quasistatic').
 
-Coulomb's law in its rate form, friction against the slip velocity, is integrated by implicit Euler steps: step n is
-the static problem of contactopt.problem with u_t replaced by the slip of the step, u_t - u_t(n-1), that is with q_t
-shifted by -u_t(n-1). Normal displacements (gaps) and plate displacements stay total; Q and V do not change.
+Coulomb's law in its rate form, friction against the slip velocity, is integrated by implicit Euler
+steps: step n is the static problem of contactopt.problem with u_t replaced by the slip of the step,
+u_t - u_t(n-1), that is with q_t shifted by -u_t(n-1). Normal displacements (gaps) and plate
+displacements stay total; Q and V do not change.
 
-Energy of a step, exact for the discrete bodies because they are linear. With F the nodal forces on a body (of loads,
-supports and plates), r the contact forces, E the elastic energy and a bar for the mean of the states n-1 and n,
+Energy of a step, exact for the discrete bodies because they are linear. With F the nodal forces on
+a body (of loads, supports and plates), r the contact forces, E the elastic energy and a bar for the
+mean of the states n-1 and n,
 
-    W = sum F-bar' dU  =  dE + D,   D = -r-bar' du                                                    (midpoint work)
+    W = sum F-bar' dU  =  dE + D,   D = -r-bar' du
+                       (midpoint work)
 
-whatever law gave r. Of D, friction dissipates what Coulomb's law says, D_f = -r_t(n)' du_t = sum mu r_n |du_t| >= 0;
-the rest, D - D_f = r_n(n)' u_n(n-1) + (r(n) - r(n-1))' du / 2, is the error of the step in energy: second order in its
-size, zero where neither contact nor the direction and bound of slip change.
+whatever law gave r. Of D, friction dissipates what Coulomb's law says, D_f = -r_t(n)' du_t = sum mu
+r_n |du_t| >= 0; the rest, D - D_f = r_n(n)' u_n(n-1) + (r(n) - r(n-1))' du / 2, is the error of the
+step in energy: second order in its size, zero where neither contact nor the direction and bound of
+slip change.
 """
 
 from __future__ import annotations
@@ -47,11 +52,14 @@ class State:
     """One converged state of a path.
 
     q, s           of the step's problem: q_t is measured from the state before [length], [force]
-    displacements  u (k, dim), total: gap, tangential displacement [length];  slip (k, dim - 1) of this step [length]
-    apart          (dim,) relative displacement of the bodies, had they no contact: minus approach, shift [length]
-    elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D [force length]
-    bodies         displacements (n,) of every body [length]; empty for bodies of more than KEPT unknowns, and for those on other
-                   ranks
+    displacements  u (k, dim), total: gap, tangential displacement [length];  slip (k, dim - 1) of
+                   this step [length]
+    apart          (dim,) relative displacement of the bodies, had they no contact: minus approach,
+                   shift [length]
+    elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D
+                   [force length]
+    bodies         displacements (n,) of every body [length]; empty for bodies of more than KEPT
+                   unknowns, and for those on other ranks
     """
 
     scene: Scene
@@ -87,9 +95,15 @@ class PathResult:
         return line("PathResult", scene.name, count(len(self.states), "state"), f"{solved} solved")
 
     def _repr_html_(self) -> str:
-        rows = {"states": len(self.states), "solved": sum(state.solution.solved for state in self.states)}
+        rows = {
+            "states": len(self.states),
+            "solved": sum(state.solution.solved for state in self.states),
+        }
         worst = max(float(state.solution.residual) for state in self.states)
-        return card(f"Load path of {self.states[-1].scene.name}", rows | {"largest residual": f"{worst:.2e}"})
+        return card(
+            f"Load path of {self.states[-1].scene.name}",
+            rows | {"largest residual": f"{worst:.2e}"},
+        )
 
     @property
     def solved(self) -> bool:
@@ -108,13 +122,11 @@ class PathResult:
 
         Parameters
         ----------
-        step
-            The number of the state, from 0 on.
+        step : The number of the state, from 0 on.
 
         Returns
         -------
-        InterfaceProblem
-            The problem with the gaps and resultants of that state.
+        The problem with the gaps and resultants of that state.
         """
         return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
 
@@ -122,44 +134,52 @@ class PathResult:
     def history(self) -> dict[str, np.ndarray]:
         """One value per state (n,), energies summed from the unloaded bodies on.
 
-        normal_force, shear_force    that press and push the upper body on the lower, the latter along t1 [force]
+        normal_force, shear_force    that press and push the upper body on the lower, the latter
+                                     along t1 [force]
         approach, shift              of the bodies, in the same directions [length]
         contact_half_width, stick_half_width [length];  contact_nodes, stick_nodes, slip_nodes
-        elastic_energy, external_work, friction_work, step_work [force length]: external_work is the sum of the others
-        energy_error                 of that sum in this step, relative to the largest work or energy so far
+        elastic_energy, external_work, friction_work, step_work [force length]: external_work is the
+        sum of the others
+        energy_error                 of that sum in this step, relative to the largest work or
+                                     energy so far
         residual, iterations, seconds   of the solve
         """
         rows = [_row(self.reduction.problem, state) for state in self.states]
         history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         elastic = history["elastic_energy"]
-        error = np.abs(history["external_work"] - np.diff(elastic, prepend=0.0) - history["step_work"])
+        error = np.abs(
+            history["external_work"] - np.diff(elastic, prepend=0.0) - history["step_work"]
+        )
         history["step_work"] = history["step_work"] - history["friction_work"]
         for name in ("external_work", "friction_work", "step_work"):
             history[name] = np.cumsum(history[name])
         largest = np.maximum.accumulate(np.maximum(np.abs(history["external_work"]), elastic))
-        history["energy_error"] = np.divide(error, largest, out=np.zeros_like(error), where=largest > 0)
+        history["energy_error"] = np.divide(
+            error, largest, out=np.zeros_like(error), where=largest > 0
+        )
         return history
 
     def fields(self, step: int) -> tuple[Fields, ...]:
-        """Displacement and stress of the elastic bodies at a state; empty where the state keeps no displacements."""
+        """Displacement and stress of the elastic bodies at a state; empty where the state keeps no
+        displacements.
+        """
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
         return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
 
     def write(self, out: str | Path) -> None:
-        """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
+        """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and
+        displacements (n, k, dim).
 
-        It also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1 stick, 2 slip, and the contact frames
-        (k, dim, dim), one direction per row, normal first.
+        It also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1 stick, 2
+        slip, and the contact frames (k, dim, dim), one direction per row, normal first.
 
         Parameters
         ----------
-        out
-            The folder, which is made if it does not exist.
+        out : The folder, which is made if it does not exist.
 
         Raises
         ------
-        InputError
-            Where the files cannot be written.
+        InputError : Where the files cannot be written.
         """
         problem = self.reduction.problem
         forces = [state.solution.reactions for state in self.states]
@@ -195,9 +215,11 @@ def follow(
     Parameters
     ----------
     scenes : states that differ in their loads only: forces, tractions, prescribed displacements
-    elements : across the contact half-width; the scene's own number by default. One mesh serves the whole path.
+    elements : across the contact half-width; the scene's own number by default. One mesh serves the
+        whole path.
     zone : half-width that the mesh resolves [length]; by default the scene's
-    note : receives one short sentence after every state, "state 17 of 41: ..." where the number of states is known
+    note : receives one short sentence after every state, "state 17 of 41: ..." where the number of
+        states is known
     Q, solver : form of Q and solver of the bodies, as for reduce()
     settings : arguments of solve(). Each step starts from the solution of the one before.
 
@@ -216,7 +238,10 @@ def follow(
 
 
 def _follow_states(
-    scenes: Iterable[Scene], elements: int | None = None, zone: float | None = None, options: Options | None = None
+    scenes: Iterable[Scene],
+    elements: int | None = None,
+    zone: float | None = None,
+    options: Options | None = None,
 ) -> PathResult:
     """As follow(), with the options of contactopt.solving.solve_scene."""
     options = options or Options()
@@ -241,9 +266,13 @@ def _follow_states(
 
 
 def solve_states(
-    states: Sequence[Scene], elements: int | None = None, options: Options | None = None, start: Solved | None = None
+    states: Sequence[Scene],
+    elements: int | None = None,
+    options: Options | None = None,
+    start: Solved | None = None,
 ) -> Solved:
-    """Solve a scene on meshes fitted to its contact zone, or follow the load path of several states on one mesh.
+    """Solve a scene on meshes fitted to its contact zone, or follow the load path of several states
+    on one mesh.
 
     Parameters
     ----------
@@ -268,8 +297,10 @@ def solve_states(
 
 @dataclass(frozen=True, eq=False)
 class _Mechanics:
-    """What energies are made of: contact forces r and displacements u, both (k, dim), of each body the displacements U
-    and the external forces F on them, and the elastic energy of all bodies."""
+    """What energies are made of: contact forces r and displacements u, both (k, dim), of each body
+    the displacements U
+    and the external forces F on them, and the elastic energy of all bodies.
+    """
 
     r: np.ndarray
     u: np.ndarray
@@ -278,7 +309,9 @@ class _Mechanics:
     elastic: float = 0.0
 
 
-def _state(solved: Solved, before: State | None, last: _Mechanics | None) -> tuple[State, _Mechanics]:
+def _state(
+    solved: Solved, before: State | None, last: _Mechanics | None
+) -> tuple[State, _Mechanics]:
     """What is kept of a state, given the one before it, and the state of the bodies."""
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
@@ -302,7 +335,10 @@ def _state(solved: Solved, before: State | None, last: _Mechanics | None) -> tup
         (now.u - earlier)[:, 1:],
         np.average(moved, axis=0, weights=problem.areas),
         now.elastic,
-        external=sum(float((F + F0) @ (U - U0)) for F, F0, U, U0 in zip(now.F, last.F, now.U, last.U)) / 2,
+        external=sum(
+            float((F + F0) @ (U - U0)) for F, F0, U, U0 in zip(now.F, last.F, now.U, last.U)
+        )
+        / 2,
         contact=-float(np.sum((now.r + last.r) * (now.u - last.u))) / 2,
         bodies=_kept(U),
     )
@@ -323,7 +359,9 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
         "approach": -float(state.apart[0]),
         "shift": float(state.apart[1]),
         "contact_half_width": contact_edge(state.scene, problem, r) if single else np.nan,
-        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0] if single else np.nan,
+        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0]
+        if single
+        else np.nan,
         "contact_nodes": int(status.touching.sum()),
         "stick_nodes": int(status.stick.sum()),
         "slip_nodes": int(status.slip.sum()),

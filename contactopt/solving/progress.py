@@ -1,4 +1,6 @@
-"""One line per outer iteration of a solve that takes long: what it has reached, what it took, what is left."""
+"""One line per outer iteration of a solve that takes long: what it has reached, what it took, what
+is left.
+"""
 
 from __future__ import annotations
 
@@ -15,26 +17,26 @@ from contactopt.problem import InterfaceProblem
 PATIENCE = 5.0  # seconds of a solve about which nothing is said
 
 
-def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: float) -> Callable[[int, float], None]:
-    """Make a function for the `progress` of contactopt.solve that says a line for each outer iteration.
+def progress_lines(
+    say: Callable[[str], None], problem: InterfaceProblem, tol: float
+) -> Callable[[int, float], None]:
+    """Make a function for the `progress` of contactopt.solve that says a line for each outer
+    iteration.
 
-    It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the V-cycles where the
-    method works on the bodies themselves, the time, the largest memory of the process so far, and the time that is left
-    if the residual goes on falling as it fell in the last iteration.
+    It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the
+    V-cycles where the method works on the bodies themselves, the time, the largest memory of the
+    process so far, and the time that is left if the residual goes on falling as it fell in the last
+    iteration.
 
     Parameters
     ----------
-    say
-        A function that receives each line.
-    problem
-        The interface problem that is solved.
-    tol
-        The residual at which the solve will end.
+    say : A function that receives each line.
+    problem : The interface problem that is solved.
+    tol : The residual at which the solve will end.
 
     Returns
     -------
-    callable
-        A function of the number of the iteration and of its residual.
+    A function of the number of the iteration and of its residual.
     """
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
@@ -48,8 +50,8 @@ def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: f
             return
         cycles = "" if form is None else f", {form.cycles - first} V-cycles of each body"
         say(
-            f"step {iteration}: residual {residual:.1e}{cycles}, {spent:.0f} s, {_peak_memory() / 2**30:.1f} GiB"
-            + remaining(before, tol)
+            f"step {iteration}: residual {residual:.1e}{cycles}, {spent:.0f} s,"
+            f" {_peak_memory() / 2**30:.1f} GiB" + remaining(before, tol)
         )
 
     return progress
@@ -60,15 +62,12 @@ def remaining(steps: list[tuple[float, float]], tol: float) -> str:
 
     Parameters
     ----------
-    steps
-        The seconds spent [s] and the residual after each step.
-    tol
-        The residual at which the solve will end.
+    steps : The seconds spent [s] and the residual after each step.
+    tol : The residual at which the solve will end.
 
     Returns
     -------
-    str
-        ", about T s left"; nothing where the residual did not fall or is small enough.
+    ", about T s left"; nothing where the residual did not fall or is small enough.
     """
     if len(steps) < 2:
         return ""
@@ -89,8 +88,7 @@ def resident_memory() -> float:
 
     Returns
     -------
-    float
-        Bytes; 0 where the system does not tell.
+    Bytes; 0 where the system does not tell.
     """
     try:
         return float(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()

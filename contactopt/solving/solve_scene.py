@@ -1,8 +1,9 @@
 """The one place that solves a scene: reduce it to its interface, find a start, solve.
 
-Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with a scene. solve_loaded() goes
-on with the same bodies under other loads. contactopt.solving.zone remeshes to the contact zone, contactopt.solving.paths
-follows a load path, and contactopt.accuracy refines meshes around both.
+Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with
+a scene. solve_loaded() goes on with the same bodies under other loads. contactopt.solving.zone
+remeshes to the contact zone, contactopt.solving.paths follows a load path, and contactopt.accuracy
+refines meshes around both.
 """
 
 from __future__ import annotations
@@ -46,8 +47,10 @@ class Options:
     solver : of the bodies' linear systems, as for contactopt.reduce
     method : as for contactopt.solve
     tol : bound on the natural-map residual
-    settings : further arguments of contactopt.solve: limits, and settings of a method that is given by its name
-    note : receives one short sentence before every step that takes time, and in long solves one after each iteration
+    settings : further arguments of contactopt.solve: limits, and settings of a method that is given
+        by its name
+    note : receives one short sentence before every step that takes time, and in long solves one
+        after each iteration
     """
 
     Q: str = "auto"
@@ -67,13 +70,15 @@ class Options:
 class Solved:
     """A scene that was reduced and solved.
 
-    `solution.seconds` holds the wall time [s] of each phase, summed over all that led to this solution: `assemble`,
-    `factorise` and `compliance` of the bodies, `load` of further states of a path, `solve` of the interface problem by
-    the method, and `coarse` for everything that was done on coarser meshes.
+    `solution.seconds` holds the wall time [s] of each phase, summed over all that led to this
+    solution: `assemble`, `factorise` and `compliance` of the bodies, `load` of further states of a
+    path, `solve` of the interface problem by the method, and `coarse` for everything that was done
+    on coarser meshes.
 
-    zones  half-widths of the contact zone [length]: for which the first mesh was made, and read from each solution; none
-           if the scene has no zone
-    path   all states of a load path, of which this is the last one; None where there is one state only
+    zones  half-widths of the contact zone [length]: for which the first mesh was made, and read
+           from each solution; none if the scene has no zone
+    path   all states of a load path, of which this is the last one; None where there is one state
+           only
     """
 
     reduction: Reduction
@@ -93,27 +98,22 @@ def solve_scene(
 
     Parameters
     ----------
-    scene
-        What to solve.
-    elements
-        Number across the contact half-width; the scene's own number by default.
-    zone
-        Half-width of contact that the mesh resolves [length]; the scene's first guess by default.
-    options
-        How to solve it.
-    start
-        The same scene solved on another mesh, to start from. Without one, where Newton's steps take products with Q,
-        the scene is first solved on a coarser mesh, if its bodies can make one.
+    scene : What to solve.
+    elements : Number across the contact half-width; the scene's own number by default.
+    zone : Half-width of contact that the mesh resolves [length]; the scene's first guess by
+        default.
+    options : How to solve it.
+    start : The same scene solved on another mesh, to start from. Without one, where Newton's steps
+        take products with Q, the scene is first solved on a coarser mesh, if its bodies can make
+        one.
 
     Returns
     -------
-    Solved
-        The reduction and its solution. The solution says itself whether it is certified.
+    The reduction and its solution. The solution says itself whether it is certified.
 
     Raises
     ------
-    InputError
-        On a scene that cannot be modelled, or options that do not fit.
+    InputError : On a scene that cannot be modelled, or options that do not fit.
     """
     options = options or Options()
     if not isinstance(scene, Scene):
@@ -124,14 +124,19 @@ def solve_scene(
     coarse: dict[str, float] = {}
     operator = reduction.problem.Q
     products = isinstance(operator, InterfaceOperator) and operator.coupled is None
-    products = products and not isinstance(operator, Convolution)  # half-spaces have coarse grids of their own
+    # half-spaces have coarse grids of their own
+    products = products and not isinstance(operator, Convolution)
     coarser = elements // FACTOR[scene.dim]
     if start is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         coarse = {"coarse": time.perf_counter() - begin}
     options.note(f"solving {reduction.problem.contacts} contacts")
-    first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
+    first = (
+        None
+        if start is None
+        else transfer(start.reduction.problem, start.solution, reduction.problem)
+    )
     solved = _solved(reduction, first, options, coarse)
     log.info("%s: %d elements, %s", scene.name, elements, solved.solution.status)
     return solved
@@ -144,7 +149,8 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
     ----------
     scene : the state, which differs from the one before in its loads only
     before : the state before, whose solution is the start
-    slipped : (k, dim - 1) tangential displacements of the contacts in the state before, from which slip is measured [length]
+    slipped : (k, dim - 1) tangential displacements of the contacts in the state before, from which
+        slip is measured [length]
     options : how to solve it; the form of Q and the bodies' solvers stay those of `before`
 
     Returns
@@ -162,8 +168,12 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
     return _solved(step, before.solution, options, {})
 
 
-def _solved(reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]) -> Solved:
-    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what came earlier."""
+def _solved(
+    reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]
+) -> Solved:
+    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what
+    came earlier.
+    """
     lines = progress_lines(options.note, reduction.problem, options.tol)
 
     def answer(problem: InterfaceProblem, start: Solution | None) -> Solution:
@@ -196,9 +206,13 @@ def _doubt(reduction: Reduction, solution: Solution) -> float:
 
 
 def _on_ground(
-    held: Reduction, start: Solution | None, answer: Callable[[InterfaceProblem, Solution | None], Solution]
+    held: Reduction,
+    start: Solution | None,
+    answer: Callable[[InterfaceProblem, Solution | None], Solution],
 ) -> tuple[Reduction, Solution]:
-    """The answer for thin bodies, which a ground holds until it bears nothing or no longer gets less to bear."""
+    """The answer for thin bodies, which a ground holds until it bears nothing or no longer gets
+    less to bear.
+    """
     begin, before = time.perf_counter(), np.inf
     solution = answer(held.problem, start)
     for _ in range(ROUNDS):

@@ -1,4 +1,6 @@
-"""The loop that remeshes a scene until its contact zone ends at a node of the mesh (paper, 3 and 4.2)."""
+"""The loop that remeshes a scene until its contact zone ends at a node of the mesh (paper, 3 and
+4.2).
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,17 @@ from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 
 def solve_zone(
-    scene: Scene, elements: int | None = None, options: Options | None = None, start: Solved | None = None
+    scene: Scene,
+    elements: int | None = None,
+    options: Options | None = None,
+    start: Solved | None = None,
 ) -> Solved:
     """Solve a scene; where it has a contact zone, remesh until its edge is a node of the mesh.
 
-    Each round solves on meshes with a node at the edge of the present zone, starting from the round before, and reads the
-    new edge from the reactions. The loop ends when two zones agree to AGREE of an element, when a solve fails, or after LOOPS
-    rounds. A scene without a zone, or with several pairs of surfaces, is
-    solved once.
+    Each round solves on meshes with a node at the edge of the present zone, starting from the round
+    before, and reads the new edge from the reactions. The loop ends when two zones agree to AGREE
+    of an element, when a solve fails, or after LOOPS rounds. A scene without a zone, or with
+    several pairs of surfaces, is solved once.
 
     Parameters
     ----------
@@ -33,8 +38,8 @@ def solve_zone(
 
     Returns
     -------
-    Solved : the last round; `zones` are those tried, the last of them read from this solution; `solution.seconds` are summed
-        over the rounds
+    Solved : the last round; `zones` are those tried, the last of them read from this solution;
+        `solution.seconds` are summed over the rounds
 
     Raises
     ------
@@ -50,7 +55,9 @@ def solve_zone(
         problem, solution = start.reduction.problem, start.solution
         seconds.update(solution.seconds)
         if contact_status(problem, solution.reactions).touching.sum() < 2:
-            raise InputError(f"scene '{scene.name}': fewer than two nodes are in contact; take more elements.")
+            raise InputError(
+                f"scene '{scene.name}': fewer than two nodes are in contact; take more elements."
+            )
         zones.append(contact_edge(scene, problem, solution.reactions))
         agreed = abs(zones[-1] - zones[-2]) <= AGREE * zones[-2] / elements
         if agreed or solution.status not in (Status.SOLVED, Status.SETTLED) or len(zones) > LOOPS:

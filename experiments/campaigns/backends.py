@@ -1,4 +1,6 @@
-"""QP and conic backends on one convex subproblem, as they come or made exact: plug-in methods of the campaigns here."""
+"""QP and conic backends on one convex subproblem, as they come or made exact: plug-in methods of
+the campaigns here.
+"""
 
 from __future__ import annotations
 
@@ -15,19 +17,28 @@ from contactopt.methods.kernels.semismooth import crossover
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 
-LOOPS = {"max_iter", "max_iters"}  # kept at the backend's default settings too: iterations are no matter of accuracy
+# kept at the backend's default settings too: iterations are no matter of accuracy
+LOOPS = {"max_iter", "max_iters"}
 
 
 def asked(backend, tol: float | None):  # type: ignore[no-untyped-def]
     """The backend with its accuracy settings at tol; None: with its own defaults."""
     if tol is None:
-        return replace(backend, settings={key: v for key, v in backend.settings.items() if key in LOOPS})
-    return replace(backend, settings={key: tol if v == TIGHT else v for key, v in backend.settings.items()})
+        return replace(
+            backend, settings={key: v for key, v in backend.settings.items() if key in LOOPS}
+        )
+    return replace(
+        backend, settings={key: tol if v == TIGHT else v for key, v in backend.settings.items()}
+    )
 
 
 @method
-def normal_qp(problem: InterfaceProblem, backend: str, exact: bool = False, tol: float | None = None):  # type: ignore[no-untyped-def]
-    """The normal problem alone (friction forces zero), by one call of a QP backend; exact: with a crossover."""
+def normal_qp(
+    problem: InterfaceProblem, backend: str, exact: bool = False, tol: float | None = None
+):  # type: ignore[no-untyped-def]
+    """The normal problem alone (friction forces zero), by one call of a QP backend; exact: with a
+    crossover.
+    """
     p, scales = dimensionless(problem)
     k, dim = p.q.shape
     Q, V = p.Q[::dim, ::dim].copy(), p.V[::dim].copy()
@@ -43,15 +54,21 @@ def normal_qp(problem: InterfaceProblem, backend: str, exact: bool = False, tol:
 
 
 @method
-def friction_socp(problem: InterfaceProblem, backend: str, exact: bool = False, tol: float | None = None):  # type: ignore[no-untyped-def]
-    """Friction under given normal forces (family `tangential`), by one call of a conic backend; exact: with a crossover."""
+def friction_socp(
+    problem: InterfaceProblem, backend: str, exact: bool = False, tol: float | None = None
+):  # type: ignore[no-untyped-def]
+    """Friction under given normal forces (family `tangential`), by one call of a conic backend;
+    exact: with a crossover.
+    """
     p, scales = dimensionless(problem)
     k, dim = p.q.shape
     normal = np.maximum(-p.q[:, 0] / np.diag(p.Q)[::dim], 0.0)
     tangents = np.arange(k * dim).reshape(k, dim)[:, 1:].ravel()
     Q, radius = p.Q[np.ix_(tangents, tangents)], p.mu * normal
     bridge = DiscSOCP.using(backend, Q, np.zeros((0, len(Q))))
-    t, _ = replace(bridge, backend=asked(find(backend, CONIC), tol)).solve(p.q[:, 1:].ravel(), np.zeros(0), radius)
+    t, _ = replace(bridge, backend=asked(find(backend, CONIC), tol)).solve(
+        p.q[:, 1:].ravel(), np.zeros(0), radius
+    )
     t = t.reshape(k, dim - 1)
     if exact:
         c, V = p.q[:, 1:].ravel(), np.zeros((len(Q), 0))

@@ -14,19 +14,30 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     uzawa = table[(table["name"] == "augmented_lagrangian") & _true(table)]
     good = exact[exact["success"]].groupby("method.rho")["iterations"].max()
     steps = uzawa.set_index("problem.elements")["iterations"]
-    errors = [float(ten["error"][ten["problem.elements"] == n].iloc[0]) for n in (size.min(), size.max())]
+    errors = [
+        float(ten["error"][ten["problem.elements"] == n].iloc[0]) for n in (size.min(), size.max())
+    ]
     conditions = [float(table["condition"][size == n].iloc[0]) for n in (size.min(), size.max())]
     return [
-        f"The error of the penalty method falls like factor^{slope:.2f} (fit over factors up to 1e6 and all meshes). At a factor "
-        f"of 1e3 it is {errors[0]:.1e} on the coarsest and {errors[1]:.1e} on the finest mesh, "
-        f"while the condition number of Q goes from {conditions[0]:.0f} to {conditions[1]:.0f}.",
-        f"With multipliers the answer is exact whatever the factor. Exact minimisation is certified in {_share(exact)} runs. From "
-        f"rho = {good.index[0]:.0e} to {good.index[-1]:.0e} the largest number of iterations on any mesh goes from {good.iloc[0]:.0f} to "
-        f"{good.iloc[-1]:.0f}.",
-        f"One Uzawa step per iteration is certified in {_share(uzawa)} runs. Its iterations go from {steps[size.min()]:.0f} to "
-        f"{steps[size.max()]:.0f} as the mesh is refined from {size.min()} to {size.max()} elements. "
-        f"Lagrangian multipliers with a QP for the normal problem need no factor. They are certified in "
-        f"{_share(table[table['name'] == 'lagrangian'])} runs.",
+        (
+            f"The error of the penalty method falls like factor^{slope:.2f} (fit over factors up to"
+            f" 1e6 and all meshes). At a factor of 1e3 it is {errors[0]:.1e} on the coarsest and"
+            f" {errors[1]:.1e} on the finest mesh, while the condition number of Q goes from"
+            f" {conditions[0]:.0f} to {conditions[1]:.0f}."
+        ),
+        (
+            "With multipliers the answer is exact whatever the factor. Exact minimisation is"
+            f" certified in {_share(exact)} runs. From rho = {good.index[0]:.0e} to"
+            f" {good.index[-1]:.0e} the largest number of iterations on any mesh goes from"
+            f" {good.iloc[0]:.0f} to {good.iloc[-1]:.0f}."
+        ),
+        (
+            f"One Uzawa step per iteration is certified in {_share(uzawa)} runs. Its iterations go"
+            f" from {steps[size.min()]:.0f} to {steps[size.max()]:.0f} as the mesh is refined from"
+            f" {size.min()} to {size.max()} elements. Lagrangian multipliers with a QP for the"
+            " normal problem need no factor. They are certified in"
+            f" {_share(table[table['name'] == 'lagrangian'])} runs."
+        ),
     ]
 
 

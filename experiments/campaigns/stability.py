@@ -4,7 +4,10 @@ from __future__ import annotations
 
 
 def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
-    elastic, rigid = table[table["family"] != "rigid_bodies"], table[table["family"] == "rigid_bodies"]
+    elastic, rigid = (
+        table[table["family"] != "rigid_bodies"],
+        table[table["family"] == "rigid_bodies"],
+    )
     alternating = elastic[elastic["name"] == "alternating"]
     below = alternating[alternating["problem.mu"] < alternating["guaranteed_mu"]]
     above = alternating[alternating["problem.mu"] >= alternating["alternating_mu"]]
@@ -13,11 +16,15 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     return [
         "Of their runs on elastic bodies the methods certify: "
         + _shares(elastic)
-        + ". The least friction coefficient at which "
-        "one fails: " + (", ".join(f"{mu:g} (`{name}`)" for name, mu in lowest.items()) or "none") + ".",
-        f"The threshold that is known before solving holds, and is not sharp. Below it the alternating iteration is certified in "
-        f"{_share(below)} runs. Between it and the upper bound it is certified in {_share(between)} runs. Above that bound some load breaks it. With "
-        f"the loads of these problems it is still certified in {_share(above)} runs.",
+        + ". The least friction coefficient at which one fails: "
+        + (", ".join(f"{mu:g} (`{name}`)" for name, mu in lowest.items()) or "none")
+        + ".",
+        (
+            "The threshold that is known before solving holds, and is not sharp. Below it the"
+            f" alternating iteration is certified in {_share(below)} runs. Between it and the upper"
+            f" bound it is certified in {_share(between)} runs. Above that bound some load breaks"
+            f" it. With the loads of these problems it is still certified in {_share(above)} runs."
+        ),
         "Of their runs on rank-deficient rigid bodies the methods certify: " + _shares(rigid) + ".",
     ]
 

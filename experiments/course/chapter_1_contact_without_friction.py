@@ -1,11 +1,12 @@
 # %% [markdown]
 # # Chapter 1. A spring, a node and a floor
 #
-# The smallest contact problem has one unknown. It already shows everything that this course is about: an energy that is
-# minimised under a constraint, a second problem in the contact forces, the conditions that join the two, a program that a
-# solver can read, and several ways to go wrong.
+# The smallest contact problem has one unknown. It already shows everything that this course is
+# about: an energy that is minimised under a constraint, a second problem in the contact forces, the
+# conditions that join the two, a program that a solver can read, and several ways to go wrong.
 #
-# You need derivatives, and the idea of a minimum under a constraint. The chapter takes 30 minutes with its exercises.
+# You need derivatives, and the idea of a minimum under a constraint. The chapter takes 30 minutes
+# with its exercises.
 
 # %%
 import cvxpy as cp
@@ -18,9 +19,10 @@ from contactopt.teaching import Slider, check
 # %% [markdown]
 # ## The mechanical system
 #
-# A node hangs on a spring of stiffness $k$ above a floor. Without load the gap between node and floor is $g_0$. A load $F$
-# pulls the node down. We call the gap that remains $u$, and the force of the floor on the node $r$. The normal $n$ points
-# out of the floor, that is, upwards. The gap $u$ and the force $r$ are positive in this direction.
+# A node hangs on a spring of stiffness $k$ above a floor. Without load the gap between node and
+# floor is $g_0$. A load $F$ pulls the node down. We call the gap that remains $u$, and the force of
+# the floor on the node $r$. The normal $n$ points out of the floor, that is, upwards. The gap $u$
+# and the force $r$ are positive in this direction.
 #
 # | letter | meaning | unit |
 # |---|---|---|
@@ -43,12 +45,19 @@ def sketch(ax, u, r):
     ax.plot(np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]), y, "C0", lw=1.5)
     ax.plot([-0.6, 0.6], [3, 3], "k", lw=3)
     ax.plot(0, u, "o", ms=10, color="C0")
-    for x, y0, y1, name, color in ((0.5, u + 0.6, u, "$F$", "C3"), (-0.5, u - 0.6, u, f"$r$ = {r:.1f} N", "C1")):
-        ax.annotate("", (x, y1), (x, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    for x, y0, y1, name, color in (
+        (0.5, u + 0.6, u, "$F$", "C3"),
+        (-0.5, u - 0.6, u, f"$r$ = {r:.1f} N", "C1"),
+    ):
+        ax.annotate(
+            "", (x, y1), (x, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8}
+        )
         ax.text(x + 0.08, (y0 + y1) / 2, name, color=color)
     ax.annotate("", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
     ax.text(1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center")
-    ax.annotate("", (-1.3, 0.8), (-1.3, 0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8})
+    ax.annotate(
+        "", (-1.3, 0.8), (-1.3, 0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8}
+    )
     ax.text(-1.22, 0.6, "$n$")
     ax.set(xlim=(-1.5, 2.2), ylim=(-0.7, 3.2), aspect="equal")
     ax.axis("off")
@@ -60,19 +69,20 @@ sketch(ax, 1.0, 0.0)
 # %% [markdown]
 # ## The primal problem: an energy in displacements
 #
-# The spring stores the energy $\tfrac12 k (u - g_0)^2$. The load does work when the node moves down, so its potential is
-# $+F u$. The node goes to the place where the sum of both is smallest, among all places above the floor:
+# The spring stores the energy $\tfrac12 k (u - g_0)^2$. The load does work when the node moves
+# down, so its potential is $+F u$. The node goes to the place where the sum of both is smallest,
+# among all places above the floor:
 #
 # $$ \min_{u \ge 0} \; E(u), \qquad E(u) = \tfrac12 k\,(u - g_0)^2 + F u . $$
 #
-# This is the *primal* problem. The derivative $E'(u) = k (u - g_0) + F$ is the force that is missing for equilibrium, and
-# the floor supplies it. Solvers call this number the *Lagrange multiplier* of the constraint $u \ge 0$. For us it is the
-# contact force:
+# This is the *primal* problem. The derivative $E'(u) = k (u - g_0) + F$ is the force that is
+# missing for equilibrium, and the floor supplies it. Solvers call this number the *Lagrange
+# multiplier* of the constraint $u \ge 0$. For us it is the contact force:
 #
 # $$ r = E'(u) = k\,(u - g_0) + F . $$
 #
-# The Python package `cvxpy` reads such a problem nearly as it is written on paper. A constraint has its multiplier as
-# `dual_value`.
+# The Python package `cvxpy` reads such a problem nearly as it is written on paper. A constraint has
+# its multiplier as `dual_value`.
 
 # %%
 u = cp.Variable()
@@ -87,14 +97,15 @@ assert np.isclose(floor.dual_value, F - k * g0, atol=1e-4)
 # %% [markdown]
 # ## The optimality conditions
 #
-# A minimum under constraints obeys the conditions of Karush, Kuhn and Tucker, the *KKT conditions* for short. Here they
-# are the equilibrium of the node, and three conditions that are named after Signorini:
+# A minimum under constraints obeys the conditions of Karush, Kuhn and Tucker, the *KKT conditions*
+# for short. Here they are the equilibrium of the node, and three conditions that are named after
+# Signorini:
 #
 # $$ r = k\,(u - g_0) + F, \qquad u \ge 0, \qquad r \ge 0, \qquad u\, r = 0 . $$
 #
-# In words: the forces on the node balance. The node does not pass through the floor. The floor pushes, and never pulls.
-# If there is a gap, there is no force, and if there is a force, there is no gap. Move the slider, and watch which of $u$
-# and $r$ is zero.
+# In words: the forces on the node balance. The node does not pass through the floor. The floor
+# pushes, and never pulls. If there is a gap, there is no force, and if there is a force, there is
+# no gap. Move the slider, and watch which of $u$ and $r$ is zero.
 
 
 # %% tags=["hide-input"]
@@ -107,7 +118,9 @@ def state(load):
     right.plot(w, k * (w - g0) ** 2 / 2 + load * w, "C0")
     right.axvspan(-1, 0, color="0.85", lw=0)
     right.plot(gap, k * (gap - g0) ** 2 / 2 + load * gap, "o", color="C1", ms=9)
-    right.set(xlabel="gap $u$ [mm]", ylabel="energy [N mm]", title=f"load F = {load:.1f} N", ylim=(-5, 8))
+    right.set(
+        xlabel="gap $u$ [mm]", ylabel="energy [N mm]", title=f"load F = {load:.1f} N", ylim=(-5, 8)
+    )
     return fig
 
 
@@ -120,15 +133,16 @@ Slider("load F [N]", np.linspace(0, 5, 11), state, start=10)
 #
 # $$ u = Q\,r + q, \qquad Q = 1/k, \qquad q = g_0 - F/k . $$
 #
-# $Q$ is the *compliance* of the spring. $q$ is the gap that the node would have if the floor were not there. A negative $q$
-# means that the node would pass through the floor. Signorini's conditions now say that $r \ge 0$, that $Q r + q \ge 0$, and
-# that at least one of the two is zero. These are the KKT conditions of another minimum:
+# $Q$ is the *compliance* of the spring. $q$ is the gap that the node would have if the floor were
+# not there. A negative $q$ means that the node would pass through the floor. Signorini's conditions
+# now say that $r \ge 0$, that $Q r + q \ge 0$, and that at least one of the two is zero. These are
+# the KKT conditions of another minimum:
 #
 # $$ \min_{r \ge 0} \; \tfrac12 Q\, r^2 + q\, r . $$
 #
-# This is the *dual* problem. The force $r$, which was the multiplier, has become the unknown. The gap $u$, which was the
-# unknown, has become the multiplier. contactopt solves the dual problem. For large bodies its unknowns live on the contact
-# surface alone, and are few.
+# This is the *dual* problem. The force $r$, which was the multiplier, has become the unknown. The
+# gap $u$, which was the unknown, has become the multiplier. contactopt solves the dual problem. For
+# large bodies its unknowns live on the contact surface alone, and are few.
 
 # %%
 Q, q = 1 / k, g0 - F / k
@@ -143,9 +157,9 @@ assert np.isclose(r.value, F - k * g0, atol=1e-4)
 assert np.isclose(primal.value + dual.value, F * g0 - F**2 / (2 * k), atol=1e-4)
 
 # %% [markdown]
-# contactopt solves the same problem. It takes one row of $q$ for each contact, with the normal component first and the
-# tangential one second. Our node is not pulled sideways, so the tangential entry of $q$ is zero. The last argument is the
-# friction coefficient.
+# contactopt solves the same problem. It takes one row of $q$ for each contact, with the normal
+# component first and the tangential one second. Our node is not pulled sideways, so the tangential
+# entry of $q$ is zero. The last argument is the friction coefficient.
 
 # %%
 problem = InterfaceProblem(np.diag([Q, Q]), [[q, 0.0]], 0.0)
@@ -157,42 +171,46 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 # %% [markdown]
 # ## Penalty: a soft floor
 #
-# Many codes replace the floor by a second, stiff spring of stiffness $\kappa$ that acts only when the node is below zero:
+# Many codes replace the floor by a second, stiff spring of stiffness $\kappa$ that acts only when
+# the node is below zero:
 #
 # $$ \min_u \; E(u) + \tfrac12 \kappa \min(u, 0)^2 . $$
 #
-# This program has no constraint any more, but the node sinks into the floor. If the load is large enough to close the gap,
-# $F > k g_0$, the minimum is at $u = -(F - k g_0) / (k + \kappa)$. A larger $\kappa$ makes this error smaller. But when
-# contact begins, the stiffness of the system jumps by the factor $1 + \kappa / k$. Such jumps make large penalty problems
-# hard to solve.
+# This program has no constraint any more, but the node sinks into the floor. If the load is large
+# enough to close the gap, $F > k g_0$, the minimum is at $u = -(F - k g_0) / (k + \kappa)$. A
+# larger $\kappa$ makes this error smaller. But when contact begins, the stiffness of the system
+# jumps by the factor $1 + \kappa / k$. Such jumps make large penalty problems hard to solve.
 #
 # ## Nitsche: exact without a multiplier
 #
-# Nitsche's method also has the displacement as its only unknown. It uses that the displacement determines the contact
-# force: by equilibrium, $r(u) = k (u - g_0) + F$. With the notation $[x]_+ = \max(x, 0)$, Signorini's conditions are the
-# same as the one equation $r = [\,r - \gamma u\,]_+$, for any number $\gamma > 0$. The method minimises
+# Nitsche's method also has the displacement as its only unknown. It uses that the displacement
+# determines the contact force: by equilibrium, $r(u) = k (u - g_0) + F$. With the notation $[x]_+ =
+# \max(x, 0)$, Signorini's conditions are the same as the one equation $r = [\,r - \gamma u\,]_+$,
+# for any number $\gamma > 0$. The method minimises
 #
 # $$ E(u) - \frac{1}{2\gamma} r(u)^2 + \frac{1}{2\gamma} [\,r(u) - \gamma u\,]_+^2 . $$
 #
-# The derivative of this function is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. For every $\gamma$ but $\gamma = k$ it is
-# zero exactly at the solution. Such a method is called *consistent*. (The penalty method is not: its minimum is another
-# point.) There is a price. The function is convex only if $\gamma > k$. For a smaller $\gamma$ it has no minimum.
+# The derivative of this function is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. For every
+# $\gamma$ but $\gamma = k$ it is zero exactly at the solution. Such a method is called
+# *consistent*. (The penalty method is not: its minimum is another point.) There is a price. The
+# function is convex only if $\gamma > k$. For a smaller $\gamma$ it has no minimum.
 #
 # ## Proximal Galerkin: never below the floor
 #
-# The youngest of the four methods writes the gap as $u = e^{\psi}$, with a *latent variable* $\psi$. A gap of this form is
-# always positive. The method goes in steps. Each step minimises the energy $E(u)$ together with a term that keeps $u$ near
-# the last gap $u_{\text{last}}$:
+# The youngest of the four methods writes the gap as $u = e^{\psi}$, with a *latent variable*
+# $\psi$. A gap of this form is always positive. The method goes in steps. Each step minimises the
+# energy $E(u)$ together with a term that keeps $u$ near the last gap $u_{\text{last}}$:
 #
 # $$ \min_{u > 0} \; \alpha\, E(u) + u \ln \frac{u}{u_{\text{last}}} - u + u_{\text{last}} . $$
 #
-# The number $\alpha$ is the step size. The added term is a distance that is measured by the entropy. The derivative of the
-# whole is zero if
+# The number $\alpha$ is the step size. The added term is a distance that is measured by the
+# entropy. The derivative of the whole is zero if
 #
 # $$ \alpha\, E'(e^{\psi}) + \psi - \psi_{\text{last}} = 0 . $$
 #
-# If the node touches, every step multiplies the gap by about $e^{-\alpha r}$. The number $(\psi_{\text{last}} - \psi) / \alpha$
-# tends to the contact force. Now we compare the methods on our node.
+# If the node touches, every step multiplies the gap by about $e^{-\alpha r}$. The number
+# $(\psi_{\text{last}} - \psi) / \alpha$ tends to the contact force. Now we compare the methods on
+# our node.
 
 
 # %%
@@ -229,7 +247,11 @@ print(f"proximal Galerkin after 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.loglog(stiffness / k, -sunk, "o-")
-left.set(xlabel=r"penalty stiffness $\kappa / k$ [-]", ylabel="depth below the floor [mm]", title="penalty")
+left.set(
+    xlabel=r"penalty stiffness $\kappa / k$ [-]",
+    ylabel="depth below the floor [mm]",
+    title="penalty",
+)
 right.semilogy(range(1, 7), gaps, "s-", color="C1")
 right.set(xlabel="step [-]", ylabel="gap above the floor [mm]", title="proximal Galerkin")
 
@@ -249,10 +271,10 @@ assert np.isclose(sunk[-1] * stiffness[-1], -3.0, rtol=1e-4)
 #
 # ## What fails: a body that nothing holds
 #
-# Cut the spring, so that $k = 0$, and pull the node up with $F = -1$ N. The energy $F u$ falls for ever as the gap grows. A
-# solver says that the primal problem is *unbounded*. In the dual problem, equilibrium asks for $r = F = -1$ N. But the
-# contact force may not be negative. A solver says that the dual problem is *infeasible*. Both words mean that the node flies
-# away.
+# Cut the spring, so that $k = 0$, and pull the node up with $F = -1$ N. The energy $F u$ falls for
+# ever as the gap grows. A solver says that the primal problem is *unbounded*. In the dual problem,
+# equilibrium asks for $r = F = -1$ N. But the contact force may not be negative. A solver says that
+# the dual problem is *infeasible*. Both words mean that the node flies away.
 
 # %%
 gap, force = cp.Variable(nonneg=True), cp.Variable(nonneg=True)
@@ -267,18 +289,18 @@ assert primal_without_spring.status == "unbounded" and dual_without_spring.statu
 # %% [markdown]
 # ## Exercises
 #
-# Replace `...` by your answer, and run the cell and the one below it, which grades your answer. The first two exercises need
-# pen and paper only.
+# Replace `...` by your answer, and run the cell and the one below it, which grades your answer. The
+# first two exercises need pen and paper only.
 #
-# **1.1** (Pen and paper.) A spring of stiffness 4 N/mm holds a node 0.5 mm above the floor. A load of 5 N pulls it down. How large are the gap
-# and the contact force?
+# **1.1** (Pen and paper.) A spring of stiffness 4 N/mm holds a node 0.5 mm above the floor. A load
+# of 5 N pulls it down. How large are the gap and the contact force?
 
 # %% tags=["exercise"]
 answer = (..., ...)  # gap [mm], force [N]
 
 # %% [markdown] tags=["solution"]
-# The spring would let the node sink by $5/4 = 1.25$ mm, which is more than 0.5 mm. So the node touches the floor, $u = 0$,
-# and the contact force is $r = F - k g_0 = 5 - 2 = 3$ N.
+# The spring would let the node sink by $5/4 = 1.25$ mm, which is more than 0.5 mm. So the node
+# touches the floor, $u = 0$, and the contact force is $r = F - k g_0 = 5 - 2 = 3$ N.
 
 # %% tags=["solution"]
 answer = (0.0, 3.0)
@@ -293,8 +315,8 @@ check("1.1", answer if ... not in answer else ..., (0.0, 3.0))
 answer = ...  # N
 
 # %% [markdown] tags=["solution"]
-# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too. A contact whose gap and force are
-# both zero is called *weakly active*.
+# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too. A contact
+# whose gap and force are both zero is called *weakly active*.
 
 # %% tags=["solution"]
 answer = 4 * 0.5
@@ -303,14 +325,16 @@ answer = 4 * 0.5
 check("1.2", answer, 2.0)
 
 # %% [markdown]
-# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this chapter ($k = 2$ N/mm,
-# $g_0 = 1$ mm) *up*, with $F = -5$ N. Write the primal program in cvxpy. How large is the force of the ceiling?
+# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this
+# chapter ($k = 2$ N/mm, $g_0 = 1$ mm) *up*, with $F = -5$ N. Write the primal program in cvxpy. How
+# large is the force of the ceiling?
 
 # %% tags=["exercise"]
 answer = ...  # N, positive
 
 # %% [markdown] tags=["solution"]
-# The multiplier of $u \le 2$ is the force of the ceiling. By hand: $-E'(2) = -(2 \cdot 1 - 5) = 3$ N.
+# The multiplier of $u \le 2$ is the force of the ceiling. By hand: $-E'(2) = -(2 \cdot 1 - 5) = 3$
+# N.
 
 # %% tags=["solution"]
 w = cp.Variable()
@@ -322,15 +346,15 @@ answer = float(ceiling.dual_value)
 check("1.3", answer, 3.0)
 
 # %% [markdown]
-# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks only 0.01 mm into the floor? Give its
-# stiffness as a multiple of the stiffness $k$ of the spring.
+# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks only 0.01 mm
+# into the floor? Give its stiffness as a multiple of the stiffness $k$ of the spring.
 
 # %% tags=["exercise"]
 answer = ...  # kappa / k [-]
 
 # %% [markdown] tags=["solution"]
-# The depth is $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ mm. This gives $\kappa = 298$ N/mm, which is 149 times
-# the stiffness of the spring.
+# The depth is $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ mm. This gives $\kappa = 298$
+# N/mm, which is 149 times the stiffness of the spring.
 
 # %% tags=["solution"]
 answer = (3 / 0.01 - k) / k
@@ -341,11 +365,13 @@ check("1.4", answer, 149.0)
 # %% [markdown]
 # ## References
 #
-# - N. Kikuchi, J. T. Oden, *Contact Problems in Elasticity*, SIAM 1988, [doi:10.1137/1.9781611970845](https://doi.org/10.1137/1.9781611970845).
-# - F. Chouly, P. Hild, A Nitsche-based method for unilateral contact problems, *SIAM J. Numer. Anal.* 51 (2013),
-#   [doi:10.1137/12088344X](https://doi.org/10.1137/12088344X).
-# - B. Keith, T. M. Surowiec, Proximal Galerkin: a structure-preserving finite element method for pointwise bound
-#   constraints, *Found. Comput. Math.* (2024), [doi:10.1007/s10208-024-09681-8](https://doi.org/10.1007/s10208-024-09681-8).
+# - N. Kikuchi, J. T. Oden, *Contact Problems in Elasticity*, SIAM 1988,
+#   [doi:10.1137/1.9781611970845](https://doi.org/10.1137/1.9781611970845).
+# - F. Chouly, P. Hild, A Nitsche-based method for unilateral contact problems, *SIAM J. Numer.
+#   Anal.* 51 (2013), [doi:10.1137/12088344X](https://doi.org/10.1137/12088344X).
+# - B. Keith, T. M. Surowiec, Proximal Galerkin: a structure-preserving finite element method for
+#   pointwise bound constraints, *Found. Comput. Math.* (2024),
+#   [doi:10.1007/s10208-024-09681-8](https://doi.org/10.1007/s10208-024-09681-8).
 #
 # Next: [friction](chapter_2_friction_at_one_node.py).
 

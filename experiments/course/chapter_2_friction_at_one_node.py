@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Chapter 2. Friction at one node
 #
-# Now the node can also move along the floor, and friction resists. If the bound on the friction force is *given*, the
-# solution is still the minimum of an energy. With Coulomb's law the bound depends on the answer, and the solution is not
-# the minimum of an energy any more.
+# Now the node can also move along the floor, and friction resists. If the bound on the friction
+# force is *given*, the solution is still the minimum of an energy. With Coulomb's law the bound
+# depends on the answer, and the solution is not the minimum of an energy any more.
 #
 # You need chapter 1. The chapter takes 40 minutes with its exercises.
 
@@ -18,15 +18,17 @@ from contactopt.teaching import Slider, check
 # %% [markdown]
 # ## The mechanical system
 #
-# Two springs hold the node, a vertical one and one at 45 degrees. The load pulls the node down and to the right. The normal
-# $n$ points up, and the tangent $t$ points to the right. All vectors are written with the normal component first:
+# Two springs hold the node, a vertical one and one at 45 degrees. The load pulls the node down and
+# to the right. The normal $n$ points up, and the tangent $t$ points to the right. All vectors are
+# written with the normal component first:
 #
-# - $u = (u_n, u_t)$ is the gap that remains and the slip, that is, how far the node has moved to the right;
+# - $u = (u_n, u_t)$ is the gap that remains and the slip, that is, how far the node has moved to
+#   the right;
 # - $r = (r_n, r_t)$ is the force of the floor on the node.
 #
-# The arrows of the sketch show the positive directions. As in chapter 1, $u = Q r + q$: the matrix $Q$ is the compliance of
-# the springs, and $q$ is the place to which the load alone would bring the node. $K = Q^{-1}$ is the stiffness of the
-# springs.
+# The arrows of the sketch show the positive directions. As in chapter 1, $u = Q r + q$: the matrix
+# $Q$ is the compliance of the springs, and $q$ is the place to which the load alone would bring the
+# node. $K = Q^{-1}$ is the stiffness of the springs.
 
 # %%
 k_vertical, k_inclined = 1.0, 2.0  # N/mm
@@ -36,7 +38,9 @@ Q = np.linalg.inv(K)
 load = np.array([-3.0, 1.0])  # N: 3 N down, 1 N to the right
 q = np.array([1.0, 0.0]) + Q @ load  # the gap without load is 1 mm
 mu = 0.5  # friction coefficient
-print("K =", np.round(K, 6).tolist(), " Q =", np.round(Q, 6).tolist(), " q =", np.round(q, 6).tolist())
+print(
+    "K =", np.round(K, 6).tolist(), " Q =", np.round(Q, 6).tolist(), " q =", np.round(q, 6).tolist()
+)
 
 assert np.allclose(Q, [[1, -1], [-1, 2]]) and np.allclose(q, [-3, 5])
 
@@ -45,7 +49,10 @@ fig, ax = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
 ax.axhspan(-0.5, 0, color="0.8", lw=0)
 ax.axhline(0, color="k", lw=1)
 for end in ((0, 2.2), (1.5, 1.9)):
-    way, side = np.array(end) - [0, 0.4], np.array([-(end[1] - 0.4), end[0]]) / np.hypot(end[0], end[1] - 0.4)
+    way, side = (
+        np.array(end) - [0, 0.4],
+        np.array([-(end[1] - 0.4), end[0]]) / np.hypot(end[0], end[1] - 0.4),
+    )
     steps = np.linspace(0, 1, 13)[:, None]
     zigzag = np.concatenate([[0], 0.09 * (-1.0) ** np.arange(11), [0]])[:, None]
     ax.plot(*([0, 0.4] + steps * way + zigzag * side).T, "C0", lw=1.5)
@@ -64,14 +71,15 @@ ax.set(xlim=(-1.7, 2), ylim=(-0.6, 2.4), aspect="equal")
 _ = ax.axis("off")
 
 # %% [markdown]
-# The entry $Q_{nt} = -1$ of the compliance couples the two directions. A force to the right moves the node down as well,
-# because the inclined spring guides it.
+# The entry $Q_{nt} = -1$ of the compliance couples the two directions. A force to the right moves
+# the node down as well, because the inclined spring guides it.
 #
 # ## Primal: an energy with a given friction bound
 #
-# Suppose that the friction force cannot exceed a known number $g$. This is called *Tresca friction*. To move the node by
-# $u_t$ against this force costs the work $g |u_t|$. So the node goes to the minimum of the energy of the springs, the load
-# and friction (the prime denotes a transposed vector):
+# Suppose that the friction force cannot exceed a known number $g$. This is called *Tresca
+# friction*. To move the node by $u_t$ against this force costs the work $g |u_t|$. So the node goes
+# to the minimum of the energy of the springs, the load and friction (the prime denotes a transposed
+# vector):
 #
 # $$ \min_{u_n \ge 0} \; \tfrac12 (u - q)' K (u - q) + g\,|u_t| . $$
 #
@@ -83,29 +91,34 @@ _ = ax.axis("off")
 #
 # ## The optimality conditions
 #
-# Both problems have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium
-# of the springs, Signorini's conditions, and a law of friction:
+# Both problems have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT
+# conditions). They are equilibrium of the springs, Signorini's conditions, and a law of friction:
 #
 # $$ u = Q\, r + q, \qquad\quad u_n \ge 0, \quad r_n \ge 0, \quad u_n r_n = 0, $$
 #
 # $$ |r_t| \le g, \qquad u_t \ne 0 \;\Rightarrow\; r_t = -g\, \frac{u_t}{|u_t|} . $$
 #
-# If the friction force is below its bound, the node does not move: it *sticks*. If the node moves, it *slips*. Then the
-# friction force has reached its bound and points against the slip. The two programs in `cvxpy`:
+# If the friction force is below its bound, the node does not move: it *sticks*. If the node moves,
+# it *slips*. Then the friction force has reached its bound and points against the slip. The two
+# programs in `cvxpy`:
 
 
 # %%
 def primal(g):
     u = cp.Variable(2)
     floor = u[0] >= 0
-    cp.Problem(cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]).solve(solver=cp.CLARABEL)
+    cp.Problem(cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]).solve(
+        solver=cp.CLARABEL
+    )
     return K @ (u.value - q)  # the contact force, from equilibrium
 
 
 def dual(g, Q=Q, q=q):
     r = cp.Variable(2)
     box = [r[0] >= 0, cp.abs(r[1]) <= g]
-    cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box).solve(solver=cp.CLARABEL)
+    cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box).solve(
+        solver=cp.CLARABEL
+    )
     return r.value
 
 
@@ -117,9 +130,10 @@ assert np.allclose(dual(3.0), -K @ q, atol=1e-4)  # from 2 N on the node sticks:
 # %% [markdown]
 # ## Coulomb: the bound depends on the answer
 #
-# Coulomb's law says that the bound is $g = \mu r_n$. Neither program takes a bound that contains its own answer. If we write
-# $\mu r_n$ into the constraint of the dual, we get another law, as we shall see below. But we can guess $g$, solve the
-# program, set $g = \mu r_n$, and solve again, until nothing changes. This is *Tresca's iteration*.
+# Coulomb's law says that the bound is $g = \mu r_n$. Neither program takes a bound that contains
+# its own answer. If we write $\mu r_n$ into the constraint of the dual, we get another law, as we
+# shall see below. But we can guess $g$, solve the program, set $g = \mu r_n$, and solve again,
+# until nothing changes. This is *Tresca's iteration*.
 
 # %%
 g, history = 0.0, []
@@ -134,18 +148,20 @@ assert np.allclose(r, [2.0, -1.0], atol=1e-4)
 assert natural_map_residual(problem, r[None]) < 1e-4
 
 # %% [markdown]
-# `natural_map_residual` is the *certificate*. It is computed from the problem and the forces alone, and it is zero exactly
-# if the forces obey Signorini's conditions and Coulomb's law.
+# `natural_map_residual` is the *certificate*. It is computed from the problem and the forces alone,
+# and it is zero exactly if the forces obey Signorini's conditions and Coulomb's law.
 #
-# We can also check the answer by hand. Suppose that the node slips to the right, so that $r_t = -\mu r_n = -\tfrac12 r_n$. It
-# touches the floor, so that $0 = u_n = Q_{nn} r_n + Q_{nt} r_t + q_n = r_n + \tfrac12 r_n - 3$. Hence $r_n = 2$ N and
-# $r_t = -1$ N. The slip is $u_t = Q_{tn} r_n + Q_{tt} r_t + q_t = -2 - 2 + 5 = 1$ mm, which is to the right, as we supposed.
+# We can also check the answer by hand. Suppose that the node slips to the right, so that $r_t =
+# -\mu r_n = -\tfrac12 r_n$. It touches the floor, so that $0 = u_n = Q_{nn} r_n + Q_{nt} r_t + q_n
+# = r_n + \tfrac12 r_n - 3$. Hence $r_n = 2$ N and $r_t = -1$ N. The slip is $u_t = Q_{tn} r_n +
+# Q_{tt} r_t + q_t = -2 - 2 + 5 = 1$ mm, which is to the right, as we supposed.
 #
 # ## The cone
 #
-# The forces that Coulomb's law admits fill the cone $|r_t| \le \mu r_n$. The force that would make the node stick, so that
-# $u = 0$, is $-Kq$. If the friction coefficient grows, the cone opens. The contact force moves along the edge of the cone,
-# until the cone contains the sticking force. From there on the node sticks.
+# The forces that Coulomb's law admits fill the cone $|r_t| \le \mu r_n$. The force that would make
+# the node stick, so that $u = 0$, is $-Kq$. If the friction coefficient grows, the cone opens. The
+# contact force moves along the edge of the cone, until the cone contains the sticking force. From
+# there on the node sticks.
 
 
 # %% tags=["hide-input"]
@@ -154,11 +170,20 @@ def in_the_cone(coefficient):
     slip = (Q @ force + q)[1]
     fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
     ax.fill([0, -coefficient * 4, coefficient * 4], [0, 4, 4], color="C0", alpha=0.15, lw=0)
-    ax.annotate("", (force[1], force[0]), (0, 0), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2})
+    ax.annotate(
+        "", (force[1], force[0]), (0, 0), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2}
+    )
     ax.plot(*(-K @ q)[::-1], "kx")
     ax.text(-2.0, 0.7, "sticking force", ha="center")
-    ax.set(xlim=(-3.2, 3.2), ylim=(0, 3.2), xlabel="friction force $r_t$ [N]", ylabel="normal force $r_n$ [N]")
-    ax.set_title(rf"$\mu$ = {coefficient:.2f}: " + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks"))
+    ax.set(
+        xlim=(-3.2, 3.2),
+        ylim=(0, 3.2),
+        xlabel="friction force $r_t$ [N]",
+        ylabel="normal force $r_n$ [N]",
+    )
+    ax.set_title(
+        rf"$\mu$ = {coefficient:.2f}: " + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks")
+    )
     return fig
 
 
@@ -171,9 +196,10 @@ Slider("friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2
 #
 # $$ \min_r \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad |r_t| \le \mu\, r_n . $$
 #
-# This is a *second-order cone program* (SOCP), a convex program with a cone as its constraint. `cvxpy` writes the cone as
-# `cp.SOC`. The KKT conditions of this program are not Coulomb's law. In them a node that slips by $u_t$ is also lifted, by
-# $u_n = \mu |u_t|$. This law is called *associated friction*.
+# This is a *second-order cone program* (SOCP), a convex program with a cone as its constraint.
+# `cvxpy` writes the cone as `cp.SOC`. The KKT conditions of this program are not Coulomb's law. In
+# them a node that slips by $u_t$ is also lifted, by $u_n = \mu |u_t|$. This law is called
+# *associated friction*.
 
 # %%
 f = cp.Variable(2)
@@ -185,15 +211,17 @@ print(f"associated: force {np.round(f.value, 3)}, gap {lifted[0]:.3f} mm, slip {
 assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 
 # %% [markdown]
-# Acary and Cadoux found a repair. They add the term $\mu\, \sigma\, r_n$ to the cost, where $\sigma = |u_t|$ is the slip of the
-# last answer, and solve the program again and again. When nothing changes any more, the added term has removed the lift,
-# and the answer obeys Coulomb's law (exercise 2.3).
+# Acary and Cadoux found a repair. They add the term $\mu\, \sigma\, r_n$ to the cost, where $\sigma
+# = |u_t|$ is the slip of the last answer, and solve the program again and again. When nothing
+# changes any more, the added term has removed the lift, and the answer obeys Coulomb's law
+# (exercise 2.3).
 #
 # ## What fails
 #
-# **The iteration fails.** With $\mu = 1.5$ the node still has exactly one solution, and slips to the right. In Tresca's
-# iteration the new normal force is $r_n = 3 - g$, and the next bound is $\mu (3 - g)$. So every iteration multiplies an error
-# of the bound by $-\mu$. For $\mu > 1$ the error grows.
+# **The iteration fails.** With $\mu = 1.5$ the node still has exactly one solution, and slips to
+# the right. In Tresca's iteration the new normal force is $r_n = 3 - g$, and the next bound is $\mu
+# (3 - g)$. So every iteration multiplies an error of the bound by $-\mu$. For $\mu > 1$ the error
+# grows.
 
 # %%
 much, g, history = 1.5, 1.0, []
@@ -213,23 +241,26 @@ assert abs(history[-1] - 1.2) > 0.1  # it has not converged
 assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 
 # %% [markdown]
-# **Uniqueness fails.** If the node slips to the *left*, friction pushes it to the right with $r_t = +\mu r_n$. The coupling
-# then draws the node down: $u_n = (Q_{nn} + \mu Q_{nt})\, r_n + q_n = (1 - \mu)\, r_n + q_n$. For $\mu > 1$ a larger contact
-# force makes the gap *smaller*. The node can wedge itself in. As soon as $\mu$ exceeds $Q_{nn} / |Q_{nt}| = 1$, there are
-# loads with several solutions.
+# **Uniqueness fails.** If the node slips to the *left*, friction pushes it to the right with $r_t =
+# +\mu r_n$. The coupling then draws the node down: $u_n = (Q_{nn} + \mu Q_{nt})\, r_n + q_n = (1 -
+# \mu)\, r_n + q_n$. For $\mu > 1$ a larger contact force makes the gap *smaller*. The node can
+# wedge itself in. As soon as $\mu$ exceeds $Q_{nn} / |Q_{nt}| = 1$, there are loads with several
+# solutions.
 
 # %%
 wedged = InterfaceProblem(Q, [[0.1, -0.5]], 1.5)
 for found in all_solutions(wedged):
     state = Q @ found.reactions[0] + wedged.q[0]
-    print(f"force {np.round(found.reactions[0], 4)}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm")
+    print(
+        f"force {np.round(found.reactions[0], 4)}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm"
+    )
 
 assert len(all_solutions(wedged)) == 3
 assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 
 # %% [markdown]
-# Under the same load the node may hang freely, stick, or slip. Which of these happens depends on what happened before, and
-# no static law can tell.
+# Under the same load the node may hang freely, stick, or slip. Which of these happens depends on
+# what happened before, and no static law can tell.
 #
 # | method | what it solves | it fails if |
 # |---|---|---|
@@ -239,16 +270,16 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 #
 # ## Exercises
 #
-# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1, 2)$ mm/N, $q = (-1, 1)$ mm and $\mu = 0.3$. Find the normal force
-# and the friction force.
+# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1, 2)$ mm/N, $q = (-1, 1)$ mm and $\mu =
+# 0.3$. Find the normal force and the friction force.
 
 # %% tags=["exercise"]
 answer = ...  # (r_n, r_t) in N
 
 # %% [markdown] tags=["solution"]
-# Nothing couples the directions, so $r_n = -q_n / Q_{nn} = 1$ N. To stick, the node would need
-# $r_t = -q_t / Q_{tt} = -0.5$ N, which is more than friction can give. So the node slips to the right with $r_t = -0.3$ N.
-# The slip is $u_t = 1 - 0.6 = 0.4$ mm.
+# Nothing couples the directions, so $r_n = -q_n / Q_{nn} = 1$ N. To stick, the node would need $r_t
+# = -q_t / Q_{tt} = -0.5$ N, which is more than friction can give. So the node slips to the right
+# with $r_t = -0.3$ N. The slip is $u_t = 1 - 0.6 = 0.4$ mm.
 
 # %% tags=["solution"]
 answer = (1.0, -0.3)
@@ -257,13 +288,15 @@ answer = (1.0, -0.3)
 check("2.1", answer, (1.0, -0.3))
 
 # %% [markdown]
-# **2.2** (Pen and paper.) What is the smallest friction coefficient with which the node of this chapter sticks?
+# **2.2** (Pen and paper.) What is the smallest friction coefficient with which the node of this
+# chapter sticks?
 
 # %% tags=["exercise"]
 answer = ...
 
 # %% [markdown] tags=["solution"]
-# If the node sticks, $u = 0$, so that $r = -K q = (1, -2)$ N. The cone contains this force if $\mu \ge 2$.
+# If the node sticks, $u = 0$, so that $r = -K q = (1, -2)$ N. The cone contains this force if $\mu
+# \ge 2$.
 
 # %% tags=["solution"]
 answer = 2.0
@@ -272,8 +305,8 @@ answer = 2.0
 check("2.2", answer, 2.0)
 
 # %% [markdown]
-# **2.3** Write the iteration of Acary and Cadoux. Solve the case $\mu = 1.5$ with it, in which Tresca's iteration failed. The
-# certificate grades your forces.
+# **2.3** Write the iteration of Acary and Cadoux. Solve the case $\mu = 1.5$ with it, in which
+# Tresca's iteration failed. The certificate grades your forces.
 
 # %% tags=["exercise"]
 answer = ...  # (r_n, r_t) in N
@@ -291,17 +324,18 @@ answer = x.value
 check("2.3", answer, InterfaceProblem(Q, [q], 1.5))
 
 # %% [markdown]
-# **2.4** (Pen and paper.) Find the three solutions of the wedged node, $q = (0.1, -0.5)$ mm and $\mu = 1.5$. Try the three
-# states open, stick, and slip to the left. Give the three normal forces, the smallest first.
+# **2.4** (Pen and paper.) Find the three solutions of the wedged node, $q = (0.1, -0.5)$ mm and
+# $\mu = 1.5$. Try the three states open, stick, and slip to the left. Give the three normal forces,
+# the smallest first.
 
 # %% tags=["exercise"]
 answer = ...  # three numbers [N]
 
 # %% [markdown] tags=["solution"]
-# *Open:* if $r = 0$, then $u = q$, and the gap $u_n = 0.1$ mm is not negative. This is a solution. *Stick:* if $u = 0$, then
-# $r = -K q = (0.3, 0.4)$ N, and the cone contains this force, because $0.4 \le 1.5 \cdot 0.3$. *Slip to the left:*
-# $u_n = (1 - 1.5)\, r_n + 0.1 = 0$ gives $r_n = 0.2$ N and $r_t = 0.3$ N. The slip $u_t = -0.2 + 0.6 - 0.5 = -0.1$ mm is
-# negative, as we assumed.
+# *Open:* if $r = 0$, then $u = q$, and the gap $u_n = 0.1$ mm is not negative. This is a solution.
+# *Stick:* if $u = 0$, then $r = -K q = (0.3, 0.4)$ N, and the cone contains this force, because
+# $0.4 \le 1.5 \cdot 0.3$. *Slip to the left:* $u_n = (1 - 1.5)\, r_n + 0.1 = 0$ gives $r_n = 0.2$ N
+# and $r_t = 0.3$ N. The slip $u_t = -0.2 + 0.6 - 0.5 = -0.1$ mm is negative, as we assumed.
 
 # %% tags=["solution"]
 answer = (0.0, 0.2, 0.3)
@@ -312,10 +346,12 @@ check("2.4", answer, (0.0, 0.2, 0.3))
 # %% [markdown]
 # ## References
 #
-# - G. De Saxcé, Z.-Q. Feng, The bipotential method: a constructive approach to design the complete contact law with friction,
-#   *Math. Comput. Modelling* 28 (1998), [doi:10.1016/S0895-7177(98)00119-8](https://doi.org/10.1016/S0895-7177(98)00119-8).
-# - V. Acary, F. Cadoux, C. Lemaréchal, J. Malick, A formulation of the linear discrete Coulomb friction problem via convex
-#   optimization, *ZAMM* 91 (2011), [doi:10.1002/zamm.201000073](https://doi.org/10.1002/zamm.201000073).
+# - G. De Saxcé, Z.-Q. Feng, The bipotential method: a constructive approach to design the complete
+#   contact law with friction, *Math. Comput. Modelling* 28 (1998),
+#   [doi:10.1016/S0895-7177(98)00119-8](https://doi.org/10.1016/S0895-7177(98)00119-8).
+# - V. Acary, F. Cadoux, C. Lemaréchal, J. Malick, A formulation of the linear discrete Coulomb
+#   friction problem via convex optimization, *ZAMM* 91 (2011),
+#   [doi:10.1002/zamm.201000073](https://doi.org/10.1002/zamm.201000073).
 #
 # Next: [many nodes without friction](chapter_3_a_string_on_a_floor.py).
 

@@ -1,12 +1,12 @@
 # %% [markdown]
 # # Chapter 3. A string on a floor: many nodes
 #
-# A heavy string sags until it lies on a floor. The question is now *where* it touches the floor. The programs of chapter 1
-# stay the same, but their numbers become vectors and matrices. This problem has an exact solution, so we can measure the
-# errors of every method.
+# A heavy string sags until it lies on a floor. The question is now *where* it touches the floor.
+# The programs of chapter 1 stay the same, but their numbers become vectors and matrices. This
+# problem has an exact solution, so we can measure the errors of every method.
 #
-# You need chapter 1, and the idea of finite differences or finite elements. The chapter takes 40 minutes with its
-# exercises.
+# You need chapter 1, and the idea of finite differences or finite elements. The chapter takes 40
+# minutes with its exercises.
 
 # %%
 import cvxpy as cp
@@ -19,10 +19,11 @@ from contactopt.teaching import Slider, check
 # %% [markdown]
 # ## The mechanical system
 #
-# A string of length $L$ and tension $T$ is fixed at both ends, at the height $d$ above a floor. Its weight per length is
-# $f$. We divide the string into $N$ elements of the length $h = L / N$. The gap between node $i$ and the floor is $u_i$. The
-# force of the floor on node $i$ is $r_i$. Both are positive in the direction of the normal $n$, upwards. There is no
-# friction in this chapter, so each node has a normal component only.
+# A string of length $L$ and tension $T$ is fixed at both ends, at the height $d$ above a floor. Its
+# weight per length is $f$. We divide the string into $N$ elements of the length $h = L / N$. The
+# gap between node $i$ and the floor is $u_i$. The force of the floor on node $i$ is $r_i$. Both are
+# positive in the direction of the normal $n$, upwards. There is no friction in this chapter, so
+# each node has a normal component only.
 
 # %%
 L, T, f, d = 1.0, 1.0, 8.0, 0.25  # mm, N, N/mm, mm
@@ -44,16 +45,20 @@ for tail, head, name, color, at in (
 ):
     ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
     ax.text(*at, name, color=color)
-for x_at, top, name, at in ((0.0, 0.25, "$d$", (0.012, 0.03)), (15 / 16, sag[15], "$u_i$", (0.95, 0.05))):
+for x_at, top, name, at in (
+    (0.0, 0.25, "$d$", (0.012, 0.03)),
+    (15 / 16, sag[15], "$u_i$", (0.95, 0.05)),
+):
     ax.annotate("", (x_at, top), (x_at, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
     ax.text(*at, name, color="C2")
 ax.set(xlim=(-0.15, L + 0.15), ylim=(-0.075, 0.3))
 _ = ax.axis("off")
 
 # %% [markdown]
-# We put the stiffness of the string into a matrix $A$. Its row for node $i$ is $\tfrac{T}{h} (2 u_i - u_{i-1} - u_{i+1})$,
-# the force with which the tension resists the kink at the node. The weight of node $i$ is $w_i = f h$. Without the floor the
-# gaps would be $q = d - A^{-1} w$. The compliance is $Q = A^{-1}$.
+# We put the stiffness of the string into a matrix $A$. Its row for node $i$ is $\tfrac{T}{h} (2 u_i
+# - u_{i-1} - u_{i+1})$, the force with which the tension resists the kink at the node. The weight
+# of node $i$ is $w_i = f h$. Without the floor the gaps would be $q = d - A^{-1} w$. The compliance
+# is $Q = A^{-1}$.
 
 
 # %%
@@ -72,9 +77,10 @@ q = d - Q @ weight
 # %% [markdown]
 # ## Primal and dual
 #
-# The string takes the shape of least energy among all shapes above the floor (primal). The forces are the minimum of another
-# function (dual). In these programs $u$, $r$, $w$ and $q$ are vectors with one number for each inner node. The difference
-# $u - d$ says how high the nodes are relative to the ends; it is negative where the string sags.
+# The string takes the shape of least energy among all shapes above the floor (primal). The forces
+# are the minimum of another function (dual). In these programs $u$, $r$, $w$ and $q$ are vectors
+# with one number for each inner node. The difference $u - d$ says how high the nodes are relative
+# to the ends; it is negative where the string sags.
 #
 # | | primal | dual |
 # |---|---|---|
@@ -84,8 +90,8 @@ q = d - Q @ weight
 #
 # ## The optimality conditions
 #
-# Both programs have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium,
-# and Signorini's conditions at every node:
+# Both programs have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT
+# conditions). They are equilibrium, and Signorini's conditions at every node:
 #
 # $$ u = Q\, r + q, \qquad u_i \ge 0, \qquad r_i \ge 0, \qquad u_i\, r_i = 0 . $$
 #
@@ -94,11 +100,15 @@ q = d - Q @ weight
 # %%
 u = cp.Variable(len(x))
 floor = u >= 0
-cp.Problem(cp.Minimize(cp.quad_form(u - d, cp.psd_wrap(A)) / 2 + weight @ u), [floor]).solve(solver=cp.CLARABEL)
+cp.Problem(cp.Minimize(cp.quad_form(u - d, cp.psd_wrap(A)) / 2 + weight @ u), [floor]).solve(
+    solver=cp.CLARABEL
+)
 
 r = cp.Variable(len(x))
 push = r >= 0
-cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [push]).solve(solver=cp.CLARABEL)
+cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [push]).solve(
+    solver=cp.CLARABEL
+)
 
 assert np.allclose(u.value, push.dual_value, atol=1e-5)
 assert np.allclose(r.value, floor.dual_value, atol=1e-3)
@@ -106,13 +116,14 @@ assert np.allclose(r.value, floor.dual_value, atol=1e-3)
 # %% [markdown]
 # ## The exact solution
 #
-# Where the string hangs freely, it is a parabola, because $u'' = f / T$. It leaves the floor without a kink, at the distance
-# $a$ from the end. So near the left end $u = \tfrac{f}{2T} (a - x)^2$. At the end itself, $x = 0$, the height is $d$:
+# Where the string hangs freely, it is a parabola, because $u'' = f / T$. It leaves the floor
+# without a kink, at the distance $a$ from the end. So near the left end $u = \tfrac{f}{2T} (a -
+# x)^2$. At the end itself, $x = 0$, the height is $d$:
 #
 # $$ d = \frac{f a^2}{2 T}, \qquad a = \sqrt{2 T d / f} . $$
 #
-# On the floor the string is straight, so its tension carries nothing. There the floor carries exactly the weight:
-# $r_i = f h$.
+# On the floor the string is straight, so its tension carries nothing. There the floor carries
+# exactly the weight: $r_i = f h$.
 
 
 # %%
@@ -160,13 +171,15 @@ Slider("height of the ends d [mm]", np.linspace(0, 1.25, 11), lowered, start=2)
 # %% [markdown]
 # ## Newton's method: guess the contact set
 #
-# If we knew which nodes touch the floor, we would only have to solve a linear system: $u_i = 0$ at these nodes, and $r_i = 0$
-# at all others. The *primal-dual active set method* guesses the set of nodes that touch, solves the linear system, and
-# corrects the guess. A node belongs to the new set if $r_i - \rho u_i > 0$, where $\rho$ is any positive stiffness. The
-# method ends when the set stays as it is.
+# If we knew which nodes touch the floor, we would only have to solve a linear system: $u_i = 0$ at
+# these nodes, and $r_i = 0$ at all others. The *primal-dual active set method* guesses the set of
+# nodes that touch, solves the linear system, and corrects the guess. A node belongs to the new set
+# if $r_i - \rho u_i > 0$, where $\rho$ is any positive stiffness. The method ends when the set
+# stays as it is.
 #
-# Signorini's conditions are the same as the equations $r_i = [\,r_i - \rho u_i\,]_+$ with $[x]_+ = \max(x, 0)$. These equations
-# have kinks, but Newton's method can be applied to them, and it is exactly the active set method.
+# Signorini's conditions are the same as the equations $r_i = [\,r_i - \rho u_i\,]_+$ with $[x]_+ =
+# \max(x, 0)$. These equations have kinks, but Newton's method can be applied to them, and it is
+# exactly the active set method.
 
 
 # %%
@@ -194,15 +207,15 @@ assert np.allclose(active_set(Q, q)[0], r.value, atol=1e-3)
 assert counts[320] <= 320 / 4
 
 # %% [markdown]
-# The number of steps grows with the number of nodes. If the first guess is far from the answer, the set shrinks only by a few
-# nodes at its edge in every step. A start from the answer on a coarser mesh cures this (exercise 3.4). contactopt does so on
-# large problems.
+# The number of steps grows with the number of nodes. If the first guess is far from the answer, the
+# set shrinks only by a few nodes at its edge in every step. A start from the answer on a coarser
+# mesh cures this (exercise 3.4). contactopt does so on large problems.
 #
 # ## Penalty and proximal Galerkin once more
 #
-# Both methods of chapter 1 work for vectors too. The penalty method puts springs of the stiffness $\kappa$ per length below
-# the floor. The proximal Galerkin method writes the gap at every node as $u_i = e^{\psi_i}$. Each of its steps solves these
-# equations by Newton's method:
+# Both methods of chapter 1 work for vectors too. The penalty method puts springs of the stiffness
+# $\kappa$ per length below the floor. The proximal Galerkin method writes the gap at every node as
+# $u_i = e^{\psi_i}$. Each of its steps solves these equations by Newton's method:
 #
 # $$ \alpha\,\bigl(A (e^\psi - d) + w\bigr) + h\, (\psi - \psi_{\text{last}}) = 0 . $$
 
@@ -227,7 +240,9 @@ def proximal_galerkin(steps, alpha=0.1):
             gap = np.exp(psi)
             step = alpha * (A @ (gap - d) + weight) + h * (psi - last)
             change = np.linalg.solve(alpha * A * gap + h * np.eye(len(x)), -step)
-            psi = psi + change * min(1.0, 2 / np.abs(change).max())  # the exponential allows no large step
+            psi = psi + change * min(
+                1.0, 2 / np.abs(change).max()
+            )  # the exponential allows no large step
             if np.abs(change).max() < 1e-10:
                 break
         errors.append(np.abs(np.exp(psi) - truth).max())
@@ -239,7 +254,9 @@ depths = [-penalty(kappa).min() for kappa in stiffness]
 gap, errors = proximal_galerkin(25)
 fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.loglog(stiffness, depths, "o-")
-left.set(xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]", ylabel="largest depth [mm]", title="penalty")
+left.set(
+    xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]", ylabel="largest depth [mm]", title="penalty"
+)
 right.semilogy(range(1, 26), errors, "s-", color="C1", label="against the exact string")
 right.set(xlabel="step [-]", ylabel="largest error of the gap [mm]", title="proximal Galerkin")
 
@@ -247,28 +264,35 @@ assert np.isclose(depths[-1] * stiffness[-1], f, rtol=0.05)  # the springs carry
 assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %% [markdown]
-# The string of the penalty method sinks into the floor by $f / \kappa$, as deep as a bed of springs gives way under its weight.
-# The string of the proximal method never touches the floor, and comes closer in every step.
+# The string of the penalty method sinks into the floor by $f / \kappa$, as deep as a bed of springs
+# gives way under its weight. The string of the proximal method never touches the floor, and comes
+# closer in every step.
 #
 # ## What fails
 #
-# **A decision from a rough answer is wrong.** The solver that we use here is an interior-point method. Its answers have a small
-# positive force at every node. So we cannot ask `r > 0` to find out which nodes touch. Instead we compare $r_i$ with $u_i$,
-# each in its own scale.
+# **A decision from a rough answer is wrong.** The solver that we use here is an interior-point
+# method. Its answers have a small positive force at every node. So we cannot ask `r > 0` to find
+# out which nodes touch. Instead we compare $r_i$ with $u_i$, each in its own scale.
 
 # %%
 loose = cp.Variable(len(x))
 program = cp.Problem(cp.Minimize(cp.quad_form(loose, cp.psd_wrap(Q)) / 2 + q @ loose), [loose >= 0])
 program.solve(solver=cp.CLARABEL, tol_gap_abs=1e-3, tol_gap_rel=1e-3, tol_feas=1e-3)
-print("nodes with r > 0:", int(np.sum(loose.value > 0)), "; nodes that touch:", int(np.sum(active_set(Q, q)[0] > 0)))
+print(
+    "nodes with r > 0:",
+    int(np.sum(loose.value > 0)),
+    "; nodes that touch:",
+    int(np.sum(active_set(Q, q)[0] > 0)),
+)
 
 assert np.sum(loose.value > 0) != np.sum(active_set(Q, q)[0] > 0)
 
 # %% [markdown]
-# **Fine meshes are badly conditioned.** The condition number of $Q$ is the ratio of its largest to its smallest eigenvalue.
-# Iterative methods become slow when it is large. For a string it grows like $N^2$, because the compliance divides a wave of
-# force by the *square* of its wave number. On the surface of a solid body the compliance divides by the wave number itself,
-# so that the condition number grows like $N$ only. Chapter 6 makes use of this.
+# **Fine meshes are badly conditioned.** The condition number of $Q$ is the ratio of its largest to
+# its smallest eigenvalue. Iterative methods become slow when it is large. For a string it grows
+# like $N^2$, because the compliance divides a wave of force by the *square* of its wave number. On
+# the surface of a solid body the compliance divides by the wave number itself, so that the
+# condition number grows like $N$ only. Chapter 6 makes use of this.
 
 # %%
 conditions = {N: np.linalg.cond(string(N)[0]) for N in (20, 40, 80)}
@@ -279,8 +303,8 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # %% [markdown]
 # ## Exercises
 #
-# **3.1** (Pen and paper.) The ends of the string are only 0.09 mm above the floor. At which distance from the end does the
-# contact begin?
+# **3.1** (Pen and paper.) The ends of the string are only 0.09 mm above the floor. At which
+# distance from the end does the contact begin?
 
 # %% tags=["exercise"]
 answer = ...  # distance from the end [mm]
@@ -310,14 +334,16 @@ answer = 0.7
 check("3.2", answer, 0.7)
 
 # %% [markdown]
-# **3.3** A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) / 0.2)^2)$ mm where this number is positive.
-# The ends of the string stay at $d = 0.25$ mm. Change $q$ and solve for the 39 forces. The certificate grades them.
+# **3.3** A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) / 0.2)^2)$ mm
+# where this number is positive. The ends of the string stay at $d = 0.25$ mm. Change $q$ and solve
+# for the 39 forces. The certificate grades them.
 
 # %% tags=["exercise"]
 answer = ...  # 39 forces [N]
 
 # %% [markdown] tags=["solution"]
-# The gap is now measured from the hill, so the height of the hill is subtracted from $q$. $Q$ does not change.
+# The gap is now measured from the hill, so the height of the hill is subtracted from $q$. $Q$ does
+# not change.
 
 # %% tags=["solution"]
 hill = np.maximum(0.2 * (1 - ((x - 0.5) / 0.2) ** 2), 0)
@@ -326,7 +352,9 @@ answer = active_set(Q, q - hill)[0]
 
 # %%
 def frictionless(Q, q):
-    """An interface problem in the forces r_n alone: tangential components get the same compliance, and no friction."""
+    """An interface problem in the forces r_n alone: tangential components get the same compliance,
+    and no friction.
+    """
     return InterfaceProblem(np.kron(Q, np.eye(2)), np.column_stack([q, np.zeros(len(q))]), 0.0)
 
 
@@ -335,8 +363,9 @@ given = answer if answer is ... else np.column_stack([answer, np.zeros(len(x))])
 check("3.3", given, hill_problem)
 
 # %% [markdown]
-# **3.4** The active set method above starts with the guess that all nodes touch. On 320 elements, start it from the set that
-# it found on 160 elements. How many steps does it take? (`np.repeat` or `np.interp` carry a set to the finer mesh.)
+# **3.4** The active set method above starts with the guess that all nodes touch. On 320 elements,
+# start it from the set that it found on 160 elements. How many steps does it take? (`np.repeat` or
+# `np.interp` carry a set to the finer mesh.)
 
 # %% tags=["exercise"]
 answer = ...  # number of steps
@@ -361,8 +390,9 @@ check("3.4", answer, lambda steps: 1 <= steps <= 5)
 # %% [markdown]
 # ## References
 #
-# - M. Hintermüller, K. Ito, K. Kunisch, The primal-dual active set strategy as a semismooth Newton method, *SIAM J. Optim.*
-#   13 (2002), [doi:10.1137/S1052623401383558](https://doi.org/10.1137/S1052623401383558).
+# - M. Hintermüller, K. Ito, K. Kunisch, The primal-dual active set strategy as a semismooth Newton
+#   method, *SIAM J. Optim.* 13 (2002),
+#   [doi:10.1137/S1052623401383558](https://doi.org/10.1137/S1052623401383558).
 # - B. Keith, T. M. Surowiec, Proximal Galerkin, *Found. Comput. Math.* (2024),
 #   [doi:10.1007/s10208-024-09681-8](https://doi.org/10.1007/s10208-024-09681-8).
 #

@@ -1,35 +1,57 @@
 # %% [markdown]
 # # Chapter 4. From bodies to the interface
 #
-# A real body has thousands of unknowns, and only those on its surface can touch anything. In this chapter we compute the
-# stiffness of a block by finite elements. Then we eliminate all unknowns that cannot touch the floor. What remains is a
-# small problem of the form that you know: $u = Q r + q$.
+# A real body has thousands of unknowns, and only those on its surface can touch anything. In this
+# chapter we compute the stiffness of a block by finite elements. Then we eliminate all unknowns
+# that cannot touch the floor. What remains is a small problem of the form that you know: $u = Q r +
+# q$.
 #
-# You need chapters 1 to 3, and you should know what a finite element is. The chapter takes 50 minutes with its exercises.
+# You need chapters 1 to 3, and you should know what a finite element is. The chapter takes 50
+# minutes with its exercises.
 
 # %%
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
-from skfem import Basis, BilinearForm, ElementTriP1, ElementVector, FacetBasis, LinearForm, MeshTri, condense
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementTriP1,
+    ElementVector,
+    FacetBasis,
+    LinearForm,
+    MeshTri,
+    condense,
+)
 from skfem import solve as solve_linear
 from skfem.helpers import div
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from contactopt import InterfaceProblem, Material, Part, Rigid, Scene, Traction, natural_map_residual, reduce, solve
+from contactopt import (
+    InterfaceProblem,
+    Material,
+    Part,
+    Rigid,
+    Scene,
+    Traction,
+    natural_map_residual,
+    reduce,
+    solve,
+)
 from contactopt.problem.laws.tresca import Tresca
 from contactopt.teaching import Slider, check
 
 # %% [markdown]
 # ## The mechanical system
 #
-# A block of rubber, 4 mm wide and 2 mm high, hangs on a rigid plate. The plate comes down by 0.1 mm, onto a rigid floor that
-# is slightly round: before the plate moves, the gap at the place $x$ is $g(x) = x^2 / 20$ mm. The block is long in the third
-# direction. So it is in plane strain, and all forces are those of a slice of 1 mm.
+# A block of rubber, 4 mm wide and 2 mm high, hangs on a rigid plate. The plate comes down by 0.1
+# mm, onto a rigid floor that is slightly round: before the plate moves, the gap at the place $x$ is
+# $g(x) = x^2 / 20$ mm. The block is long in the third direction. So it is in plane strain, and all
+# forces are those of a slice of 1 mm.
 #
-# The normal $n$ points out of the floor, upwards, and the tangent $t$ points to the right. (The floor is so flat that we take
-# the same $n$ everywhere.) As before, $r$ is the force on the upper body, here the block, and every contact has its normal
-# component first.
+# The normal $n$ points out of the floor, upwards, and the tangent $t$ points to the right. (The
+# floor is so flat that we take the same $n$ everywhere.) As before, $r$ is the force on the upper
+# body, here the block, and every contact has its normal component first.
 
 # %%
 E, nu, lowered = 5.0, 0.3, 0.1  # MPa, -, mm
@@ -68,40 +90,46 @@ _ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), y
 # %% [markdown]
 # ## Primal: all displacements
 #
-# Let $U$ be the displacements of all nodes, $U_y$ their vertical parts, and $K$ the stiffness matrix. The block takes the
-# shape of least elastic energy that does not pass through the floor:
+# Let $U$ be the displacements of all nodes, $U_y$ their vertical parts, and $K$ the stiffness
+# matrix. The block takes the shape of least elastic energy that does not pass through the floor:
 #
 # $$ \min_U \; \tfrac12 U' K U \qquad \text{subject to} \qquad U_y + g \ge 0 \text{ on the bottom}, \quad U = U_{\text{top}} \text{ on the top.} $$
 #
-# Without friction this is the primal program of chapter 3. It only has many more unknowns that have no constraint. The
-# multipliers of the constraint are the normal forces of the floor on the nodes.
+# Without friction this is the primal program of chapter 3. It only has many more unknowns that have
+# no constraint. The multipliers of the constraint are the normal forces of the floor on the nodes.
 
 # %%
 U = cp.Variable(basis.N)
 floor = U[c_n] + gap >= 0
-primal = cp.Problem(cp.Minimize(cp.quad_form(U, cp.psd_wrap(K)) / 2), [floor, U[held] == U_top[held]])
+primal = cp.Problem(
+    cp.Minimize(cp.quad_form(U, cp.psd_wrap(K)) / 2), [floor, U[held] == U_top[held]]
+)
 primal.solve(solver=cp.CLARABEL)
 pressed = floor.dual_value
-print(f"the floor carries {pressed.sum():.4f} N; {int(np.sum(pressed > 1e-4))} of {len(x)} nodes touch")
+print(
+    f"the floor carries {pressed.sum():.4f} N; {int(np.sum(pressed > 1e-4))} of {len(x)} nodes touch"
+)
 
 assert 3 < np.sum(pressed > 1e-4) < len(x)
 
 # %% [markdown]
 # ## Elimination
 #
-# Let the index $I$ stand for the unknowns that are free to move. Let $T$ be the matrix that picks the unknowns of the contact
-# out of these, the normal one first at each node. The free unknowns are in equilibrium under the contact forces $r$ and the
-# motion of the plate:
+# Let the index $I$ stand for the unknowns that are free to move. Let $T$ be the matrix that picks
+# the unknowns of the contact out of these, the normal one first at each node. The free unknowns are
+# in equilibrium under the contact forces $r$ and the motion of the plate:
 #
 # $$ K_{II}\, U_I = T' r - K_{I,\text{top}}\, U_{\text{top}} . $$
 #
-# We solve this for $U_I$. The displacements of the contact are $T U_I$, and the gaps are these plus $g$ in the direction $n$:
+# We solve this for $U_I$. The displacements of the contact are $T U_I$, and the gaps are these plus
+# $g$ in the direction $n$:
 #
 # $$ u = Q\, r + q, \qquad Q = T K_{II}^{-1} T', \qquad q = T U_I^0 + g\, n, $$
 #
-# where $U_I^0$ is the solution without contact forces. $Q$ is the compliance of the surface: it says how the surface moves
-# under forces on the surface. It is also the inverse of the *Schur complement*, which is the stiffness that remains when the
-# inner unknowns are eliminated. Nothing has been approximated.
+# where $U_I^0$ is the solution without contact forces. $Q$ is the compliance of the surface: it
+# says how the surface moves under forces on the surface. It is also the inverse of the *Schur
+# complement*, which is the stiffness that remains when the inner unknowns are eliminated. Nothing
+# has been approximated.
 
 # %%
 free = np.setdiff1d(np.arange(basis.N), held)
@@ -125,24 +153,28 @@ assert np.allclose(S, schur)
 # %% [markdown]
 # ## Dual: forces on the contact alone
 #
-# Without friction the unknowns of the dual problem are the normal forces alone. $Q_{nn}$ and $q_n$ are the normal parts of $Q$
-# and $q$:
+# Without friction the unknowns of the dual problem are the normal forces alone. $Q_{nn}$ and $q_n$
+# are the normal parts of $Q$ and $q$:
 #
 # $$ \min_{r_n \ge 0} \; \tfrac12 r_n' Q_{nn} r_n + q_n' r_n . $$
 #
 # ## The optimality conditions
 #
-# Primal and dual have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium
-# of the block, and Signorini's conditions at every node $i$ of the contact:
+# Primal and dual have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT
+# conditions). They are equilibrium of the block, and Signorini's conditions at every node $i$ of
+# the contact:
 #
 # $$ u_n = Q_{nn} r_n + q_n, \qquad u_{n,i} \ge 0, \qquad r_{n,i} \ge 0, \qquad u_{n,i}\, r_{n,i} = 0 . $$
 #
-# The program in `cvxpy` is as short as in chapter 1, and its forces are the multipliers of the primal program:
+# The program in `cvxpy` is as short as in chapter 1, and its forces are the multipliers of the
+# primal program:
 
 # %%
 r_n = cp.Variable(len(x))
 push = r_n >= 0
-dual = cp.Problem(cp.Minimize(cp.quad_form(r_n, cp.psd_wrap(Q[::2, ::2])) / 2 + q[:, 0] @ r_n), [push])
+dual = cp.Problem(
+    cp.Minimize(cp.quad_form(r_n, cp.psd_wrap(Q[::2, ::2])) / 2 + q[:, 0] @ r_n), [push]
+)
 dual.solve(solver=cp.CLARABEL)
 
 frictionless = InterfaceProblem(Q, q, 0.0)
@@ -152,8 +184,9 @@ assert np.allclose(r_n.value, pressed, atol=1e-4)
 assert answer.solved and np.allclose(answer.reactions[:, 0], pressed, atol=1e-4)
 
 # %% [markdown]
-# Without contact forces the displacements of the block are proportional to the motion of the plate. So if the plate comes down
-# further, only $q$ changes, and $Q$ stays the same. The slider shows how the contact grows.
+# Without contact forces the displacements of the block are proportional to the motion of the plate.
+# So if the plate comes down further, only $q$ changes, and $Q$ stays the same. The slider shows how
+# the contact grows.
 
 
 # %% tags=["hide-input"]
@@ -173,15 +206,17 @@ Slider("the plate comes down by [mm]", np.linspace(0.02, 0.2, 10), further_down,
 # %% [markdown]
 # ## Nitsche's method with finite elements
 #
-# Nitsche's method has no multiplier. It takes the pressure from the stresses in the elements, $p(U) = -\sigma_{yy}$. The gap is
-# $u_n = U_y + g$. The parameter is $\gamma = \gamma_0 E / h$ with the size $h$ of the elements and a number $\gamma_0$. In
-# chapter 1 we minimised a function. Here this function holds integrals over the bottom of the block, and its derivative must
-# vanish for every virtual displacement $v$:
+# Nitsche's method has no multiplier. It takes the pressure from the stresses in the elements, $p(U)
+# = -\sigma_{yy}$. The gap is $u_n = U_y + g$. The parameter is $\gamma = \gamma_0 E / h$ with the
+# size $h$ of the elements and a number $\gamma_0$. In chapter 1 we minimised a function. Here this
+# function holds integrals over the bottom of the block, and its derivative must vanish for every
+# virtual displacement $v$:
 #
 # $$ a(U, v) - \int \tfrac1\gamma\, p(U)\, p(v) + \int \tfrac1\gamma\, [\,p(U) - \gamma u_n\,]_+ \,\bigl(p(v) - \gamma v_y\bigr) = 0 . $$
 #
-# The first term, $a(U, v)$, is the virtual work of the stresses. The only nonlinear part is the bracket
-# $[x]_+ = \max(x, 0)$. So in every step Newton's method asks where the bracket is positive, and solves a linear system.
+# The first term, $a(U, v)$, is the virtual work of the stresses. The only nonlinear part is the
+# bracket $[x]_+ = \max(x, 0)$. So in every step Newton's method asks where the bracket is positive,
+# and solves a linear system.
 
 # %%
 lam, shear = lame_parameters(E, nu)
@@ -213,9 +248,13 @@ step = 0
 while step < 30:
     step += 1
     system = K + fixed + bracket.assemble(edge, touches=touches)
-    nitsche = solve_linear(*condense(system, distance.assemble(edge, touches=touches), x=U_top, D=held))
+    nitsche = solve_linear(
+        *condense(system, distance.assemble(edge, touches=touches), x=U_top, D=held)
+    )
     field = edge.interpolate(nitsche)
-    value = pressure(field) - gamma * (field[1] + np.asarray(edge.global_coordinates())[0] ** 2 / 20)
+    value = pressure(field) - gamma * (
+        field[1] + np.asarray(edge.global_coordinates())[0] ** 2 / 20
+    )
     if np.array_equal(value > 0, touches > 0):
         break
     touches = (value > 0).astype(float)
@@ -223,7 +262,13 @@ carried = np.sum(np.maximum(value, 0) * edge.dx)
 print(f"Nitsche: {step} steps, the floor carries {carried:.4f} N")
 
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
-ax.plot(x[np.argsort(x)], pressed[np.argsort(x)] / (4 / 32), "C0o-", mfc="none", label="multiplier / area of the node")
+ax.plot(
+    x[np.argsort(x)],
+    pressed[np.argsort(x)] / (4 / 32),
+    "C0o-",
+    mfc="none",
+    label="multiplier / area of the node",
+)
 middle = np.asarray(edge.global_coordinates())[0].mean(axis=1)
 order = np.argsort(middle)
 ax.plot(middle[order], np.maximum(value, 0).mean(axis=1)[order], "C1.", label="Nitsche's bracket")
@@ -233,20 +278,23 @@ ax.legend(frameon=False)
 assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 
 # %% [markdown]
-# Both methods find the same pressure, up to the error of the mesh. If $\gamma_0$ is too small, the energy has no minimum, as in
-# chapter 1 (exercise 4.4).
+# Both methods find the same pressure, up to the error of the mesh. If $\gamma_0$ is too small, the
+# energy has no minimum, as in chapter 1 (exercise 4.4).
 #
 # ## Friction with a given bound
 #
-# With Tresca friction the primal energy gets the term $\sum_i b_i |u_{t,i}|$, where $b_i$ is the friction bound of node $i$.
-# (Chapter 2 called it $g$. In this chapter $g$ is the gap.) In the dual problem every tangential force gets the constraint
-# $|r_{t,i}| \le b_i$. It is one convex program again, with 66 unknowns.
+# With Tresca friction the primal energy gets the term $\sum_i b_i |u_{t,i}|$, where $b_i$ is the
+# friction bound of node $i$. (Chapter 2 called it $g$. In this chapter $g$ is the gap.) In the dual
+# problem every tangential force gets the constraint $|r_{t,i}| \le b_i$. It is one convex program
+# again, with 66 unknowns.
 
 # %%
 bound = np.full(len(x), 0.02)  # N
 r = cp.Variable(2 * len(x))
 law = [r[::2] >= 0, cp.abs(r[1::2]) <= bound]
-cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q.ravel() @ r), law).solve(solver=cp.CLARABEL)
+cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q.ravel() @ r), law).solve(
+    solver=cp.CLARABEL
+)
 with_bound = InterfaceProblem(Q, q, Tresca(bound))
 
 assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
@@ -254,13 +302,14 @@ assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
 # %% [markdown]
 # ## What fails: a body that only contact holds
 #
-# Take the plate away, and load the top by a pressure of 1 MPa. Now nothing but a flat floor holds the block. The block can move
-# as a rigid body, so its stiffness matrix is singular and $K_{II}^{-1}$ does not exist.
+# Take the plate away, and load the top by a pressure of 1 MPa. Now nothing but a flat floor holds
+# the block. The block can move as a rigid body, so its stiffness matrix is singular and
+# $K_{II}^{-1}$ does not exist.
 #
-# The remedy is to treat the rigid motions as unknowns of the interface problem. In the plane there are three: two
-# translations and a rotation. The columns of a matrix $V$ hold what these motions do to the contact. The unknowns $\lambda$
-# say how far the block moves in each of them. In return, the contact forces have to balance the load, and $s$ is minus the
-# load in each motion:
+# The remedy is to treat the rigid motions as unknowns of the interface problem. In the plane there
+# are three: two translations and a rotation. The columns of a matrix $V$ hold what these motions do
+# to the contact. The unknowns $\lambda$ say how far the block moves in each of them. In return, the
+# contact forces have to balance the load, and $s$ is minus the load in each motion:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0 . $$
 #
@@ -284,15 +333,16 @@ assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
 # %% [markdown]
 # ## Exercises
 #
-# **4.1** (Pen and paper.) The block of this chapter has $33 \times 17$ nodes, and the top row is held. How many free unknowns
-# does the primal problem have? How many unknowns does the dual problem with friction have?
+# **4.1** (Pen and paper.) The block of this chapter has $33 \times 17$ nodes, and the top row is
+# held. How many free unknowns does the primal problem have? How many unknowns does the dual problem
+# with friction have?
 
 # %% tags=["exercise"]
 answer = ...  # (primal, dual)
 
 # %% [markdown] tags=["solution"]
-# $2 \cdot 33 \cdot 16 = 1056$ displacements are free. The dual has two force components at each of the 33 nodes of the bottom,
-# which makes 66.
+# $2 \cdot 33 \cdot 16 = 1056$ displacements are free. The dual has two force components at each of
+# the 33 nodes of the bottom, which makes 66.
 
 # %% tags=["solution"]
 answer = (1056, 66)
@@ -301,15 +351,17 @@ answer = (1056, 66)
 check("4.1", answer, (1056, 66))
 
 # %% [markdown]
-# **4.2** (Pen and paper.) The block without a plate is 4 mm wide. The load on it is one vertical force at the distance $e$ from
-# the middle. What is the largest $e$ for which the block does not tip over?
+# **4.2** (Pen and paper.) The block without a plate is 4 mm wide. The load on it is one vertical
+# force at the distance $e$ from the middle. What is the largest $e$ for which the block does not
+# tip over?
 
 # %% tags=["exercise"]
 answer = ...  # mm
 
 # %% [markdown] tags=["solution"]
-# The floor can only push. So the resultant of its forces lies between the ends of the block, and $e$ can be at most 2 mm.
-# For a larger $e$ no forces balance the load, and the interface problem is *infeasible*.
+# The floor can only push. So the resultant of its forces lies between the ends of the block, and
+# $e$ can be at most 2 mm. For a larger $e$ no forces balance the load, and the interface problem is
+# *infeasible*.
 
 # %% tags=["solution"]
 answer = 2.0
@@ -318,8 +370,9 @@ answer = 2.0
 check("4.2", answer, 2.0)
 
 # %% [markdown]
-# **4.3** Solve the block under the lowered plate with Coulomb's law and $\mu = 0.4$. Use Tresca's iteration of chapter 2, with
-# the program above. Give the forces, one row $(r_n, r_t)$ for each node. The certificate grades them.
+# **4.3** Solve the block under the lowered plate with Coulomb's law and $\mu = 0.4$. Use Tresca's
+# iteration of chapter 2, with the program above. Give the forces, one row $(r_n, r_t)$ for each
+# node. The certificate grades them.
 
 # %% tags=["exercise"]
 answer = ...  # (33, 2) forces [N]
@@ -338,15 +391,17 @@ answer = y.value.reshape(-1, 2)
 check("4.3", answer, InterfaceProblem(Q, q, 0.4))
 
 # %% [markdown]
-# **4.4** Nitsche's energy is convex only if one matrix is positive definite on the free unknowns: $K$ minus the matrix of the
-# integral of $p(U)\,p(v) / \gamma$. Compute the smallest eigenvalue of this matrix for $\gamma_0 = 0.1$ and for
-# $\gamma_0 = 10$. Is it positive?
+# **4.4** Nitsche's energy is convex only if one matrix is positive definite on the free unknowns:
+# $K$ minus the matrix of the integral of $p(U)\,p(v) / \gamma$. Compute the smallest eigenvalue of
+# this matrix for $\gamma_0 = 0.1$ and for $\gamma_0 = 10$. Is it positive?
 
 # %% tags=["exercise"]
 answer = ...  # (True or False for 0.1, True or False for 10)
 
 # %% tags=["solution"]
-at_ten = fixed[free][:, free].toarray()  # it was assembled with gamma_0 = 10, and scales with 1 / gamma_0
+at_ten = fixed[free][
+    :, free
+].toarray()  # it was assembled with gamma_0 = 10, and scales with 1 / gamma_0
 answer = tuple(bool(np.linalg.eigvalsh(K_free + at_ten * 10 / g)[0] > 0) for g in (0.1, 10.0))
 
 # %%
@@ -355,10 +410,11 @@ check("4.4", answer, lambda given: tuple(given) == (False, True))
 # %% [markdown]
 # ## References
 #
-# - F. Chouly, P. Hild, Y. Renard, *Finite Element Approximation of Contact and Friction in Elasticity*, Birkhäuser 2023,
+# - F. Chouly, P. Hild, Y. Renard, *Finite Element Approximation of Contact and Friction in
+#   Elasticity*, Birkhäuser 2023,
 #   [doi:10.1007/978-3-031-31423-0](https://doi.org/10.1007/978-3-031-31423-0).
-# - T. Gustafsson, G. D. McBain, scikit-fem: A Python package for finite element assembly, *J. Open Source Softw.* 5 (2020),
-#   [doi:10.21105/joss.02369](https://doi.org/10.21105/joss.02369).
+# - T. Gustafsson, G. D. McBain, scikit-fem: A Python package for finite element assembly, *J. Open
+#   Source Softw.* 5 (2020), [doi:10.21105/joss.02369](https://doi.org/10.21105/joss.02369).
 #
 # Next: [friction on an interface](chapter_5_friction_on_an_interface.py).
 

@@ -1,9 +1,10 @@
 # %% [markdown]
 # # Chapter 5. Coulomb friction on an interface
 #
-# Now we put everything together: elastic bodies, many nodes, and Coulomb's law. The solution is not the minimum of an energy.
-# Therefore all methods solve another, simpler problem again and again. In this chapter we write three methods, compare their
-# speed and their accuracy, and look at a problem that has no solution at all.
+# Now we put everything together: elastic bodies, many nodes, and Coulomb's law. The solution is not
+# the minimum of an energy. Therefore all methods solve another, simpler problem again and again. In
+# this chapter we write three methods, compare their speed and their accuracy, and look at a problem
+# that has no solution at all.
 #
 # You need chapters 2 and 4. The chapter takes 50 minutes with its exercises.
 
@@ -20,21 +21,24 @@ from contactopt.teaching import Slider, check
 # %% [markdown]
 # ## The mechanical system
 #
-# A plate presses a rubber block, 40 mm wide and 40 mm high, on a foundation of the same rubber with 100 N. Under the load both
-# bodies spread sideways, the foundation less than the block. Friction resists the difference. The system is symmetric, so we
-# model its right half.
+# A plate presses a rubber block, 40 mm wide and 40 mm high, on a foundation of the same rubber with
+# 100 N. Under the load both bodies spread sideways, the foundation less than the block. Friction
+# resists the difference. The system is symmetric, so we model its right half.
 #
-# The normal $n$ points out of the foundation, upwards. The tangent $t$ points to the right, which is outwards. $r$ is the
-# force on the block. The vectors $u$, $r$ and $q$ hold the components of all nodes, $(n, t)$ for the first node, then $(n, t)$
-# for the second, and so on. The plate may move down. So, as in chapter 4, there is a rigid motion $V$ with the unknown
-# $\lambda$, and the contact forces must balance the load: $V' r + s = 0$.
+# The normal $n$ points out of the foundation, upwards. The tangent $t$ points to the right, which
+# is outwards. $r$ is the force on the block. The vectors $u$, $r$ and $q$ hold the components of
+# all nodes, $(n, t)$ for the first node, then $(n, t)$ for the second, and so on. The plate may
+# move down. So, as in chapter 4, there is a rigid motion $V$ with the unknown $\lambda$, and the
+# contact forces must balance the load: $V' r + s = 0$.
 
 # %%
 mu = 0.2
 problem = reduce(scenes.flat_punch(2, mu=mu, elements=24))
 Q, q, V, s = problem.Q, problem.q.ravel(), problem.V, problem.s
 k = problem.contacts
-moves = np.diag(Q) > 0  # the node on the axis of symmetry cannot move sideways: its row of Q is zero
+moves = (
+    np.diag(Q) > 0
+)  # the node on the axis of symmetry cannot move sideways: its row of Q is zero
 print(f"{k} contacts, V {V.shape}: one plate, s = {s} N")
 
 # %% tags=["hide-input"]
@@ -56,9 +60,9 @@ _ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim
 # %% [markdown]
 # ## Primal and dual for a given bound
 #
-# First let the friction bound $g_i$ of every node be given. Then the solution is the minimum of an energy. The *primal*
-# problem has the displacements $u$ of the contact and the motion $\lambda$ of the plate as its unknowns. With the stiffness
-# $S = Q^{-1}$ it is
+# First let the friction bound $g_i$ of every node be given. Then the solution is the minimum of an
+# energy. The *primal* problem has the displacements $u$ of the contact and the motion $\lambda$ of
+# the plate as its unknowns. With the stiffness $S = Q^{-1}$ it is
 #
 # $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| . $$
 #
@@ -68,22 +72,27 @@ _ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim
 #
 # ## The optimality conditions
 #
-# Both have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium of the
-# bodies and of the plate, and, at every node $i$, Signorini's conditions and friction with the bound $g_i$:
+# Both have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They
+# are equilibrium of the bodies and of the plate, and, at every node $i$, Signorini's conditions and
+# friction with the bound $g_i$:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0, \qquad u_{n,i} \ge 0, \quad r_{n,i} \ge 0, \quad u_{n,i}\, r_{n,i} = 0, $$
 #
 # $$ |r_{t,i}| \le g_i, \qquad u_{t,i} \ne 0 \;\Rightarrow\; r_{t,i} = -g_i\, \frac{u_{t,i}}{|u_{t,i}|} . $$
 #
-# The multiplier of the balance $V' r + s = 0$ is the motion $\lambda$ of the plate. Coulomb's law asks in addition that
-# $g_i = \mu r_{n,i}$. In `cvxpy` the bounds are a parameter, which we can change from one solve to the next:
+# The multiplier of the balance $V' r + s = 0$ is the motion $\lambda$ of the plate. Coulomb's law
+# asks in addition that $g_i = \mu r_{n,i}$. In `cvxpy` the bounds are a parameter, which we can
+# change from one solve to the next:
 
 # %%
 n, t = slice(0, None, 2), slice(1, None, 2)
 r = cp.Variable(2 * k)
 g = cp.Parameter(k, nonneg=True)
 balance = V.T @ r + s == 0
-dual = cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [r[n] >= 0, cp.abs(r[t]) <= g, balance])
+dual = cp.Problem(
+    cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r),
+    [r[n] >= 0, cp.abs(r[t]) <= g, balance],
+)
 
 u, plate = cp.Variable(2 * k), cp.Variable(V.shape[1])
 S = np.linalg.inv(Q[np.ix_(moves, moves)])
@@ -101,9 +110,9 @@ assert np.allclose(S @ (u.value - q - V @ plate.value)[moves], r.value[moves], a
 # %% [markdown]
 # ## Method 1: Tresca's iteration
 #
-# Solve the dual for a bound $g$, set $g = \mu r_n$, and repeat. Each step is one quadratic program (QP: a quadratic cost with
-# linear constraints). The certificate falls by the same factor in every step. It stops falling when it has reached the
-# accuracy of the QP solver.
+# Solve the dual for a bound $g$, set $g = \mu r_n$, and repeat. Each step is one quadratic program
+# (QP: a quadratic cost with linear constraints). The certificate falls by the same factor in every
+# step. It stops falling when it has reached the accuracy of the QP solver.
 
 # %%
 g.value, road = np.zeros(k), []
@@ -118,10 +127,12 @@ assert road[-1] < 1e-4 and road[3] < road[1]
 # %% [markdown]
 # ## Method 2: Newton on the states
 #
-# If we knew which nodes are open, which stick and which slip, all equations would be linear. An open node has $r = 0$. A
-# sticking node has $u = 0$. A slipping node has $u_n = 0$, and $r_t = -\mu r_n$ or $r_t = +\mu r_n$, against its slip. Newton's
-# method guesses the states from the last answer. A node is pressed if $y_n = r_n - \rho u_n$ is positive. A pressed node slips
-# if $|r_t - \rho u_t|$ exceeds $\mu\, y_n$. Then the method solves the linear equations that belong to these states.
+# If we knew which nodes are open, which stick and which slip, all equations would be linear. An
+# open node has $r = 0$. A sticking node has $u = 0$. A slipping node has $u_n = 0$, and $r_t = -\mu
+# r_n$ or $r_t = +\mu r_n$, against its slip. Newton's method guesses the states from the last
+# answer. A node is pressed if $y_n = r_n - \rho u_n$ is positive. A pressed node slips if $|r_t -
+# \rho u_t|$ exceeds $\mu\, y_n$. Then the method solves the linear equations that belong to these
+# states.
 
 
 # %%
@@ -151,28 +162,33 @@ def newton(rho=1.0, steps=20):
 
 
 forces, steps = newton()
-print(f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces.reshape(-1, 2)):.0e}")
+print(
+    f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces.reshape(-1, 2)):.0e}"
+)
 
 assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8)
 
 # %% [markdown]
-# Once the states are right, the next step is exact. Therefore Newton's method ends with an error of the size of rounding.
-# Tresca's iteration does not.
+# Once the states are right, the next step is exact. Therefore Newton's method ends with an error of
+# the size of rounding. Tresca's iteration does not.
 #
 # ## Method 3: a cone program with a shift
 #
-# As in chapter 2, Acary and Cadoux minimise over the cones $|r_{t,i}| \le \mu r_{n,i}$. The cost has the additional term
-# $\sum_i \mu\, \sigma_i r_{n,i}$, where $\sigma_i$ is the slip of node $i$ in the last answer. The program is solved again with
-# the new slips, until nothing changes. In contactopt the method has the name `acary_cadoux`. In three dimensions the program
-# is the same, with round cones.
+# As in chapter 2, Acary and Cadoux minimise over the cones $|r_{t,i}| \le \mu r_{n,i}$. The cost
+# has the additional term $\sum_i \mu\, \sigma_i r_{n,i}$, where $\sigma_i$ is the slip of node $i$
+# in the last answer. The program is solved again with the new slips, until nothing changes. In
+# contactopt the method has the name `acary_cadoux`. In three dimensions the program is the same,
+# with round cones.
 #
 # ## Penalty and multipliers
 #
-# A penalty can replace the constraints of friction problems too. Its error has the size of $1 / \kappa$, where $\kappa$ is the
-# stiffness of the penalty springs. The *augmented Lagrangian* adds the contact force of the last iteration to the force of
-# the spring. By repetition it removes the error, although $\kappa$ is moderate.
+# A penalty can replace the constraints of friction problems too. Its error has the size of $1 /
+# \kappa$, where $\kappa$ is the stiffness of the penalty springs. The *augmented Lagrangian* adds
+# the contact force of the last iteration to the force of the spring. By repetition it removes the
+# error, although $\kappa$ is moderate.
 #
-# Now we compare five methods. Each is asked for a small certificate and for smaller and smaller ones.
+# Now we compare five methods. Each is asked for a small certificate and for smaller and smaller
+# ones.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -197,12 +213,13 @@ errors = [solve(problem, "penalty", factor=10.0**j).residual for j in (1, 2, 3)]
 assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 # %% [markdown]
-# A chart like this one compares methods fairly. It asks: *how long does each method take to reach the same certificate?* The
-# times are those of the machine that drew the figure.
+# A chart like this one compares methods fairly. It asks: *how long does each method take to reach
+# the same certificate?* The times are those of the machine that drew the figure.
 #
 # ## What more friction does
 #
-# The slider changes the friction coefficient. The dashed curve is the friction bound $\mu p$, where $p$ is the pressure.
+# The slider changes the friction coefficient. The dashed curve is the friction bound $\mu p$, where
+# $p$ is the pressure.
 
 
 # %% tags=["hide-input"]
@@ -212,7 +229,12 @@ def with_friction(coefficient):
     fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
     ax.plot(problem.coordinates[0], coefficient * pressure, "k--", lw=1, label=r"$\mu\, p$")
     ax.plot(problem.coordinates[0], -shear, "C1.-", label="friction, inwards")
-    ax.set(xlabel="x [mm]", ylabel="stress [MPa]", ylim=(-0.005, 0.06), title=rf"$\mu$ = {coefficient:.2f}")
+    ax.set(
+        xlabel="x [mm]",
+        ylabel="stress [MPa]",
+        ylim=(-0.005, 0.06),
+        title=rf"$\mu$ = {coefficient:.2f}",
+    )
     ax.legend(frameon=False, loc="upper left")
     return fig
 
@@ -220,15 +242,16 @@ def with_friction(coefficient):
 Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3)
 
 # %% [markdown]
-# Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the edge. In the end all nodes
-# stick.
+# Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the
+# edge. In the end all nodes stick.
 #
 # ## What fails: no solution
 #
-# A rigid sledge stands on two runners and is pressed down with 100 N. Somebody pulls it sideways with 25 N. A rigid body has
-# no compliance, so $Q = 0$. The forces on the two runners have to balance the load, and each of them has to lie in its
-# friction cone. With $\mu = 0.2$ this is impossible: the sledge slides away, and there is no static solution. contactopt finds
-# a proof of this, and says `infeasible`.
+# A rigid sledge stands on two runners and is pressed down with 100 N. Somebody pulls it sideways
+# with 25 N. A rigid body has no compliance, so $Q = 0$. The forces on the two runners have to
+# balance the load, and each of them has to lie in its friction cone. With $\mu = 0.2$ this is
+# impossible: the sledge slides away, and there is no static solution. contactopt finds a proof of
+# this, and says `infeasible`.
 #
 # | method | it fails if |
 # |---|---|
@@ -239,25 +262,32 @@ Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=
 # | any method | the load cannot be balanced: there is no solution |
 
 # %%
-motions = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]])  # both runners move up, or sideways
+motions = np.array(
+    [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]
+)  # both runners move up, or sideways
 pulled = np.array([-100.0, 25.0])  # N: the load in these two motions
 for coefficient in (0.2, 0.3):
     sledge = InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), coefficient, motions, pulled)
     print(f"mu = {coefficient}: {solve(sledge).status}")
 
-assert str(solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled)).status) == "infeasible"
+assert (
+    str(solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled)).status)
+    == "infeasible"
+)
 assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, pulled)).solved
 
 # %% [markdown]
 # ## Exercises
 #
-# **5.1** (Pen and paper.) What is the smallest friction coefficient with which the sledge stands still?
+# **5.1** (Pen and paper.) What is the smallest friction coefficient with which the sledge stands
+# still?
 
 # %% tags=["exercise"]
 answer = ...
 
 # %% [markdown] tags=["solution"]
-# Together the two runners carry 100 N, so friction can hold $100 \mu$ N. It has to hold 25 N. Hence $\mu = 0.25$.
+# Together the two runners carry 100 N, so friction can hold $100 \mu$ N. It has to hold 25 N. Hence
+# $\mu = 0.25$.
 
 # %% tags=["solution"]
 answer = 0.25
@@ -266,9 +296,9 @@ answer = 0.25
 check("5.1", answer, 0.25)
 
 # %% [markdown]
-# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the back runner 20 N. The front
-# runner stands on ice, with $\mu = 0.05$. The back runner stands on stone, with $\mu = 0.5$. Write a linear program for the
-# largest pull that the sledge withstands.
+# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the
+# back runner 20 N. The front runner stands on ice, with $\mu = 0.05$. The back runner stands on
+# stone, with $\mu = 0.5$. Write a linear program for the largest pull that the sledge withstands.
 
 # %% tags=["exercise"]
 answer = ...  # N
@@ -279,14 +309,17 @@ answer = ...  # N
 # %% tags=["solution"]
 pull, friction = cp.Variable(), cp.Variable(2)
 limits = np.array([0.05 * 80, 0.5 * 20])
-cp.Problem(cp.Maximize(pull), [cp.abs(friction) <= limits, pull == cp.sum(friction)]).solve(solver=cp.CLARABEL)
+cp.Problem(cp.Maximize(pull), [cp.abs(friction) <= limits, pull == cp.sum(friction)]).solve(
+    solver=cp.CLARABEL
+)
 answer = float(pull.value)
 
 # %%
 check("5.2", answer, 14.0)
 
 # %% [markdown]
-# **5.3** How many nodes of the block slip if $\mu = 0.2$? Count them in the answer of Newton's method, `forces`.
+# **5.3** How many nodes of the block slip if $\mu = 0.2$? Count them in the answer of Newton's
+# method, `forces`.
 
 # %% tags=["exercise"]
 answer = ...
@@ -298,9 +331,10 @@ answer = int(np.sum((np.abs(forces[t]) > mu * forces[n] * (1 - 1e-9)) & (forces[
 check("5.3", answer, diagnose(problem, solve(problem)).local.slip)
 
 # %% [markdown]
-# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to the next. (Run
-# `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for every step, with the certificate as `"residual"`.)
-# The cell below compares your factor with the one that `diagnose` predicts.
+# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to
+# the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for every step,
+# with the certificate as `"residual"`.) The cell below compares your factor with the one that
+# `diagnose` predicts.
 
 # %% tags=["exercise"]
 answer = ...
@@ -316,10 +350,11 @@ check("5.4", answer, lambda rate: abs(rate / predicted - 1) < 0.05)
 # %% [markdown]
 # ## References
 #
-# - P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods, *Comput.
-#   Methods Appl. Mech. Eng.* 92 (1991), [doi:10.1016/0045-7825(91)90022-X](https://doi.org/10.1016/0045-7825(91)90022-X).
-# - V. Acary, M. Brémond, O. Huber, On solving contact problems with Coulomb friction: formulations and numerical comparisons,
-#   in: *Advanced Topics in Nonsmooth Dynamics*, Springer 2018,
+# - P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like
+#   solution methods, *Comput. Methods Appl. Mech. Eng.* 92 (1991),
+#   [doi:10.1016/0045-7825(91)90022-X](https://doi.org/10.1016/0045-7825(91)90022-X).
+# - V. Acary, M. Brémond, O. Huber, On solving contact problems with Coulomb friction: formulations
+#   and numerical comparisons, in: *Advanced Topics in Nonsmooth Dynamics*, Springer 2018,
 #   [doi:10.1007/978-3-319-75972-2_10](https://doi.org/10.1007/978-3-319-75972-2_10).
 #
 # Next: [large problems in three dimensions](chapter_6_large_and_three_dimensional.py).

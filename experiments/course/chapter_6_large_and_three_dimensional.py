@@ -1,9 +1,10 @@
 # %% [markdown]
 # # Chapter 6. Large problems in three dimensions
 #
-# In three dimensions the friction force has two components, and its bound is a circle. The number of unknowns grows with the
-# third power of the resolution. On small problems it is a matter of taste which method we take, and in which form. On large
-# ones the choice decides whether we get an answer at all. One rule guides us: *model no more than a scene needs*.
+# In three dimensions the friction force has two components, and its bound is a circle. The number
+# of unknowns grows with the third power of the resolution. On small problems it is a matter of
+# taste which method we take, and in which form. On large ones the choice decides whether we get an
+# answer at all. One rule guides us: *model no more than a scene needs*.
 #
 # You need chapters 3 and 5. The chapter takes 50 minutes with its exercises.
 
@@ -12,27 +13,42 @@ import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import HalfSpace, InterfaceProblem, Material, Rigid, Scene, models, reduce, scenes, solve
+from contactopt import (
+    HalfSpace,
+    InterfaceProblem,
+    Material,
+    Rigid,
+    Scene,
+    models,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.teaching import Slider, check
 
 # %% [markdown]
 # ## The mechanical system
 #
-# A rigid plate presses a square rubber block on a foundation with 100 N. The system has two planes of symmetry, so a quarter
-# of it is enough. It has a fourth of the unknowns, and the same answer.
+# A rigid plate presses a square rubber block on a foundation with 100 N. The system has two planes
+# of symmetry, so a quarter of it is enough. It has a fourth of the unknowns, and the same answer.
 #
-# The normal $n$ points out of the foundation, upwards. The two tangents $t_1$ and $t_2$ lie in the surface, along $x$ and
-# $y$. Every contact has three components in the order $(n, t_1, t_2)$: the force on the block is
-# $r = (r_n, r_1, r_2)$, and $u = (u_n, u_1, u_2)$ is the gap that remains with the two components of the slip. We write
-# $r_t = (r_1, r_2)$ and $u_t = (u_1, u_2)$ for the tangential parts.
+# The normal $n$ points out of the foundation, upwards. The two tangents $t_1$ and $t_2$ lie in the
+# surface, along $x$ and $y$. Every contact has three components in the order $(n, t_1, t_2)$: the
+# force on the block is $r = (r_n, r_1, r_2)$, and $u = (u_n, u_1, u_2)$ is the gap that remains
+# with the two components of the slip. We write $r_t = (r_1, r_2)$ and $u_t = (u_1, u_2)$ for the
+# tangential parts.
 
 # %% tags=["hide-input"]
 fig = plt.figure(figsize=(5.4, 4.2), layout="constrained")
 ax = fig.add_subplot(projection="3d", computed_zorder=False)
-ax.bar3d(-40, -40, -30, 80, 80, 30, color="C1", alpha=0.12, shade=False, zorder=0)  # the foundation, cut off
+ax.bar3d(
+    -40, -40, -30, 80, 80, 30, color="C1", alpha=0.12, shade=False, zorder=0
+)  # the foundation, cut off
 ax.bar3d(-20, -20, 0, 40, 40, 40, color="C0", alpha=0.10, shade=False, zorder=1)
-ax.bar3d(0, 0, 0, 20, 20, 40, color="C0", alpha=0.45, shade=False, zorder=2)  # the quarter that is modelled
+ax.bar3d(
+    0, 0, 0, 20, 20, 40, color="C0", alpha=0.45, shade=False, zorder=2
+)  # the quarter that is modelled
 ax.quiver(10, 10, 68, 0, 0, -25, color="C3", lw=2, arrow_length_ratio=0.3, zorder=3)
 ax.text(13, 10, 58, "100 N", color="C3", zorder=3)
 for way, name in (((0, 0, 30), "$n$"), ((30, 0, 0), "$t_1$"), ((0, 30, 0), "$t_2$")):
@@ -44,9 +60,10 @@ ax.view_init(elev=22, azim=-58)
 # %% [markdown]
 # ## Primal and dual with a given friction bound
 #
-# As before, let the friction bound $g_i$ of every contact be given first. Only one thing is new: $|r_{t,i}|$ and $|u_{t,i}|$
-# are now the lengths of vectors with two components. $S = Q^{-1}$ is the stiffness at the contact. $V$ is the motion of the
-# plate, $\lambda$ its size, and $s$ is minus the load on it.
+# As before, let the friction bound $g_i$ of every contact be given first. Only one thing is new:
+# $|r_{t,i}|$ and $|u_{t,i}|$ are now the lengths of vectors with two components. $S = Q^{-1}$ is
+# the stiffness at the contact. $V$ is the motion of the plate, $\lambda$ its size, and $s$ is minus
+# the load on it.
 #
 # Primal, in displacements:
 #
@@ -58,8 +75,8 @@ ax.view_init(elev=22, azim=-58)
 #
 # ## The optimality conditions
 #
-# The optimality conditions of Karush, Kuhn and Tucker (KKT conditions) are those of chapter 5, but the tangential parts are
-# vectors in the surface. Friction points against the slip:
+# The optimality conditions of Karush, Kuhn and Tucker (KKT conditions) are those of chapter 5, but
+# the tangential parts are vectors in the surface. Friction points against the slip:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0, \qquad u_{n,i} \ge 0, \quad r_{n,i} \ge 0, \quad u_{n,i}\, r_{n,i} = 0, $$
 #
@@ -70,14 +87,16 @@ ax.view_init(elev=22, azim=-58)
 #
 # ## Both programs for one node
 #
-# One node without a plate shows the programs on one screen. It is pressed on the floor and pulled along the first tangent, hard
-# enough to slip. The friction bound is 0.5 N. A constraint on the length of a vector makes the dual a *second-order cone
-# program* (SOCP).
+# One node without a plate shows the programs on one screen. It is pressed on the floor and pulled
+# along the first tangent, hard enough to slip. The friction bound is 0.5 N. A constraint on the
+# length of a vector makes the dual a *second-order cone program* (SOCP).
 
 
 # %%
 def pulled(degrees):
-    """One node on its own: pressed down by 1 mm and pulled 3 mm in a direction, that angle from the first tangent."""
+    """One node on its own: pressed down by 1 mm and pulled 3 mm in a direction, that angle from the
+    first tangent.
+    """
     angle = np.deg2rad(degrees)
     return InterfaceProblem(np.eye(3), [[-1.0, 3 * np.cos(angle), 3 * np.sin(angle)]], 0.5)
 
@@ -100,9 +119,10 @@ assert np.allclose(u.value, Q @ r.value + q, atol=1e-3)
 # %% [markdown]
 # ## Polygons in place of circles
 #
-# Many codes replace the circle by a polygon with $m$ edges, also called facets. All constraints are then linear, and the
-# program is a quadratic program (QP). But a polygon inside the circle is a weaker law. In the direction of the middle of an
-# edge it carries less friction. It also prefers the directions of its corners, which the material does not.
+# Many codes replace the circle by a polygon with $m$ edges, also called facets. All constraints are
+# then linear, and the program is a quadratic program (QP). But a polygon inside the circle is a
+# weaker law. In the direction of the middle of an edge it carries less friction. It also prefers
+# the directions of its corners, which the material does not.
 
 
 # %% tags=["hide-input"]
@@ -122,10 +142,13 @@ def polygon(facets):
 Slider("facets [-]", [3, 4, 6, 8, 12, 16, 32], polygon, start=3)
 
 # %% [markdown]
-# The node from above shows the difference. `contactopt.models` has both programs ready, with the circle and with a polygon.
+# The node from above shows the difference. `contactopt.models` has both programs ready, with the
+# circle and with a polygon.
 
 # %%
-program = {name: models.tresca(one, facets=facets) for name, facets in (("circle", None), ("8 facets", 8))}
+program = {
+    name: models.tresca(one, facets=facets) for name, facets in (("circle", None), ("8 facets", 8))
+}
 for name, each in program.items():
     each.parameters["g"].value = np.array([0.5])
     each.problem.solve(solver=cp.CLARABEL)
@@ -139,8 +162,9 @@ assert np.linalg.norm(program["8 facets"].variables["r"].value[1:]) < 0.47
 # %% [markdown]
 # ## The block
 #
-# Now we solve the block of the drawing, with Coulomb's law and $\mu = 0.3$. The colours of the figure show the pressure on the
-# quarter. The arrows show the friction force on the block, and crosses mark the nodes that slip.
+# Now we solve the block of the drawing, with Coulomb's law and $\mu = 0.3$. The colours of the
+# figure show the pressure on the quarter. The arrows show the friction force on the block, and
+# crosses mark the nodes that slip.
 
 # %%
 scene = scenes.flat_punch(3, mu=0.3, elements=8)
@@ -164,7 +188,8 @@ assert answer.solved and 0 < slips.sum() < len(slips)
 # %% [markdown]
 # ## Primal or dual?
 #
-# Let the block have $N$ nodes along each edge. Then it has about $3 N^3$ displacements and $3 N^2$ contact forces.
+# Let the block have $N$ nodes along each edge. Then it has about $3 N^3$ displacements and $3 N^2$
+# contact forces.
 #
 # | | unknowns | matrix | memory for $N = 100$ |
 # |---|---|---|---|
@@ -172,20 +197,22 @@ assert answer.solved and 0 < slips.sum() < len(slips)
 # | dual, $Q$ as an array | $3 N^2$ | dense | 7 GB (exercise 6.1) |
 # | dual, $Q$ known by its products | $3 N^2$ | never formed | as much as the primal |
 #
-# The third way never forms $Q$. It computes products $Q r = \sum_b T_b K_b^{-1} T_b' r$. The sum is over the bodies $b$, with the
-# stiffness $K_b$ and the matrix $T_b$ that picks the contact, as in chapter 4. Each product takes one linear solve with each
-# body. So the number of products decides the cost.
+# The third way never forms $Q$. It computes products $Q r = \sum_b T_b K_b^{-1} T_b' r$. The sum is
+# over the bodies $b$, with the stiffness $K_b$ and the matrix $T_b$ that picks the contact, as in
+# chapter 4. Each product takes one linear solve with each body. So the number of products decides
+# the cost.
 #
 # ## A preconditioner for the surface
 #
-# With products alone, a linear system is solved by an iteration such as conjugate gradients. Its number of steps grows like the
-# square root of the condition number of the matrix. On the surface of a body, $Q$ divides a wave of pressure by its wave
-# number. Therefore the condition number of $Q$ grows like $N$, and the number of products in a step of Newton's method grows
-# like $\sqrt N$.
+# With products alone, a linear system is solved by an iteration such as conjugate gradients. Its
+# number of steps grows like the square root of the condition number of the matrix. On the surface
+# of a body, $Q$ divides a wave of pressure by its wave number. Therefore the condition number of
+# $Q$ grows like $N$, and the number of products in a step of Newton's method grows like $\sqrt N$.
 #
-# A *preconditioner* is a cheap approximation of $Q^{-1}$ that makes the iteration short. Here it multiplies a wave by its wave
-# number. This operation is the square root of the Laplacian of the surface. (The paper by A. Lotfi works with it as the
-# $H^{1/2}$ seminorm.) We count products with and without it.
+# A *preconditioner* is a cheap approximation of $Q^{-1}$ that makes the iteration short. Here it
+# multiplies a wave by its wave number. This operation is the square root of the Laplacian of the
+# surface. (The paper by A. Lotfi works with it as the $H^{1/2}$ seminorm.) We count products with
+# and without it.
 
 # %%
 products = {}
@@ -195,10 +222,17 @@ for elements in (4, 8, 12):
         solve(implicit, "newton", linear="krylov", preconditioner=name).history[-1]["products"]
         for name in ("none", "neumann")
     ]
-    print(f"{elements} elements: {products[elements][0]:.0f} products without, {products[elements][1]:.0f} with")
+    print(
+        f"{elements} elements: {products[elements][0]:.0f} products without, {products[elements][1]:.0f} with"
+    )
 
 fig, ax = plt.subplots(figsize=(5, 3.2), layout="constrained")
-ax.plot(list(products), list(products.values()), "o-", label=["without", "with the square root of the Laplacian"])
+ax.plot(
+    list(products),
+    list(products.values()),
+    "o-",
+    label=["without", "with the square root of the Laplacian"],
+)
 ax.set(xlabel="elements across the half-width [-]", ylabel="products with Q [-]", ylim=(0, None))
 ax.legend(frameon=False)
 
@@ -208,17 +242,25 @@ assert products[12][1] < 1.6 * products[4][1]
 # %% [markdown]
 # ## Without a mesh
 #
-# A body that is large beside its contact may be modelled as a half-space, elastic everywhere below a plane. Then nothing is
-# meshed. $Q$ is a convolution with a function that is known exactly, so that a product takes a few fast Fourier transforms.
-# The dual program and the certificate stay the same. Here a rigid sphere is pressed on a half-space, with 4,096 contacts, and
-# compared with Hertz's exact solution:
+# A body that is large beside its contact may be modelled as a half-space, elastic everywhere below
+# a plane. Then nothing is meshed. $Q$ is a convolution with a function that is known exactly, so
+# that a product takes a few fast Fourier transforms. The dual program and the certificate stay the
+# same. Here a rigid sphere is pressed on a half-space, with 4,096 contacts, and compared with
+# Hertz's exact solution:
 
 # %%
 rubber, R, P = Material(E=5.0, nu=0.3), 400.0, 100.0
 hertz = hertz_point(P, R, contact_modulus(rubber))
 grid = (np.arange(64) + 0.5) * 2.5 * hertz.half_width / 64 - 1.25 * hertz.half_width
 sphere = Rigid("sphere", gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R), force={"z": -P})
-ball = Scene("sphere", sphere, HalfSpace("block", rubber, (grid, grid)), 0.0, kind="solid", law="frictionless")
+ball = Scene(
+    "sphere",
+    sphere,
+    HalfSpace("block", rubber, (grid, grid)),
+    0.0,
+    kind="solid",
+    law="frictionless",
+)
 flat = reduce(ball)
 round_answer = solve(flat)
 p = round_answer.reactions[:, 0] / flat.areas
@@ -230,41 +272,50 @@ line = np.linspace(0, 1.3 * hertz.half_width, 200)
 ax.plot(line, hertz.pressure(line), "k", lw=1, label="Hertz")
 ax.set(xlabel="distance from the axis [mm]", ylabel="pressure [MPa]")
 ax.legend(frameon=False)
-print(f"{flat.contacts} contacts, {round_answer.products} products, peak {p.max() / hertz.peak:.4f} of Hertz")
+print(
+    f"{flat.contacts} contacts, {round_answer.products} products, peak {p.max() / hertz.peak:.4f} of Hertz"
+)
 
 assert round_answer.solved and abs(p.max() / hertz.peak - 1) < 5e-3
 
 # %% [markdown]
 # ## What fails
 #
-# - **The matrix is too large.** $Q$ as an array needs $8\,(3k)^2$ bytes for $k$ contacts. contactopt refuses an array that is too
-#   large, and says its size.
-# - **The preconditioner takes the place of the matrix.** A preconditioner $P$ is near $Q^{-1}$, but it is not $Q^{-1}$. Inside an
-#   iteration it changes the cost and not the answer. If $P^{-1}$ is put in place of $Q$, the answer is that of another problem.
-#   The cell below shows how wrong it can be.
-# - **The products are not accurate enough.** If the products are accurate to $10^{-4}$ only, the certificate cannot fall below
-#   about $10^{-4}$. The products must become more accurate while the outer iteration converges.
+# - **The matrix is too large.** $Q$ as an array needs $8\,(3k)^2$ bytes for $k$ contacts.
+#   contactopt refuses an array that is too large, and says its size.
+# - **The preconditioner takes the place of the matrix.** A preconditioner $P$ is near $Q^{-1}$, but
+#   it is not $Q^{-1}$. Inside an iteration it changes the cost and not the answer. If $P^{-1}$ is
+#   put in place of $Q$, the answer is that of another problem. The cell below shows how wrong it
+#   can be.
+# - **The products are not accurate enough.** If the products are accurate to $10^{-4}$ only, the
+#   certificate cannot fall below about $10^{-4}$. The products must become more accurate while the
+#   outer iteration converges.
 
 # %%
 Q = problem.Q
-wrong = InterfaceProblem(np.diag(np.diag(Q)), problem.q, 0.3, problem.V, problem.s)  # the diagonal in place of Q
+wrong = InterfaceProblem(
+    np.diag(np.diag(Q)), problem.q, 0.3, problem.V, problem.s
+)  # the diagonal in place of Q
 other = solve(wrong)
 difference = np.abs(other.reactions - answer.reactions).max() / answer.reactions.max()
-print(f"with the diagonal in place of Q the forces are wrong by {100 * difference:.0f} % of the largest")
+print(
+    f"with the diagonal in place of Q the forces are wrong by {100 * difference:.0f} % of the largest"
+)
 
 assert difference > 0.1
 
 # %% [markdown]
 # ## Exercises
 #
-# **6.1** (Pen and paper.) A contact surface has $100 \times 100$ nodes in 3D. How many gigabytes ($10^9$ bytes) does $Q$ take as
-# an array of numbers of 8 bytes?
+# **6.1** (Pen and paper.) A contact surface has $100 \times 100$ nodes in 3D. How many gigabytes
+# ($10^9$ bytes) does $Q$ take as an array of numbers of 8 bytes?
 
 # %% tags=["exercise"]
 answer = ...  # GB
 
 # %% [markdown] tags=["solution"]
-# There are $3 \cdot 10^4$ unknowns, so $Q$ has $9 \cdot 10^8$ entries. They take $7.2 \cdot 10^9$ bytes.
+# There are $3 \cdot 10^4$ unknowns, so $Q$ has $9 \cdot 10^8$ entries. They take $7.2 \cdot 10^9$
+# bytes.
 
 # %% tags=["solution"]
 answer = 8 * (3 * 100**2) ** 2 / 1e9
@@ -273,15 +324,15 @@ answer = 8 * (3 * 100**2) ** 2 / 1e9
 check("6.1", answer, 7.2)
 
 # %% [markdown]
-# **6.2** (Pen and paper.) The circle of the friction bound is replaced by a polygon inside it. How many facets are needed so that
-# at most 1 % of the friction is lost in any direction?
+# **6.2** (Pen and paper.) The circle of the friction bound is replaced by a polygon inside it. How
+# many facets are needed so that at most 1 % of the friction is lost in any direction?
 
 # %% tags=["exercise"]
 answer = ...  # an integer
 
 # %% [markdown] tags=["solution"]
-# In the middle of an edge the polygon reaches the part $\cos(\pi / m)$ of the radius. The condition $\cos(\pi / m) \ge 0.99$
-# means $m \ge \pi / \arccos 0.99 = 22.2$. So 23 facets are needed.
+# In the middle of an edge the polygon reaches the part $\cos(\pi / m)$ of the radius. The condition
+# $\cos(\pi / m) \ge 0.99$ means $m \ge \pi / \arccos 0.99 = 22.2$. So 23 facets are needed.
 
 # %% tags=["solution"]
 answer = int(np.ceil(np.pi / np.arccos(0.99)))
@@ -290,20 +341,29 @@ answer = int(np.ceil(np.pi / np.arccos(0.99)))
 check("6.2", answer, lambda m: m == 23)
 
 # %% [markdown]
-# **6.3** By which factor does the peak pressure under the sphere grow when the load is doubled? Solve the half-space with a load
-# of 200 N to find the factor. (Make the grid wide enough.) Hertz's exact solution grades your answer.
+# **6.3** By which factor does the peak pressure under the sphere grow when the load is doubled?
+# Solve the half-space with a load of 200 N to find the factor. (Make the grid wide enough.) Hertz's
+# exact solution grades your answer.
 
 # %% tags=["exercise"]
 answer = ...  # peak at 200 N / peak at 100 N
 
 # %% [markdown] tags=["solution"]
-# In Hertz's solution the peak pressure is proportional to $P^{1/3}$, so the factor is $2^{1/3} = 1.26$.
+# In Hertz's solution the peak pressure is proportional to $P^{1/3}$, so the factor is $2^{1/3} =
+# 1.26$.
 
 # %% tags=["solution"]
 wide = grid * 2 ** (1 / 3)
 heavy = Rigid("sphere", gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R), force={"z": -2 * P})
 heavier = reduce(
-    Scene("sphere", heavy, HalfSpace("block", rubber, (wide, wide)), 0.0, kind="solid", law="frictionless")
+    Scene(
+        "sphere",
+        heavy,
+        HalfSpace("block", rubber, (wide, wide)),
+        0.0,
+        kind="solid",
+        law="frictionless",
+    )
 )
 answer = (solve(heavier).reactions[:, 0] / heavier.areas).max() / p.max()
 
@@ -311,16 +371,17 @@ answer = (solve(heavier).reactions[:, 0] / heavier.areas).max() / p.max()
 check("6.3", answer, lambda factor: abs(factor - 2 ** (1 / 3)) < 0.01)
 
 # %% [markdown]
-# **6.4** Pull the node of the beginning in another direction, `pulled(22.5)`, and take *four* facets instead of the circle. In
-# the material, friction pulls back along the same line, at 22.5 degrees from the first tangent. At which angle does it pull
-# back with four facets? (Give an angle between 0 and 90 degrees.)
+# **6.4** Pull the node of the beginning in another direction, `pulled(22.5)`, and take *four*
+# facets instead of the circle. In the material, friction pulls back along the same line, at 22.5
+# degrees from the first tangent. At which angle does it pull back with four facets? (Give an angle
+# between 0 and 90 degrees.)
 
 # %% tags=["exercise"]
 answer = ...  # degrees
 
 # %% [markdown] tags=["solution"]
-# Friction goes as far against the slip as the square allows. That is into a corner of the square. So it pulls back at 45
-# degrees, which is 22.5 degrees off the motion.
+# Friction goes as far against the slip as the square allows. That is into a corner of the square.
+# So it pulls back at 45 degrees, which is 22.5 degrees off the motion.
 
 # %% tags=["solution"]
 square = models.tresca(pulled(22.5), facets=4)
@@ -334,8 +395,8 @@ check("6.4", answer, lambda angle: abs(angle - 45) < 1)
 # %% [markdown]
 # ## References
 #
-# - A. Lotfi, Domain-Decomposition based $H^{1/2}$ Seminorm Preconditioners for Frictional Contact Problems: the preconditioners
-#   and the reduction to the interface.
+# - A. Lotfi, Domain-Decomposition based $H^{1/2}$ Seminorm Preconditioners for Frictional Contact
+#   Problems: the preconditioners and the reduction to the interface.
 # - K. L. Johnson, *Contact Mechanics*, Cambridge University Press 1985,
 #   [doi:10.1017/CBO9781139171731](https://doi.org/10.1017/CBO9781139171731).
 #

@@ -1,8 +1,9 @@
 """Do the time and the iterations of a frictional solve grow with the number of bodies?
 
-Chains of blocks and walls of bricks that only rest on each other. Under their own weight the lowest joints bear all blocks above, so
-that more bodies are also a harder problem. Pressed by plates from above, without weight, and with stiff and soft stones by turns, all
-joints are alike: they slip at their edges and stick inside. Walls are coupled by mortar, since bricks are staggered.
+Chains of blocks and walls of bricks that only rest on each other. Under their own weight the lowest
+joints bear all blocks above, so that more bodies are also a harder problem. Pressed by plates from
+above, without weight, and with stiff and soft stones by turns, all joints are alike: they slip at
+their edges and stick inside. Walls are coupled by mortar, since bricks are staggered.
 """
 
 from __future__ import annotations
@@ -19,7 +20,17 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, reduce_bodies, solve  # noqa: E402
+from contactopt import (  # noqa: E402
+    BodyForce,
+    Contact,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    reduce_bodies,
+    solve,
+)
 from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
 from experiments.report import write  # noqa: E402
 
@@ -47,7 +58,9 @@ def chain(count: int) -> Scene:
 
 
 def wall(count: int) -> Scene:
-    """Rows of WALL bricks, every second one moved by a quarter of a brick, pushed sideways a little."""
+    """Rows of WALL bricks, every second one moved by a quarter of a brick, pushed sideways a
+    little.
+    """
     bodies: list[Part] = []
     contacts: list[Contact] = []
     below: list[tuple[str, float]] = []
@@ -59,13 +72,19 @@ def wall(count: int) -> Scene:
             bodies.append(brick(name, left, row, 2.0, (0.02, -1.0)))
             own.append((name, left))
             contacts += [Contact(name, "floor", 0.5)] if row == 0 else []
-            contacts += [Contact(name, f"{b}:top", 0.5, coupling="mortar") for b, x in below if abs(x - left) < 2]
+            contacts += [
+                Contact(name, f"{b}:top", 0.5, coupling="mortar")
+                for b, x in below
+                if abs(x - left) < 2
+            ]
         below, row = own, row + 1
     return Scene("wall", bodies=(FLOOR, *bodies), contacts=tuple(contacts))
 
 
 def pressed(scene: Scene) -> Scene:
-    """The scene without weight: plates press its highest bodies, and bodies are stiff or soft, row by row."""
+    """The scene without weight: plates press its highest bodies, and bodies are stiff or soft, row
+    by row.
+    """
     parts = [part for part in scene.parts if isinstance(part, Part)]
     rows = [round(float(part.build_mesh(CELLS, None).p[1].min())) for part in parts]
     made: list[Any] = [FLOOR]
@@ -94,7 +113,9 @@ def measure(scene: Scene) -> dict[str, Any]:
         solution = solve(reduction.problem)
         solved.append(time.process_time() - start)
     count = len(scene.parts) - 1
-    loose = reduction.problem.law.bound(solution.reactions[:, 0]) <= np.linalg.norm(solution.reactions[:, 1:], axis=1)
+    loose = reduction.problem.law.bound(solution.reactions[:, 0]) <= np.linalg.norm(
+        solution.reactions[:, 1:], axis=1
+    )
     return {
         "scene": scene.name,
         "bodies": count,
@@ -128,15 +149,16 @@ def growth(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and walls of bricks. Each body has 16 x 16 linear
-elements. The bodies rest on each other and on a rigid floor, held by contact and friction alone. Under their own weight the lowest
-joints bear everything above them. In low chains and walls nothing slips. In the rows `pressed` there is no weight. Instead a plate presses
-every body of the highest row. Rows of stiff and soft bodies take turns, so that every joint slips at its edges.
+elements. The bodies rest on each other and on a rigid floor, held by contact and friction alone.
+Under their own weight the lowest joints bear everything above them. In low chains and walls nothing
+slips. In the rows `pressed` there is no weight. Instead a plate presses every body of the highest
+row. Rows of stiff and soft bodies take turns, so that every joint slips at its edges.
 
 {runs}
 
-The seconds are processor seconds of one run with one thread. The slopes are those of the logarithm of the seconds over the logarithm
-of the number of bodies, from 4 bodies on. A wall has 5 joints for 4 bodies, and 47 joints for 32 bodies. The slope over the number of
-joints takes this into account.
+The seconds are processor seconds of one run with one thread. The slopes are those of the logarithm
+of the seconds over the logarithm of the number of bodies, from 4 bodies on. A wall has 5 joints for
+4 bodies, and 47 joints for 32 bodies. The slope over the number of joints takes this into account.
 
 {growth}
 """

@@ -1,4 +1,6 @@
-"""What do the solvers of a body's linear system cost as the mesh is refined? `--large`: up to a million unknowns."""
+"""What do the solvers of a body's linear system cost as the mesh is refined? `--large`: up to a
+million unknowns.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ GIB = 2**30
 
 
 def system(part: str, elements: int) -> tuple[System, np.ndarray]:
-    """What the solvers of one body of the 3D punch are made from, and a random load on its contact unknowns."""
+    """What the solvers of one body of the 3D punch are made from, and a random load on its contact
+    unknowns.
+    """
     scene = scenes.flat_punch(3)
     body = build_body(scene, getattr(scene, part), elements, None)
     dofs, free = np.asarray(body.basis.nodal_dofs), body.free
@@ -97,7 +101,9 @@ def measure(task: tuple[str, int]) -> dict[str, Any]:
     name, elements = task
     arguments, load = system("lower", elements)
     before = resident()
-    solver, setup = timed(lambda: Plain(arguments) if name == PLAIN else make_solver(name, arguments))
+    solver, setup = timed(
+        lambda: Plain(arguments) if name == PLAIN else make_solver(name, arguments)
+    )
     memory = resident() - before
     solver.solve(load)
     x, seconds = timed(lambda: solver.solve(load))
@@ -117,12 +123,16 @@ def measure(task: tuple[str, int]) -> dict[str, Any]:
 
 def schedule() -> np.ndarray:
     """Seconds this thread has run, and has waited for a core."""
-    run, wait = Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()[:2]
+    run, wait = (
+        Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()[:2]
+    )
     return np.array([int(run), int(wait)]) / 1e9
 
 
 def watched(act: Callable[[], Any]) -> tuple[Any, np.ndarray]:
-    """What `act` returns; seconds it ran, waited for a core, waited for anything else (Python's lock)."""
+    """What `act` returns; seconds it ran, waited for a core, waited for anything else (Python's
+    lock).
+    """
     start, before = time.perf_counter(), schedule()
     result = act()
     run, core = schedule() - before
@@ -137,10 +147,14 @@ def both(elements: int) -> list[dict[str, Any]]:
     with ThreadPoolExecutor(2) as pool:
         made = list(pool.map(lambda s: watched(lambda: make_solver("multigrid", s[0])), systems))
         solvers = [solver for solver, _ in made]
-        solved = list(pool.map(lambda p: watched(lambda: p[0].solve(p[1][1])), zip(solvers, systems)))
+        solved = list(
+            pool.map(lambda p: watched(lambda: p[0].solve(p[1][1])), zip(solvers, systems))
+        )
     memory, peak = resident() - before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     for phase, results in (("setup", made), ("solve", solved)):
-        for part, (_, load), (_, seconds), solver in zip(("punch", "foundation"), systems, results, solvers):
+        for part, (_, load), (_, seconds), solver in zip(
+            ("punch", "foundation"), systems, results, solvers
+        ):
             rows.append(
                 {
                     "phase": phase,
@@ -168,7 +182,11 @@ def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     for name in ELEMENTS:
         own = [row for row in rows if row["solver"] == name][-3:]
         slope = {
-            key: float(np.polyfit(np.log([r["unknowns"] for r in own]), np.log([r[key] for r in own]), 1)[0])
+            key: float(
+                np.polyfit(np.log([r["unknowns"] for r in own]), np.log([r[key] for r in own]), 1)[
+                    0
+                ]
+            )
             for key in ("setup [s]", "solve [s]", "memory [MiB]")
         }
         out.append({"solver": name, **slope})
@@ -177,58 +195,85 @@ def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def draw(rows: list[dict[str, Any]]) -> Figure:
     figure = Figure(figsize=(6.8, 6.4), layout="constrained")
-    for ax, key in zip(figure.subplots(2, 2).ravel(), ("setup [s]", "solve [s]", "memory [MiB]", "iterations")):
+    for ax, key in zip(
+        figure.subplots(2, 2).ravel(), ("setup [s]", "solve [s]", "memory [MiB]", "iterations")
+    ):
         for name, colour in COLOURS.items():
             own = [row for row in rows if row["solver"] == name and row[key]]
             if own:
-                ax.plot([r["unknowns"] for r in own], [r[key] for r in own], "o-", ms=3, color=colour, label=name)
-        ax.set(xscale="log", xlabel="unknowns of the body [-]", title=key if "[" in key else f"{key} [-]")
+                ax.plot(
+                    [r["unknowns"] for r in own],
+                    [r[key] for r in own],
+                    "o-",
+                    ms=3,
+                    color=colour,
+                    label=name,
+                )
+        ax.set(
+            xscale="log",
+            xlabel="unknowns of the body [-]",
+            title=key if "[" in key else f"{key} [-]",
+        )
         if key == "iterations":
             ax.set(ylim=(0, None))
         else:
             ax.set(yscale="log")
         ax.grid(alpha=0.3)
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    figure.legend(
+        *figure.axes[0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=2,
+        frameon=False,
+    )
     return figure
 
 
 TEXT = """Which solver of a body's linear system is the fastest? The body is the foundation of `punch-3d`. Its hexahedra grow by 1.3 away from the
-contact, and it is held on three sides. One load is random on the unknowns of the contact. Multigrid and the defaults of pyamg ({versions})
-iterate to a relative accuracy of 1e-10. It is measured by (r' B r)^1/2 with the V-cycle B for the one, and by |r| for the other. The table has
-processor seconds of one thread, and the memory that the solver keeps, without the matrix. "complexity" is the number of entries of all levels over
-those of the matrix. "residual" is |b - A x| / |b|.
-{large}
+contact, and it is held on three sides. One load is random on the unknowns of the contact. Multigrid
+and the defaults of pyamg ({versions}) iterate to a relative accuracy of 1e-10. It is measured by
+(r' B r)^1/2 with the V-cycle B for the one, and by |r| for the other. The table has processor
+seconds of one thread, and the memory that the solver keeps, without the matrix. "complexity" is the
+number of entries of all levels over those of the matrix. "residual" is |b - A x| / |b|. {large}
 {{rows}}
 
-**Growth.** The table has exponents of the number of unknowns, fitted to the three largest sizes of each solver.
+**Growth.** The table has exponents of the number of unknowns, fitted to the three largest sizes of
+each solver.
 
 {{growth}}
 
-"pyamg's defaults" has the same blocks and rigid motions, and takes every neighbour for a strong one. Flat elements then make its
-iterations grow with the mesh. `multigrid` joins only nodes that are close to each other, measured by the size of the mesh around them.
+"pyamg's defaults" has the same blocks and rigid motions, and takes every neighbour for a strong
+one. Flat elements then make its iterations grow with the mesh. `multigrid` joins only nodes that
+are close to each other, measured by the size of the mesh around them.
 
-**Both bodies at the same time**, by multigrid with one thread each. Products with sparse matrices leave Python's lock to the other thread. In
-the set-up, the aggregation of pyamg and the smoothing of the prolongation do not. Waiting for a core is not counted.
+**Both bodies at the same time**, by multigrid with one thread each. Products with sparse matrices
+leave Python's lock to the other thread. In the set-up, the aggregation of pyamg and the smoothing
+of the prolongation do not. Waiting for a core is not counted.
 
 {{threads}}
 """
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--large", action="store_true", help="up to a million unknowns; some ten minutes, 12 GiB")
+    parser.add_argument(
+        "--large", action="store_true", help="up to a million unknowns; some ten minutes, 12 GiB"
+    )
     large = parser.parse_args().large
     for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ[variable] = "1"  # for the processes started below
     if find_spec("pypardiso") is None:
         del ELEMENTS["pardiso"]
-    sizes = {name: (*base, *(LARGE.get(name, ()) if large else ())) for name, base in ELEMENTS.items()}
+    sizes = {
+        name: (*base, *(LARGE.get(name, ()) if large else ())) for name, base in ELEMENTS.items()
+    }
     rows = []
     for name, several in sizes.items():
         for elements in several:
             rows.append(alone(measure, (name, elements)))
             print(rows[-1], flush=True)
     threads = alone(both, BOTH_LARGE if large else BOTH)
-    versions = ", ".join(f"{name} {version(name)}" for name in ("pyamg", "pypardiso") if find_spec(name))
+    versions = ", ".join(
+        f"{name} {version(name)}" for name in ("pyamg", "pypardiso") if find_spec(name)
+    )
     text = TEXT.format(versions=versions, large="Made with `--large`.\n" if large else "")
     tables = {"rows": rows, "growth": exponents(rows), "threads": threads}
     write("body_solvers", "Solvers of a body's linear system", text, tables, {"cost": draw(rows)})

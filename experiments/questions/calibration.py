@@ -1,4 +1,6 @@
-"""Are friction and stiffness found from a Cattaneo-Mindlin loop, are the intervals honest, and where is mu not in the data?"""
+"""Are friction and stiffness found from a Cattaneo-Mindlin loop, are the intervals honest, and
+where is mu not in the data?
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from contactopt.derivatives.states import along, solved_chain
 from experiments.report import write
 
 E, MU, FORCE = 5.0, 0.5, 100.0  # MPa, -, N
-RADIUS, THICK, REACH, DEPTH = 4000.0, 400.0, 32.0, 1000.0  # mm; the half-width of contact is about 22
+# mm; the half-width of contact is about 22
+RADIUS, THICK, REACH, DEPTH = 4000.0, 400.0, 32.0, 1000.0
 LOADS = (0.0, 16.0, 30.0, 42.0, 14.0, -16.0, -42.0, -14.0, 16.0, 42.0)
 NOISE = 0.01  # of the largest shift
 REPEATS = 100
@@ -26,7 +29,9 @@ FRICTIONS = (0.2, 0.35, 0.5, 0.7)
 
 
 def loop(cells: int, loads: Sequence[float] = LOADS) -> list[contactopt.Scene]:
-    """Two equal cylinders as half-planes; the upper one is pressed, and pushed by one load after the other."""
+    """Two equal cylinders as half-planes; the upper one is pressed, and pushed by one load after
+    the other.
+    """
     x = REACH * (2 * np.arange(cells) + 1 - cells) / cells
     upper = HalfSpace(
         "upper",
@@ -43,7 +48,9 @@ def loop(cells: int, loads: Sequence[float] = LOADS) -> list[contactopt.Scene]:
 
 
 def shifts(states: list[contactopt.Scene]) -> np.ndarray:
-    return np.array([seeds_of("shift", step).value for step in solved_chain(states, 1e-12, Q="explicit").steps])
+    return np.array(
+        [seeds_of("shift", step).value for step in solved_chain(states, 1e-12, Q="explicit").steps]
+    )
 
 
 def row(name: str, found: contactopt.Fit) -> dict[str, Any]:
@@ -62,11 +69,19 @@ def row(name: str, found: contactopt.Fit) -> dict[str, Any]:
 def clean() -> list[dict[str, Any]]:
     states = loop(40)
     rows = [
-        row("the same grid", contactopt.fit(states, {"shift": shifts(states)}, ("E", "mu"), start=START, Q="explicit"))
+        row(
+            "the same grid",
+            contactopt.fit(
+                states, {"shift": shifts(states)}, ("E", "mu"), start=START, Q="explicit"
+            ),
+        )
     ]
     finer = shifts(loop(160))
     rows.append(
-        row("a grid 4 times finer", contactopt.fit(states, {"shift": finer}, ("E", "mu"), start=START, Q="explicit"))
+        row(
+            "a grid 4 times finer",
+            contactopt.fit(states, {"shift": finer}, ("E", "mu"), start=START, Q="explicit"),
+        )
     )
     return rows
 
@@ -82,7 +97,9 @@ def repetitions() -> tuple[list[dict[str, Any]], contactopt.Fit]:
         data = {"shift": exact + sigma * rng.normal(size=len(exact))}
         found = contactopt.fit(states, data, ("E", "mu"), start=START, noise=sigma, Q="explicit")
         evaluations += found.evaluations
-        hits += [low <= truth <= high for truth, (low, high) in zip((E, MU), found.intervals.values())]
+        hits += [
+            low <= truth <= high for truth, (low, high) in zip((E, MU), found.intervals.values())
+        ]
     rows.append(
         {
             "noise": "known",
@@ -97,25 +114,39 @@ def repetitions() -> tuple[list[dict[str, Any]], contactopt.Fit]:
 
 
 def knowledge() -> tuple[list[dict[str, Any]], np.ndarray]:
-    """Standard deviation of mu, relative, from half a loop of the amplitude T = share mu P, data with NOISE of their largest shift."""
+    """Standard deviation of mu, relative, from half a loop of the amplitude T = share mu P, data
+    with NOISE of their largest shift.
+    """
     out, rows = np.zeros((len(FRICTIONS), len(AMPLITUDES))), []
     for i, mu in enumerate(FRICTIONS):
         for j, share in enumerate(AMPLITUDES):
             top = share * mu * FORCE
-            states = [put_all(s, {parameter("mu", s): mu}) for s in loop(32, np.linspace(0.0, 1.0, 5) * top)]
+            states = [
+                put_all(s, {parameter("mu", s): mu})
+                for s in loop(32, np.linspace(0.0, 1.0, 5) * top)
+            ]
             chain = solved_chain(states, 1e-10, Q="explicit")
             seeds = [seeds_of("shift", step) for step in chain.steps]
             sigma = NOISE * max(abs(seed.value) for seed in seeds)
             which = [parameter(name, states[0]) for name in ("E", "mu")]
-            J = [[along(s, m, {one: 1.0}) for s, m in zip(seeds, chain.forward({one: 1.0}))] for one in which]
+            J = [
+                [along(s, m, {one: 1.0}) for s, m in zip(seeds, chain.forward({one: 1.0}))]
+                for one in which
+            ]
             scaled = np.array(J).T / sigma * [E, mu]
-            slipping = int(chain.steps[-1].problem.law.slipping(chain.steps[-1].solution.reactions).sum())
+            slipping = int(
+                chain.steps[-1].problem.law.slipping(chain.steps[-1].solution.reactions).sum()
+            )
             singular = np.linalg.svd(scaled, compute_uv=False)
             blind = not singular[1] > 1e-8 * singular[0]
             out[i, j] = np.inf if blind else float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))
             if mu == MU:
                 rows.append(
-                    {"T / (mu P)": share, "contacts that slip": slipping, "relative deviation of mu": out[i, j]}
+                    {
+                        "T / (mu P)": share,
+                        "contacts that slip": slipping,
+                        "relative deviation of mu": out[i, j],
+                    }
                 )
     return rows, out
 
@@ -127,7 +158,9 @@ def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
     left, right = made.subplots(1, 2)
     for mu, line, mark in zip(FRICTIONS, deviation, "osD^"):
         seen = np.isfinite(line)
-        left.semilogy(np.array(AMPLITUDES)[seen], line[seen], f"{mark}-", ms=4, lw=1, label=f"mu = {mu:g}")
+        left.semilogy(
+            np.array(AMPLITUDES)[seen], line[seen], f"{mark}-", ms=4, lw=1, label=f"mu = {mu:g}"
+        )
         left.plot(
             np.array(AMPLITUDES)[~seen],
             np.full((~seen).sum(), 0.9),
@@ -137,7 +170,9 @@ def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
         )
     left.axhline(1.0, color="0.5", lw=0.8)
     left.set(
-        xlabel="largest shear / (mu P)", ylabel="standard deviation of mu / mu", title="x: mu is not in the data at all"
+        xlabel="largest shear / (mu P)",
+        ylabel="standard deviation of mu / mu",
+        title="x: mu is not in the data at all",
     )
     left.legend(frameon=False)
     plots.fit(found, right)
@@ -145,25 +180,29 @@ def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
 
 
 TEXT = f"""How well do measurements of a sheared contact determine friction and stiffness? Two cylinders are pressed by {FORCE:g} N and pushed to and
-fro by {len(LOADS)} shear forces up to {max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu = 0.3 and mu = {MU:g}. One has a radius of
-{RADIUS:g} mm, and the other is flat. The shift of the upper one is measured. From it `contactopt.fit` finds E of both bodies and mu. It
-starts from E = {START["E"]:g}, mu = {START["mu"]:g}.
+fro by {len(LOADS)} shear forces up to {max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu
+= 0.3 and mu = {MU:g}. One has a radius of {RADIUS:g} mm, and the other is flat. The shift of the
+upper one is measured. From it `contactopt.fit` finds E of both bodies and mu. It starts from E =
+{START["E"]:g}, mu = {START["mu"]:g}.
 
-**Without noise.** The data come from the same grid of 40 points, or from a finer grid. In the second case the error that is left is that of the
-coarse grid:
+**Without noise.** The data come from the same grid of 40 points, or from a finer grid. In the
+second case the error that is left is that of the coarse grid:
 
 {{clean}}
 
-**With noise.** Normal noise of {NOISE:.0%} of the largest shift is added, in {REPEATS} repetitions. The 95 % intervals should contain the
-truth about 95 times, and a binomial count of 100 varies by 2.2. For mu the count may be lower: the interval is computed from a linear
-model, but the true one has a kink at every point that begins to slip:
+**With noise.** Normal noise of {NOISE:.0%} of the largest shift is added, in {REPEATS} repetitions.
+The 95 % intervals should contain the truth about 95 times, and a binomial count of 100 varies by
+2.2. For mu the count may be lower: the interval is computed from a linear model, but the true one
+has a kink at every point that begins to slip:
 
 {{repetitions}}
 
-**Where mu cannot be known.** The table has the standard deviation of mu that remains after five states up to the shear T. It is computed from the
-derivatives at the truth. The slip zone shrinks with T, and with it the information about mu in the shift. If no point of the grid
-slips, mu has no influence at all, and `fit` says so. (Here mu = {MU:g}. The curves of other values fall on this one, because
-only T / (mu P) counts.) The curve goes up and down, because the points of the grid begin to slip one by one:
+**Where mu cannot be known.** The table has the standard deviation of mu that remains after five
+states up to the shear T. It is computed from the derivatives at the truth. The slip zone shrinks
+with T, and with it the information about mu in the shift. If no point of the grid slips, mu has no
+influence at all, and `fit` says so. (Here mu = {MU:g}. The curves of other values fall on this one,
+because only T / (mu P) counts.) The curve goes up and down, because the points of the grid begin to
+slip one by one:
 
 {{knowledge}}
 

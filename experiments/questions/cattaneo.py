@@ -1,4 +1,6 @@
-"""Do the sheared contacts reproduce Cattaneo and Mindlin: stick zone, tractions, energy lost in a cycle?"""
+"""Do the sheared contacts reproduce Cattaneo and Mindlin: stick zone, tractions, energy lost in a
+cycle?
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.analytic import contact_modulus, cycle_loss_line, cycle_loss_point, tangential_modulus
+from contactopt.analytic import (
+    contact_modulus,
+    cycle_loss_line,
+    cycle_loss_point,
+    tangential_modulus,
+)
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.paths import PathResult, follow
@@ -19,7 +26,9 @@ SHEARS = {2: (10.0, 20.0, 30.0, 40.0, 45.0), 3: (20.0, 30.0, 40.0)}  # of mu for
 ELEMENTS = {2: (16, 32, 64), 3: (10, 14, 20)}
 
 
-def measure(dim: int, shear: float, elements: int | None = None) -> tuple[dict[str, object], PathResult]:
+def measure(
+    dim: int, shear: float, elements: int | None = None
+) -> tuple[dict[str, object], PathResult]:
     """One cycle with four states from zero to the largest shear."""
     start = time.perf_counter()
     states = scenes.shear_cycle(dim, steps=4, shear=shear, elements=elements)
@@ -68,7 +77,9 @@ def exact_loss(dim: int, scene: Scene, shear: float) -> float:
     modulus = contact_modulus(material, material)
     if dim == 2:
         return DEPTH * cycle_loss_line(FORCE / DEPTH, modulus, MU, shear / DEPTH)
-    return cycle_loss_point(FORCE, RADIUS, modulus, tangential_modulus(material, material), MU, shear)
+    return cycle_loss_point(
+        FORCE, RADIUS, modulus, tangential_modulus(material, material), MU, shear
+    )
 
 
 def draw(paths: dict[str, PathResult]) -> Figure:
@@ -79,25 +90,38 @@ def draw(paths: dict[str, PathResult]) -> Figure:
         a, peak = scene.reference.half_width, MU * scene.reference.peak
         r = path.solution.reactions / problem.areas[:, None]
         fine = np.linspace(0, 1.25 * a, 1001)
-        ax.plot(fine / a, MU * scene.reference.pressure(fine) / peak, "--", color=GREY, lw=1, label="mu p, exact")
-        ax.plot(fine / a, scene.reference.shear(fine) / peak, color=ORANGE, lw=1.5, label="q, exact")
+        ax.plot(
+            fine / a,
+            MU * scene.reference.pressure(fine) / peak,
+            "--",
+            color=GREY,
+            lw=1,
+            label="mu p, exact",
+        )
+        ax.plot(
+            fine / a, scene.reference.shear(fine) / peak, color=ORANGE, lw=1.5, label="q, exact"
+        )
         ax.plot(distance / a, -r[:, 1] / peak, ".", color=BLUE, ms=4, label="q, all contact nodes")
-        ax.set(title=name, xlabel="distance from the centre / a [-]", ylabel="traction / (mu p0) [-]")
+        ax.set(
+            title=name, xlabel="distance from the centre / a [-]", ylabel="traction / (mu p0) [-]"
+        )
         ax.legend(frameon=False)
     return figure
 
 
 TEXT = """How accurate are sheared contacts? Two bodies of one material are pressed by 100 N and sheared to and fro by T, with mu = .5. Cattaneo and
-Mindlin's exact solution is compared with two things: the state at +T after a whole cycle, and the energy that the cycle costs. The cycle
-starts at the first +T.
+Mindlin's exact solution is compared with two things: the state at +T after a whole cycle, and the
+energy that the cycle costs. The cycle starts at the first +T.
 
-There are two scenes. In plane strain (nu = .3) a cylinder has a radius of 4,000 mm, and the bodies are 50 contact half-widths large. In 3D
-(nu = 0) a sphere has a radius of 10,000 mm, half of it is modelled, and the bodies are 8 contact radii large.
+There are two scenes. In plane strain (nu = .3) a cylinder has a radius of 4,000 mm, and the bodies
+are 50 contact half-widths large. In 3D (nu = 0) a sphere has a radius of 10,000 mm, half of it is
+modelled, and the bodies are 8 contact radii large.
 
-Tractions are compared node by node, without smoothing, although the exact ones have vertical tangents at both edges. `loss` is the
-friction work. `loop's area` is the integral of the shear force over the shift by the trapezoidal rule. It has eight chords each way, and is
-therefore coarser. The balance of energy says: external work = elastic energy + friction work + error of the steps. `energy balance` is
-its largest error, relative to the energy.
+Tractions are compared node by node, without smoothing, although the exact ones have vertical
+tangents at both edges. `loss` is the friction work. `loop's area` is the integral of the shear
+force over the shift by the trapezoidal rule. It has eight chords each way, and is therefore
+coarser. The balance of energy says: external work = elastic energy + friction work + error of the
+steps. `energy balance` is its largest error, relative to the energy.
 
 {loads}
 

@@ -1,4 +1,6 @@
-"""What do the certificate and the checks of the input cost beside the solve? `python -m experiments.questions.certificate_overhead`."""
+"""What do the certificate and the checks of the input cost beside the solve? `python -m
+experiments.questions.certificate_overhead`.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ REPEATS = 9
 
 
 def clocked(act: Callable[[], Any]) -> tuple[Any, float]:
-    """What it returns, and its seconds of the processor, which another load of the machine changes least."""
+    """What it returns, and its seconds of the processor, which another load of the machine changes
+    least.
+    """
     begin = time.process_time()
     return act(), time.process_time() - begin
 
@@ -45,11 +49,15 @@ def row(name: str) -> dict[str, object]:
     runs = []
     for _ in range(REPEATS):
         made, checks = clocked(
-            lambda: InterfaceProblem(problem.Q, problem.q, problem.law, problem.V, problem.s, problem.areas)
+            lambda: InterfaceProblem(
+                problem.Q, problem.q, problem.law, problem.V, problem.s, problem.areas
+            )
         )
         solution, whole = clocked(partial(solve, made))
         certificate = sum(
-            clocked(partial(natural_map_residual, problem, solution.reactions, solution.multipliers))[1]
+            clocked(
+                partial(natural_map_residual, problem, solution.reactions, solution.multipliers)
+            )[1]
             for _ in range(solution.iterations)
         )
         runs.append((checks, whole, alone(problem, solution.iterations), certificate))
@@ -70,12 +78,13 @@ def row(name: str) -> dict[str, object]:
 
 
 TEXT = """How much time do the certificate and the checks cost? The named scenes are solved at their own resolution. Times are processor seconds,
-medians of {repeats} solves with one BLAS thread. "Checks of the problem" is the making of the `InterfaceProblem` from its arrays. "Method
-alone" makes the same iterates without the driver and the certificate.
+medians of {repeats} solves with one BLAS thread. "Checks of the problem" is the making of the
+`InterfaceProblem` from its arrays. "Method alone" makes the same iterates without the driver and
+the certificate.
 
-Both shares count all that is not the method: checks, the dimensionless form, equilibrium of the load, certificates, and history. The
-first share is that of the time that the interface problem takes. The second is that of the solve of the scene, from the meshes to
-the contact forces.
+Both shares count all that is not the method: checks, the dimensionless form, equilibrium of the
+load, certificates, and history. The first share is that of the time that the interface problem
+takes. The second is that of the solve of the scene, from the meshes to the contact forces.
 
 {rows}
 """

@@ -1,7 +1,8 @@
-"""Does `laplacian` fit contact surfaces of any shape, meshed by triangles, and bodies of any ratio of stiffness?
+"""Does `laplacian` fit contact surfaces of any shape, meshed by triangles, and bodies of any ratio
+of stiffness?
 
-`python -m experiments.questions.contact_surfaces` makes the tables and the report; it needs the package gmsh. With `roots` it prints how
-long both ways to the square root take instead.
+`python -m experiments.questions.contact_surfaces` makes the tables and the report; it needs the
+package gmsh. With `roots` it prints how long both ways to the square root take instead.
 """
 
 from __future__ import annotations
@@ -60,10 +61,19 @@ def cut(whole: Callable[[], None], hole: Callable[[], int]) -> Callable[[], None
 # name -> (how gmsh makes it, size of the triangles at a place over the largest one)
 SURFACES: dict[str, tuple[Callable[[], None], Callable[[float, float], float]]] = {
     "disc (fitted on)": (disc, lambda x, y: 1.0),
-    "L-shape": (cut(square, lambda: int(gmsh.model.occ.addRectangle(0, 0, 0, 1, 1))), lambda x, y: 1.0),
-    "annulus": (cut(disc, lambda: int(gmsh.model.occ.addDisk(0, 0, 0, 0.5, 0.5))), lambda x, y: 1.0),
+    "L-shape": (
+        cut(square, lambda: int(gmsh.model.occ.addRectangle(0, 0, 0, 1, 1))),
+        lambda x, y: 1.0,
+    ),
+    "annulus": (
+        cut(disc, lambda: int(gmsh.model.occ.addDisk(0, 0, 0, 0.5, 0.5))),
+        lambda x, y: 1.0,
+    ),
     "ellipse": (ellipse, lambda x, y: 0.7),
-    "square, graded 1:20 to a corner": (square, lambda x, y: max(np.hypot(x + 1, y + 1) / np.sqrt(8), 0.05) * 2.6),
+    "square, graded 1:20 to a corner": (
+        square,
+        lambda x, y: max(np.hypot(x + 1, y + 1) / np.sqrt(8), 0.05) * 2.6,
+    ),
 }
 
 
@@ -72,7 +82,11 @@ def triangles(name: str, size: float) -> tuple[np.ndarray, np.ndarray]:
     make, share = SURFACES[name]
     gmsh.initialize(interruptible=False)
     try:
-        for option, value in (("General.Terminal", 0), ("Mesh.MeshSizeExtendFromBoundary", 0), ("Mesh.RandomSeed", 1)):
+        for option, value in (
+            ("General.Terminal", 0),
+            ("Mesh.MeshSizeExtendFromBoundary", 0),
+            ("Mesh.RandomSeed", 1),
+        ):
             gmsh.option.setNumber(option, value)
         make()
         gmsh.model.occ.synchronize()
@@ -88,7 +102,9 @@ def triangles(name: str, size: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def extruded(points: np.ndarray, cells: np.ndarray, levels: np.ndarray) -> MeshTet:
-    """The prisms over triangles, each cut into three tetrahedra; neighbours agree because corners are sorted."""
+    """The prisms over triangles, each cut into three tetrahedra; neighbours agree because corners
+    are sorted.
+    """
     k, cells = points.shape[1], np.sort(cells, axis=0)
     p = np.concatenate([np.concatenate([points, np.full((1, k), z)]) for z in levels], axis=1)
     tetrahedra = []
@@ -100,14 +116,20 @@ def extruded(points: np.ndarray, cells: np.ndarray, levels: np.ndarray) -> MeshT
 
 
 def stubs(name: str, size: float) -> Scene:
-    """Two stubs on each other along a surface, held at their far ends. The first layer is as thick as the smallest triangle."""
+    """Two stubs on each other along a surface, held at their far ends.
+
+    The first layer is as thick as the smallest triangle.
+    """
     points, cells = triangles(name, size)
     edge = points[:, cells[1]] - points[:, cells[0]]
     levels = graded(HEIGHT, float(np.linalg.norm(edge, axis=0).min()), GROWTH)
 
     def part(name: str, side: float) -> Part:
         mesh = extruded(points, cells, side * levels).with_boundaries(
-            {"contact": lambda x: np.abs(x[2]) < 1e-9, "far": lambda x: np.abs(x[2]) > HEIGHT - 1e-9}
+            {
+                "contact": lambda x: np.abs(x[2]) < 1e-9,
+                "far": lambda x: np.abs(x[2]) > HEIGHT - 1e-9,
+            }
         )
         return Part(name, mesh, Material(1.0, POISSON), (Support("far"),))
 
@@ -121,7 +143,10 @@ def ring(n: int) -> Scene:
 
     def part(name: str, radii: np.ndarray, far: float) -> Part:
         p = np.concatenate([r * np.stack([np.cos(angle), np.sin(angle)]) for r in radii], axis=1)
-        cells = [np.stack([i, i + n, (i + 1) % n + n, (i + 1) % n]) + layer * n for layer in range(len(radii) - 1)]
+        cells = [
+            np.stack([i, i + n, (i + 1) % n + n, (i + 1) % n]) + layer * n
+            for layer in range(len(radii) - 1)
+        ]
         middle = np.cos(np.pi / n)
         mesh = MeshQuad(p, np.concatenate(cells, axis=1)).with_boundaries(
             {
@@ -160,7 +185,9 @@ def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, objec
 
 
 def lanczos(P: LinearOperator, Q: LinearOperator) -> float:
-    """Condition of P Q from below, by Lanczos' method in the inner product of P, orthogonalised twice."""
+    """Condition of P Q from below, by Lanczos' method in the inner product of P, orthogonalised
+    twice.
+    """
     w = np.random.default_rng(0).normal(size=Q.shape[0])
     basis: list[np.ndarray] = []
     images: list[np.ndarray] = []
@@ -185,9 +212,19 @@ def many(n: int) -> dict[str, object]:
     problem = reduce_bodies(ring(n), Q="implicit").problem
     P = preconditioner(problem, "laplacian")
     Q = LinearOperator((problem.q.size,) * 2, matvec=lambda x: problem.Q @ x.ravel(), dtype=float)
-    row: dict[str, object] = {"surface": "closed ring, in the plane", "contacts": problem.contacts, "ratio": 1.0}
-    for title, chosen in (("laplacian", P), ("deflated", deflated(P, problem.Q, smooth_motions(problem)))):
-        row |= {f"{title}: condition (from below)": lanczos(chosen, Q), f"{title}: iterations": iterations(chosen, Q)}
+    row: dict[str, object] = {
+        "surface": "closed ring, in the plane",
+        "contacts": problem.contacts,
+        "ratio": 1.0,
+    }
+    for title, chosen in (
+        ("laplacian", P),
+        ("deflated", deflated(P, problem.Q, smooth_motions(problem))),
+    ):
+        row |= {
+            f"{title}: condition (from below)": lanczos(chosen, Q),
+            f"{title}: iterations": iterations(chosen, Q),
+        }
     return row
 
 
@@ -200,7 +237,14 @@ def draw(rows: list[dict]) -> Figure:
         n = [row["contacts"] for row in mine]
         for title, colour in (("laplacian", ORANGE), ("deflated", BLUE)):
             marker = "osv^D*"[i]
-            ax.semilogx(n, [row[f"{title}: condition"] for row in mine], marker, ls="-", color=colour, mfc="white")
+            ax.semilogx(
+                n,
+                [row[f"{title}: condition"] for row in mine],
+                marker,
+                ls="-",
+                color=colour,
+                mfc="white",
+            )
         ax.plot([], [], marker, color=GREY, mfc="white", label=surface)
     for title, colour in (("laplacian", ORANGE), ("laplacian, deflated", BLUE)):
         ax.plot([], [], color=colour, label=title)
@@ -210,10 +254,12 @@ def draw(rows: list[dict]) -> Figure:
 
 
 TEXT = """Does the preconditioner `laplacian` work on contact surfaces of any shape? Two stubs stand on each other along a
-surface. gmsh meshed this surface with triangles, and each stub has a column of tetrahedra over each triangle. In the plane a pin sits in a bush. The table has condition numbers of
-the whole operator, with normal and tangential components together. It also has the iterations of conjugate gradients from a random
-right-hand side to 1e-8. `deflated` means that constant and linear motions are solved for exactly. The only number that was fitted to
-stubs is ALONG (`contactopt/methods/preconditioners/constants.py`), and it was fitted on the disc.
+surface. gmsh meshed this surface with triangles, and each stub has a column of tetrahedra over each
+triangle. In the plane a pin sits in a bush. The table has condition numbers of the whole operator,
+with normal and tangential components together. It also has the iterations of conjugate gradients
+from a random right-hand side to 1e-8. `deflated` means that constant and linear motions are solved
+for exactly. The only number that was fitted to stubs is ALONG
+(`contactopt/methods/preconditioners/constants.py`), and it was fitted on the disc.
 
 1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number {most:.1f}. No surface takes more than {steps} iterations. On the disc
    the condition numbers are {disc}. {beyond}
@@ -224,8 +270,8 @@ stubs is ALONG (`contactopt/methods/preconditioners/constants.py`), and it was f
 
 {{rows}}
 
-The last table has the ring with so many contacts that Q is known by its products only. The condition number is an estimate from
-below by the method of Lanczos:
+The last table has the ring with so many contacts that Q is known by its products only. The
+condition number is an estimate from below by the method of Lanczos:
 
 {{many}}
 """
@@ -238,17 +284,31 @@ def report(rows: list[dict]) -> str:
     by_place: dict[tuple, list[float]] = {}
     growth = []
     for row in rows:
-        by_place.setdefault((row["surface"], row["contacts"]), []).append(row["deflated: condition"])
+        by_place.setdefault((row["surface"], row["contacts"]), []).append(
+            row["deflated: condition"]
+        )
     for surface in dict.fromkeys(row["surface"] for row in rows):
-        own = [row["deflated: condition"] for row in rows if row["surface"] == surface and row["ratio"] == 1.0]
+        own = [
+            row["deflated: condition"]
+            for row in rows
+            if row["surface"] == surface and row["ratio"] == 1.0
+        ]
         growth.append(own[-1] / own[0])
-    above = [row for row in rows if row["deflated: condition"] > 10 or row["deflated: iterations"] > 30]
+    above = [
+        row for row in rows if row["deflated: condition"] > 10 or row["deflated: iterations"] > 30
+    ]
     return TEXT.format(
-        worst=f"the {worst['surface']} of {worst['contacts']} contacts at a ratio of {worst['ratio']:g}",
+        worst=(
+            f"the {worst['surface']} of {worst['contacts']} contacts at a ratio of"
+            f" {worst['ratio']:g}"
+        ),
         most=worst["deflated: condition"],
         steps=max(row["deflated: iterations"] for row in rows),
         disc=f"{min(disc):.1f} to {max(disc):.1f}",
-        beyond=f"{len(above)} of {len(rows)} rows have a condition number above 10 or more than 30 iterations.",
+        beyond=(
+            f"{len(above)} of {len(rows)} rows have a condition number above 10 or more than 30"
+            " iterations."
+        ),
         plain=max(row["laplacian: condition"] for row in rows),
         plainsteps=max(row["laplacian: iterations"] for row in rows),
         none=max(row["none: iterations"] for row in rows),
@@ -278,12 +338,16 @@ def main() -> None:
 
 
 def roots() -> list[dict[str, object]]:
-    """Time of `laplacian` on discs, by eigenvectors and by poles, and after how many products eigenvectors have paid off."""
+    """Time of `laplacian` on discs, by eigenvectors and by poles, and after how many products
+    eigenvectors have paid off.
+    """
     rows = []
     for size in (0.3, 0.2, 0.13, 0.09):
         points, cells = triangles(next(iter(SURFACES)), size)
         k = points.shape[1]
-        problem = InterfaceProblem(sp.eye(3 * k, format="csr"), np.zeros((k, 3)), 0.3, coordinates=points)
+        problem = InterfaceProblem(
+            sp.eye(3 * k, format="csr"), np.zeros((k, 3)), 0.3, coordinates=points
+        )
         problem = replace(problem, chart=replace(problem.chart, cells=cells))
         X, held = np.random.default_rng(0).normal(size=(k, 3)), np.zeros((k, 3), dtype=bool)
         times = {}
@@ -295,9 +359,18 @@ def roots() -> list[dict[str, object]]:
             for _ in range(PRODUCTS):
                 act(X)
             times[way] = made - began, (time.process_time() - made) / PRODUCTS
-        slower, faster = times["eigenvectors"][0] - times["poles"][0], times["poles"][1] - times["eigenvectors"][1]
-        seconds = {f"{way}, {what} [s]": s for way, own in times.items() for what, s in zip(("set-up", "product"), own)}
-        rows.append({"unknowns": 2 * k} | seconds | {"products that pay": max(slower, 0.0) / faster})
+        slower, faster = (
+            times["eigenvectors"][0] - times["poles"][0],
+            times["poles"][1] - times["eigenvectors"][1],
+        )
+        seconds = {
+            f"{way}, {what} [s]": s
+            for way, own in times.items()
+            for what, s in zip(("set-up", "product"), own)
+        }
+        rows.append(
+            {"unknowns": 2 * k} | seconds | {"products that pay": max(slower, 0.0) / faster}
+        )
     return rows
 
 

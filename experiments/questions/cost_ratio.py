@@ -35,7 +35,9 @@ def timed(act: Callable[[], Any]) -> tuple[Any, float, float]:
 
 
 def bonded(upper: Assembly, lower: Assembly, solver: str) -> Callable[[], np.ndarray]:
-    """The direct solve of the bonded bodies under the plate's unit motion: order, factorise, substitute once."""
+    """The direct solve of the bonded bodies under the plate's unit motion: order, factorise,
+    substitute once.
+    """
     count = [b.basis.mesh.p.shape[1] for b in (upper, lower)]
     partner = {tuple(np.round(x, 9)): n for x, n in zip(lower.points.T, lower.nodes)}
     node = [np.arange(count[0]), count[0] + np.arange(count[1])]
@@ -48,7 +50,9 @@ def bonded(upper: Assembly, lower: Assembly, solver: str) -> Callable[[], np.nda
         place = np.empty(body.basis.N, dtype=int)
         for component, dofs in enumerate(body.basis.nodal_dofs):
             place[dofs] = dim * own + component
-        move = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), (size, len(place)))
+        move = sp.csr_matrix(
+            (np.ones(len(place)), (place, np.arange(len(place)))), (size, len(place))
+        )
         A = A + move @ body.A @ move.T
         load += move @ -(body.A @ body.motion.sum(axis=1))
         held |= np.asarray(move @ ~np.isin(np.arange(len(place)), body.free), dtype=bool)
@@ -77,7 +81,9 @@ def frictional(scene: Scene, solver: str) -> tuple[float, float, Any, Any]:
 
 def measure(name: str, solver: str) -> dict[str, Any]:
     scene = SCENES[name][0]()
-    upper, lower = (build_body(scene, part, scene.elements, scene.zone) for part in (scene.upper, scene.lower))
+    upper, lower = (
+        build_body(scene, part, scene.elements, scene.zone) for part in (scene.upper, scene.lower)
+    )
     act = bonded(upper, lower, solver)
     rows = []
     for _ in range(REPEATS):
@@ -106,15 +112,17 @@ def measure(name: str, solver: str) -> dict[str, Any]:
 
 
 TEXT = f"""What does friction cost? The time from assembled bodies to certified contact forces (residual at most 1e-8) is compared with that of one linear
-solve. For the frictional problem two cores factorise both bodies at the same time, and Newton's method follows. The linear solve
-is one direct solve of the same two bodies, glued together at the contact nodes, with a given motion of the plate. It has the same solver
-and ordering, and one forward and backward substitution. Times are medians of {REPEATS} runs in turn, with `OMP_NUM_THREADS=1`. The
-second ratio counts the seconds of both threads.
+solve. For the frictional problem two cores factorise both bodies at the same time, and Newton's
+method follows. The linear solve is one direct solve of the same two bodies, glued together at the
+contact nodes, with a given motion of the plate. It has the same solver and ordering, and one
+forward and backward substitution. Times are medians of {REPEATS} runs in turn, with
+`OMP_NUM_THREADS=1`. The second ratio counts the seconds of both threads.
 
 {{ratios}}
 
-Friction can cost less than a linear solve. The factors of two separate bodies are smaller than those of both bodies together, and each body has
-a core of its own. What friction itself adds are the steps between `factorise` and the certificate:
+Friction can cost less than a linear solve. The factors of two separate bodies are smaller than
+those of both bodies together, and each body has a core of its own. What friction itself adds are
+the steps between `factorise` and the certificate:
 
 {{phases}}
 """
@@ -132,6 +140,11 @@ def phases(name: str, solver: str) -> dict[str, Any]:
 if __name__ == "__main__":
     names = sys.argv[1:] or list(SCENES)
     pairs = [(n, s) for n in names for s in SOLVERS if s != "pardiso" or find_spec("pypardiso")]
-    rows = {"ratios": [measure(*pair) for pair in pairs], "phases": [phases(*pair) for pair in pairs]}
-    tables = {name: merged("cost_ratio", name, table, ("scene", "solver")) for name, table in rows.items()}
+    rows = {
+        "ratios": [measure(*pair) for pair in pairs],
+        "phases": [phases(*pair) for pair in pairs],
+    }
+    tables = {
+        name: merged("cost_ratio", name, table, ("scene", "solver")) for name, table in rows.items()
+    }
     write("cost_ratio", "The price of friction", TEXT, tables, {})

@@ -1,4 +1,6 @@
-"""How much faster are our methods than generic backends on one dense normal and one dense tangential problem?"""
+"""How much faster are our methods than generic backends on one dense normal and one dense
+tangential problem?
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,9 @@ import os
 
 # one thread for every library, before numpy is imported
 os.environ.update(
-    dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+    dict.fromkeys(
+        ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1"
+    )
 )
 
 import time
@@ -25,17 +29,20 @@ from experiments.report import write
 
 REPEATS = 3
 TOL = 1e-8  # certificate that every answer must have
-ACCURACIES = (1e-7, 1e-8, 1e-9)  # asked of a backend, loosest first: the first that is certified counts
-LARGE = ("proxqp", "piqp", "daqp", "osqp", "scs")  # backends that are run at the largest size as well
+# asked of a backend, loosest first: the first that is certified counts
+ACCURACIES = (1e-7, 1e-8, 1e-9)
+# backends that are run at the largest size as well
+LARGE = ("proxqp", "piqp", "daqp", "osqp", "scs")
 DISCS = (16, 32)  # grids
 NODES = (256, 1024, 2048)
 
 
 def half_plane(k: int, half: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    """Compliance and linear term of a parabola on a half-plane, contact on the inner part `half` of k nodes.
+    """Compliance and linear term of a parabola on a half-plane, contact on the inner part `half` of
+    k nodes.
 
-    The kernel is -log of the distance over the width, pressures constant on elements, diagonal one; the parabola is the
-    one that Hertz's pressure on the inner part makes.
+    The kernel is -log of the distance over the width, pressures constant on elements, diagonal one;
+    the parabola is the one that Hertz's pressure on the inner part makes.
     """
     x = -1 + (np.arange(k) + 0.5) * 2 / k
     d = np.arange(k).astype(float)
@@ -48,15 +55,22 @@ def half_plane(k: int, half: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     return Q, -(top + curvature * x**2)
 
 
-def half_space(n: int, nu: float = 0.3, load: float = 0.55) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cerruti's kernel on a grid of n^2 points, linear term (k, 2) of a shift with a twist, radii with 12 % zeros."""
+def half_space(
+    n: int, nu: float = 0.3, load: float = 0.55
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cerruti's kernel on a grid of n^2 points, linear term (k, 2) of a shift with a twist, radii
+    with 12 % zeros.
+    """
     x = (np.arange(n) + 0.5) * 2 / n - 1
     X, Y = (a.ravel() for a in np.meshgrid(x, x))
     dx, dy = X[:, None] - X, Y[:, None] - Y
     d = np.hypot(dx, dy)
     np.fill_diagonal(d, 1.0)
     K = np.empty((n * n, 2, n * n, 2))
-    K[:, 0, :, 0], K[:, 1, :, 1] = (1 - nu) / d + nu * dx**2 / d**3, (1 - nu) / d + nu * dy**2 / d**3
+    K[:, 0, :, 0], K[:, 1, :, 1] = (
+        (1 - nu) / d + nu * dx**2 / d**3,
+        (1 - nu) / d + nu * dy**2 / d**3,
+    )
     K[:, 0, :, 1] = K[:, 1, :, 0] = nu * dx * dy / d**3
     own = 4 * np.log(1 + np.sqrt(2)) * n / 2 * (1 - nu / 2)  # mean over the point's own square
     i = np.arange(n * n)
@@ -64,12 +78,18 @@ def half_space(n: int, nu: float = 0.3, load: float = 0.55) -> tuple[np.ndarray,
     Q = K.reshape(2 * n * n, -1) / own
     square = X**2 + Y**2
     radius = np.sqrt(np.maximum(0, 1 - square / np.quantile(square, 0.88)))
-    full = np.linalg.norm((Q @ np.stack([radius, 0 * radius], axis=1).ravel()).reshape(-1, 2), axis=1).max()
+    full = np.linalg.norm(
+        (Q @ np.stack([radius, 0 * radius], axis=1).ravel()).reshape(-1, 2), axis=1
+    ).max()
     return Q, np.stack([-load * full * (1 + 0.3 * Y), 0.15 * full * X], axis=1), radius
 
 
-def residual(Q: np.ndarray, c: np.ndarray, r: np.ndarray, project: Callable[[np.ndarray], np.ndarray]) -> float:
-    """Natural map |r - P(r - rho u)| / max(|r|, rho |c|, rho |u|), rho = |r| / min(max(|u|, |c|), |Q r|)."""
+def residual(
+    Q: np.ndarray, c: np.ndarray, r: np.ndarray, project: Callable[[np.ndarray], np.ndarray]
+) -> float:
+    """Natural map |r - P(r - rho u)| / max(|r|, rho |c|, rho |u|), rho = |r| / min(max(|u|, |c|),
+    |Q r|).
+    """
     image = (Q @ r.ravel()).reshape(r.shape)
     u = image + c
     size = max(np.linalg.norm(u), np.linalg.norm(c))
@@ -89,11 +109,16 @@ def timed(solve: Callable[[], np.ndarray]) -> tuple[np.ndarray, float]:
 
 def at(backend: Backend, accuracy: float) -> Backend:
     """A backend with its tight settings at another accuracy."""
-    settings = {k: accuracy if isinstance(v, float) and 0 < v < 1e-6 else v for k, v in backend.settings.items()}
+    settings = {
+        k: accuracy if isinstance(v, float) and 0 < v < 1e-6 else v
+        for k, v in backend.settings.items()
+    }
     return replace(backend, settings=settings)
 
 
-def best(backend: Backend, run: Callable[[Backend], np.ndarray], check: Callable[[np.ndarray], float]):  # type: ignore[no-untyped-def]
+def best(
+    backend: Backend, run: Callable[[Backend], np.ndarray], check: Callable[[np.ndarray], float]
+):  # type: ignore[no-untyped-def]
     """The loosest accuracy whose answer is certified: accuracy, residual, seconds."""
     for accuracy in ACCURACIES:
         chosen = at(backend, accuracy)
@@ -104,7 +129,9 @@ def best(backend: Backend, run: Callable[[Backend], np.ndarray], check: Callable
     raise AssertionError
 
 
-def row(name: str, size: int, accuracy: object, error: float, seconds: float, ours: float) -> dict[str, object]:
+def row(
+    name: str, size: int, accuracy: object, error: float, seconds: float, ours: float
+) -> dict[str, object]:
     return {
         "method": name,
         "unknowns": size,
@@ -147,27 +174,31 @@ def tangential(n: int) -> list[dict[str, object]]:
         bridge = DiscSOCP.using(backend.name, Q, np.zeros((0, len(Q))))
         return replace(bridge, backend=backend).solve(c.ravel(), np.zeros(0), radius)[0]
 
-    rows.append(row("clarabel through cvxpy", 2 * n * n, *best(CONIC["clarabel"], run, check), ours))
+    rows.append(
+        row("clarabel through cvxpy", 2 * n * n, *best(CONIC["clarabel"], run, check), ours)
+    )
     return rows
 
 
 TEXT = """How fast are the methods of contactopt beside general solvers, if Q is a dense matrix? Every run has a cold start and one BLAS thread. Times are medians
-of {repeats} runs. Every answer is brought to a natural-map residual of 1e-8 if its method can do that. A backend is asked
-for the accuracies 1e-7, 1e-8 and 1e-9. The table has the loosest one whose answer is certified, or the tightest one if none is. The column
-"times ours" is the ratio to the first row of the same size.
+of {repeats} runs. Every answer is brought to a natural-map residual of 1e-8 if its method can do
+that. A backend is asked for the accuracies 1e-7, 1e-8 and 1e-9. The table has the loosest one whose
+answer is certified, or the tightest one if none is. The column "times ours" is the ratio to the
+first row of the same size.
 
 ## Normal problem
 
-This is contact without friction on a half-plane, with the gap of Hertz. The kernel is logarithmic, so all unknowns are coupled. Half of the nodes are
-in contact, and no force balance is asked for. Backends that are much slower than the others are not run at the largest size.
+This is contact without friction on a half-plane, with the gap of Hertz. The kernel is logarithmic,
+so all unknowns are coupled. Half of the nodes are in contact, and no force balance is asked for.
+Backends that are much slower than the others are not run at the largest size.
 
 {normal}
 
 ## Tangential problem
 
-This is friction under given normal forces on a square grid, with Cerruti's kernel. Every node has a disc with two unknowns. 12 % of
-the discs have the radius zero, and under half of the discs slip. No force balance is asked for. The time of a backend includes the
-compilation by cvxpy.
+This is friction under given normal forces on a square grid, with Cerruti's kernel. Every node has a
+disc with two unknowns. 12 % of the discs have the radius zero, and under half of the discs slip. No
+force balance is asked for. The time of a backend includes the compilation by cvxpy.
 
 {tangential}
 """

@@ -21,12 +21,18 @@ def on_half_plane(cells: int, mu: float) -> Scene:
     x = -HALF + h * (np.arange(cells) + 0.5)
     lower = HalfSpace("half-plane", MATERIAL, x)
     return Scene(
-        f"half-plane, mu = {mu:g}", Rigid("punch", normal=(0, 1), force={"y": -FORCE}), lower, mu, units=("mm", "MPa")
+        f"half-plane, mu = {mu:g}",
+        Rigid("punch", normal=(0, 1), force={"y": -FORCE}),
+        lower,
+        mu,
+        units=("mm", "MPa"),
     )
 
 
 def on_block(elements: int, mu: float) -> Scene:
-    """A rigid punch on the middle of an elastic block of finite elements, which is clamped below: no known profile."""
+    """A rigid punch on the middle of an elastic block of finite elements, which is clamped below:
+    no known profile.
+    """
     half = np.linspace(0.0, HALF, elements + 1)
     rest = graded(3 * HALF, HALF / elements, 1.3)[1:]
     x = np.concatenate([-(HALF + rest[::-1]), -half[:0:-1], half, HALF + rest])
@@ -35,7 +41,11 @@ def on_block(elements: int, mu: float) -> Scene:
     mesh = mesh.with_boundaries({"contact": lambda p: (p[1] == 0) & (np.abs(p[0]) < HALF)})
     lower = Part("block", mesh, MATERIAL, supports=(Support("bottom"),))
     return Scene(
-        f"block, mu = {mu:g}", Rigid("punch", normal=(0, 1), force={"y": -FORCE}), lower, mu, units=("mm", "MPa")
+        f"block, mu = {mu:g}",
+        Rigid("punch", normal=(0, 1), force={"y": -FORCE}),
+        lower,
+        mu,
+        units=("mm", "MPa"),
     )
 
 
@@ -49,7 +59,9 @@ def polynomials(places: np.ndarray) -> np.ndarray:
 
 
 def known_profile(x: np.ndarray) -> np.ndarray:
-    """Displacement of a half-plane under uniform pressure on |x| < 1 (Johnson 1985, section 2.5), up to a constant [length]."""
+    """Displacement of a half-plane under uniform pressure on |x| < 1 (Johnson 1985, section 2.5),
+    up to a constant [length].
+    """
     modulus = MATERIAL.E / (1 - MATERIAL.nu**2)
     with np.errstate(divide="ignore", invalid="ignore"):
         shape = (1 + x) * np.log((1 + x) ** 2) + (1 - x) * np.log((1 - x) ** 2)
@@ -86,7 +98,9 @@ def measure() -> tuple[list[dict[str, Any]], dict[str, contactopt.Design]]:
                 "designed, peak/mean": found.peak * float(area.sum()) / FORCE,
                 "states visited": len(found.visits),
                 "largest certificate": max(visit.certificate for visit in found.visits),
-                "off the known profile": float(np.abs(apart).max() / np.ptp(exact)) if compared else "-",
+                "off the known profile": (
+                    float(np.abs(apart).max() / np.ptp(exact)) if compared else "-"
+                ),
                 "CPU [s]": seconds,
             }
         )
@@ -104,7 +118,13 @@ def figure(kept: dict[str, contactopt.Design]) -> Any:
         left.plot(x, found.gap - found.gap.min(), mark, ms=3, lw=1.2, label=name, mfc="none")
         right.plot(x, found.pressure * 2 * HALF / FORCE, mark, ms=3, lw=1.2, mfc="none")
     x = np.linspace(-0.9999, 0.9999, 400)
-    left.plot(x, known_profile(x) - known_profile(np.zeros(1)), "k", lw=0.8, label="known, uniform pressure, mu = 0")
+    left.plot(
+        x,
+        known_profile(x) - known_profile(np.zeros(1)),
+        "k",
+        lw=0.8,
+        label="known, uniform pressure, mu = 0",
+    )
     left.set(xlabel="place / half-width", ylabel="initial gap [mm]")
     left.legend(frameon=False, fontsize=7)
     right.axhline(1.05, color="0.5", lw=0.8)
@@ -113,12 +133,14 @@ def figure(kept: dict[str, contactopt.Design]) -> Any:
 
 
 TEXT = f"""Which profile makes the pressure under a punch even? A rigid flat punch of the half-width {HALF:g} mm carries {FORCE:g} N. Its pressure is infinite at
-the corners. On a mesh the pressure is largest at the last contact. `contactopt.design` looks for the profile whose largest pressure is as small as possible. The
-profile has one free height per contact, or it is a sum of six Legendre polynomials. The mean pressure is the force over the face of
+the corners. On a mesh the pressure is largest at the last contact. `contactopt.design` looks for
+the profile whose largest pressure is as small as possible. The profile has one free height per
+contact, or it is a sum of six Legendre polynomials. The mean pressure is the force over the face of
 the punch.
 
-On a half-plane without friction the answer is known: it is the displacement under a uniform pressure (Johnson 1985, section 2.5). For
-the block of finite elements, and with friction, the best profile is not known.
+On a half-plane without friction the answer is known: it is the displacement under a uniform
+pressure (Johnson 1985, section 2.5). For the block of finite elements, and with friction, the best
+profile is not known.
 
 {{designs}}
 """
@@ -126,4 +148,10 @@ the block of finite elements, and with friction, the best profile is not known.
 
 if __name__ == "__main__":
     rows, kept = measure()
-    write("design", "The punch with an even pressure", TEXT, {"designs": rows}, {"design": figure(kept)})
+    write(
+        "design",
+        "The punch with an even pressure",
+        TEXT,
+        {"designs": rows},
+        {"design": figure(kept)},
+    )

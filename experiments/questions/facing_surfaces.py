@@ -1,4 +1,6 @@
-"""Do contacts keep their areas and a uniform pressure, and Hertz and Persson their peaks, on meshes that nobody prepared?"""
+"""Do contacts keep their areas and a uniform pressure, and Hertz and Persson their peaks, on meshes
+that nobody prepared?
+"""
 
 from __future__ import annotations
 
@@ -43,18 +45,24 @@ class Shape:
     waves: float
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        return self.slope @ x + self.curvature @ x**2 / 2 + self.waves * np.sum(np.cos(5 * x), axis=0)
+        return (
+            self.slope @ x + self.curvature @ x**2 / 2 + self.waves * np.sum(np.cos(5 * x), axis=0)
+        )
 
 
 def grid(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
     """Places between two ends: even, graded to one end, or at random."""
     n = int(rng.integers(2, 13))
-    step = [np.ones(n), rng.uniform(1, 1.5) ** np.arange(n), rng.uniform(0.2, 1, n)][rng.integers(3)]
+    step = [np.ones(n), rng.uniform(1, 1.5) ** np.arange(n), rng.uniform(0.2, 1, n)][
+        rng.integers(3)
+    ]
     return low + (high - low) * np.append(0, np.cumsum(step)) / step.sum()
 
 
 def surface(rng: np.random.Generator, dim: int, ends: np.ndarray, shape: Any, up: bool) -> Faces:
-    """A random mesh of a surface between `ends` (dim - 1, 2), lifted to z = shape(x); `up`: its body lies below."""
+    """A random mesh of a surface between `ends` (dim - 1, 2), lifted to z = shape(x); `up`: its
+    body lies below.
+    """
     kind, degree = (
         str(rng.choice(["RefTri", "RefQuad"] if dim == 2 else ["RefTet", "RefHex"])),
         int(rng.integers(1, 3)),
@@ -62,7 +70,9 @@ def surface(rng: np.random.Generator, dim: int, ends: np.ndarray, shape: Any, up
     if dim == 2:
         mesh = skfem.MeshLine(grid(rng, *ends[0]))
     else:
-        mesh = (skfem.MeshTri if kind == "RefTet" else skfem.MeshQuad).init_tensor(*(grid(rng, *e) for e in ends))
+        mesh = (skfem.MeshTri if kind == "RefTet" else skfem.MeshQuad).init_tensor(
+            *(grid(rng, *e) for e in ends)
+        )
         p, inner = mesh.p.copy(), mesh.interior_nodes()
         shortest = min(float(np.diff(np.unique(row)).min()) for row in p)
         p[:, inner] += rng.uniform(-0.2, 0.2, (2, len(inner))) * shortest
@@ -80,7 +90,9 @@ def integrals(own: Faces) -> np.ndarray:
     count = len(own.faces)
     face, at = np.repeat(np.arange(count), len(share)), np.tile(at, count)
     measure = np.tile(share, count) * np.linalg.norm(cross(own.locations(face, at)[1]), axis=0)
-    return np.bincount(own.faces[face].T.ravel(), (own.shapes(at) * measure).ravel(), own.points.shape[1])
+    return np.bincount(
+        own.faces[face].T.ravel(), (own.shapes(at) * measure).ravel(), own.points.shape[1]
+    )
 
 
 def moved(rng: np.random.Generator, *sides: Faces) -> list[Faces]:
@@ -95,7 +107,9 @@ def moved(rng: np.random.Generator, *sides: Faces) -> list[Faces]:
 
 
 def pair(seed: int) -> dict[str, Any]:
-    """Areas and forces of uniform pressure where a random surface faces another one that covers it or parallels it."""
+    """Areas and forces of uniform pressure where a random surface faces another one that covers it
+    or parallels it.
+    """
     rng = np.random.default_rng(seed)
     dim, flat = int(rng.integers(2, 4)), bool(rng.integers(2))
     parallel = flat and bool(rng.integers(2))
@@ -111,7 +125,11 @@ def pair(seed: int) -> dict[str, Any]:
     inside = np.stack(np.meshgrid(*(np.linspace(*e, 30) for e in ends))).reshape(dim - 1, -1)
     lift = gap + float(np.max(below(inside) - above(inside)))
     beside = parallel and bool(rng.integers(2))
-    reach = ends + rng.uniform(-0.4, 0.4, (dim - 1, 1)) * beside if parallel else np.array([[-1.0, 1.0]] * (dim - 1))
+    reach = (
+        ends + rng.uniform(-0.4, 0.4, (dim - 1, 1)) * beside
+        if parallel
+        else np.array([[-1.0, 1.0]] * (dim - 1))
+    )
     other = surface(rng, dim, reach, lambda x: above(x) + lift, False)
     common = np.minimum(ends, reach)[:, 1] - np.maximum(ends, reach)[:, 0]
     part = float(np.prod(common / np.ptp(ends, axis=1))) if beside else 1.0
@@ -136,14 +154,21 @@ def pairs(count: int) -> list[dict[str, Any]]:
     for dim in (2, 3):
         for kind in ("flat", "curved"):
             own = [row for row in rows if row["dim"] == dim and row["surfaces"] == kind]
-            worst = {key: max((row[key] for row in own), default=0.0) for key in ("area", "share", "uniform pressure")}
+            worst = {
+                key: max((row[key] for row in own), default=0.0)
+                for key in ("area", "share", "uniform pressure")
+            }
             made.append({"space": f"{dim}D", "surfaces": kind, "pairs": len(own)} | worst)
     return made
 
 
-def meshed(rng: np.random.Generator, build: Any, side: Any, sizes: tuple[float, float, float], order: int) -> Any:
-    """A mesh by one of Gmsh's methods, of elements of the first size up to the distance of the third, then growing up to
-    the second; `side` (x, y) names the boundaries."""
+def meshed(
+    rng: np.random.Generator, build: Any, side: Any, sizes: tuple[float, float, float], order: int
+) -> Any:
+    """A mesh by one of Gmsh's methods, of elements of the first size up to the distance of the
+    third, then growing up to
+    the second; `side` (x, y) names the boundaries.
+    """
     fine, coarse, reach = sizes
     options = {
         "General.Terminal": 0,
@@ -157,7 +182,9 @@ def meshed(rng: np.random.Generator, build: Any, side: Any, sizes: tuple[float, 
     }
     gmsh.initialize(interruptible=False)
     try:
-        for key, value in (options | {"Mesh.MeshSizeExtendFromBoundary": 0, "Mesh.MeshSizeFromPoints": 0}).items():
+        for key, value in (
+            options | {"Mesh.MeshSizeExtendFromBoundary": 0, "Mesh.MeshSizeFromPoints": 0}
+        ).items():
             gmsh.option.setNumber(key, float(value))
         body = build(gmsh.model.occ)
         gmsh.model.occ.synchronize()
@@ -205,7 +232,9 @@ class Case:
 
 
 def case(shape: str, rng: np.random.Generator) -> Case:
-    """A roller or a ball with a contact of a few percent of its radius, or a pin that fills up to a third of its hole."""
+    """A roller or a ball with a contact of a few percent of its radius, or a pin that fills up to a
+    third of its hole.
+    """
     radius, steel = float(10 ** rng.uniform(-1, 2)), Material(210e3, 0.3)
     soft = steel if shape == "pin" else Material(steel.E * 10 ** rng.uniform(-0.5, 0.5), 0.3)
     modulus, a = contact_modulus(steel, soft), radius * rng.uniform(0.02, 0.05)
@@ -280,7 +309,9 @@ def scene(one: Case, rng: np.random.Generator) -> tuple[Scene, dict[str, Any]]:
 
 
 def read(x: np.ndarray, p: np.ndarray, areas: np.ndarray, terms: int) -> tuple[float, float]:
-    """Peak and half-width where p^2 is a polynomial in x^2, fitted where the pressure is not small: for Hertz of two terms."""
+    """Peak and half-width where p^2 is a polynomial in x^2, fitted where the pressure is not small:
+    for Hertz of two terms.
+    """
     inside = (p > 0.15 * p.max()) & (areas > 0)
     A = np.vander((x[inside] / x[inside].max()) ** 2, terms, increasing=True)
     c = np.linalg.lstsq(A * areas[inside, None], p[inside] ** 2 * areas[inside], rcond=None)[0]
@@ -297,7 +328,11 @@ def mesh(shape: str, seed: int) -> dict[str, Any]:
     reduction = reduce_bodies(made)
     problem, solution = reduction.problem, solve(reduction.problem)
     place = reduction.coupling.positions
-    x = one.radius * np.arctan2(place[0], one.radius - one.up * place[1]) if shape == "pin" else place[0]
+    x = (
+        one.radius * np.arctan2(place[0], one.radius - one.up * place[1])
+        if shape == "pin"
+        else place[0]
+    )
     area = problem.areas
     p = np.divide(solution.reactions[:, 0], area, out=np.zeros_like(area), where=area > 0)
     row = {"shape": shape, "seed": seed, "carrier": reduction.coupling.carrier} | row
@@ -307,7 +342,9 @@ def mesh(shape: str, seed: int) -> dict[str, Any]:
     known = read(x, np.nan_to_num(one.exact.pressure(x)), area, terms)
     row["peak at a node"] = float(p.max()) / one.exact.peak - 1
     row |= {"peak": peak / one.exact.peak - 1, "half-width": width / one.exact.half_width - 1}
-    return row | {"reading": max(abs(known[0] / one.exact.peak - 1), abs(known[1] / one.exact.half_width - 1))}
+    return row | {
+        "reading": max(abs(known[0] / one.exact.peak - 1), abs(known[1] / one.exact.half_width - 1))
+    }
 
 
 def meshes(count: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -317,24 +354,30 @@ def meshes(count: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     for shape in SHAPES:
         for degree in (1, 2):
             own = [row for row in rows if row["shape"] == shape and row["degree"] == degree]
-            largest = {key: max((abs(row[key]) for row in own), default=0.0) for key in (*LIMITS, "reading")}
+            largest = {
+                key: max((abs(row[key]) for row in own), default=0.0)
+                for key in (*LIMITS, "reading")
+            }
             worst.append({"shape": shape, "degree": degree, "meshes": len(own)} | largest)
     missed = [row for row in rows if any(abs(row[key]) > limit for key, limit in LIMITS.items())]
     return worst, missed or [{"shape": "none"}]
 
 
 TEXT = """Does every contact keep the area of its faces, whatever the gap between two surfaces is beside the size of their facets? {count} random
-pairs of surfaces: linear and quadratic faces, triangles and quadrilaterals, even, graded and random ones, turned, moved, and in
-units from 1e-6 to 1e6. The gap is 1e-4 to 1e3 facets. One surface covers the other, or is parallel and shifted. *area* is the
-relative error of the sum of the areas of all contacts. *share* is that of the area of one contact. *uniform pressure* is the error
-of the nodal forces that a uniform pressure exerts, over the mean one: the patch test.
+pairs of surfaces: linear and quadratic faces, triangles and quadrilaterals, even, graded and random
+ones, turned, moved, and in units from 1e-6 to 1e6. The gap is 1e-4 to 1e3 facets. One surface
+covers the other, or is parallel and shifted. *area* is the relative error of the sum of the areas
+of all contacts. *share* is that of the area of one contact. *uniform pressure* is the error of the
+nodal forces that a uniform pressure exerts, over the mean one: the patch test.
 
 {{pairs}}
 
-Do meshes that nobody prepared give Hertz's and Persson's pressures? A roller and a ball on a block, and a pin in a hole, each from
-{meshes} pairs of meshes: Gmsh's methods, seeds, sizes (8 to 20 facets on the half-width of contact), triangles or quadrilaterals,
-files of order 1 or 2, the round body above or below. *peak at a node* is the largest force over area. *peak* and *half-width* are
-read off all contacts: p^2 is a polynomial in x^2. *reading* is the error of reading the exact pressure in this way.
+Do meshes that nobody prepared give Hertz's and Persson's pressures? A roller and a ball on a block,
+and a pin in a hole, each from {meshes} pairs of meshes: Gmsh's methods, seeds, sizes (8 to 20
+facets on the half-width of contact), triangles or quadrilaterals, files of order 1 or 2, the round
+body above or below. *peak at a node* is the largest force over area. *peak* and *half-width* are
+read off all contacts: p^2 is a polynomial in x^2. *reading* is the error of reading the exact
+pressure in this way.
 
 {{meshes}}
 
@@ -342,8 +385,8 @@ The meshes on which a peak is off by more than 1.5 %, or a half-width by more th
 
 {{missed}}
 
-Linear triangles leave a pressure that goes up and down from node to node where their pattern does, on either side of the exact one.
-So a single node may miss where the contact as a whole does not.
+Linear triangles leave a pressure that goes up and down from node to node where their pattern does,
+on either side of the exact one. So a single node may miss where the contact as a whole does not.
 """
 
 

@@ -1,7 +1,9 @@
-"""How do the methods do on problems of other codes? `python -m experiments.questions.fclib_problems FOLDER [FOLDER ...]`.
+"""How do the methods do on problems of other codes? `python -m experiments.questions.fclib_problems
+FOLDER [FOLDER ...]`.
 
-The folders hold FCLib files (*.hdf5) and files in Siconos' text format (*.dat), which are not part of this project. The
-table of the default method beside the times of Siconos is printed first, within seconds; the other methods follow.
+The folders hold FCLib files (*.hdf5) and files in Siconos' text format (*.dat), which are not part
+of this project. The table of the default method beside the times of Siconos is printed first,
+within seconds; the other methods follow.
 """
 
 from __future__ import annotations
@@ -25,8 +27,10 @@ TOL = 1e-8
 LIMIT, SHORT_LIMIT = 20.0, 5.0  # seconds a file, of the default method and of the others
 REPEATS, LONG = 3, 2.0  # a solve that takes longer than so many seconds is not repeated
 SOLVERS = ("PROX", "NSGS", "ADMM", "NSN_AC")
-# Seconds of four of Siconos' solvers (numerics component, August 2026, C, one core of the same kind of machine, tolerance
-# 1e-8, at most 20 s, order of magnitude), by the beginning of the file's name; None: not certified or not measured.
+# Seconds of four of Siconos' solvers (numerics component, August 2026, C, one core of the same kind
+# of machine, tolerance
+# 1e-8, at most 20 s, order of magnitude), by the beginning of the file's name; None: not certified
+# or not measured.
 SICONOS: dict[str, tuple[float | None, ...]] = {
     "Box_Stacks": (0.0, 0.0, 0.0, 0.0),
     "CubeH8": (0.0, 0.0, 0.0, 0.0),
@@ -49,7 +53,9 @@ SICONOS: dict[str, tuple[float | None, ...]] = {
 
 def quoted(name: str) -> tuple[float | None, ...]:
     """Seconds of Siconos' solvers for the file of that name."""
-    return next((t for start, t in SICONOS.items() if name.startswith(start)), (None,) * len(SOLVERS))
+    return next(
+        (t for start, t in SICONOS.items() if name.startswith(start)), (None,) * len(SOLVERS)
+    )
 
 
 def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solution, float]:
@@ -102,14 +108,16 @@ def totals(rows: list[dict[str, Any]], key: str) -> list[dict[str, Any]]:
         chosen = [row for row in rows if row[key] == name]
         certified = sum(row["status"] == "solved" for row in chosen)
         seconds = sum(row["seconds"] for row in chosen)
-        out.append({key: name, "certified": f"{certified} of {len(chosen)}", "seconds in all": seconds})
+        out.append(
+            {key: name, "certified": f"{certified} of {len(chosen)}", "seconds in all": seconds}
+        )
     return out
 
 
 TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone, medians of three (one where a solve takes
-more than {long:g} s). "Siconos' residual" is the published measure, which depends on units. The last columns quote the seconds that
-Siconos' solvers take for the same files on a machine of the same kind, as an order of magnitude; - where they do not reach 1e-8 in
-20 s or were not measured.
+more than {long:g} s). "Siconos' residual" is the published measure, which depends on units. The
+last columns quote the seconds that Siconos' solvers take for the same files on a machine of the
+same kind, as an order of magnitude; - where they do not reach 1e-8 in 20 s or were not measured.
 
 ## The default method
 
@@ -130,16 +138,25 @@ At most {short:g} s a file.
 
 if __name__ == "__main__":
     files = [
-        path for folder in sys.argv[1:] for kind in ("*.hdf5", "*.dat") for path in sorted(Path(folder).glob(kind))
+        path
+        for folder in sys.argv[1:]
+        for kind in ("*.hdf5", "*.dat")
+        for path in sorted(Path(folder).glob(kind))
     ]
     if not files:
         sys.exit(
-            "usage: python -m experiments.questions.fclib_problems FOLDER [FOLDER ...], with files *.hdf5 or *.dat"
+            "usage: python -m experiments.questions.fclib_problems FOLDER [FOLDER ...], with files"
+            " *.hdf5 or *.dat"
         )
     default = [beside_siconos(path) for path in files]
     folders = totals(default, "folder")
     print(markdown(folders), markdown(default), sep="\n\n", flush=True)
     others = [of_another(path, method) for method in OTHERS for path in files]
     text = TEXT.format(long=LONG, limit=LIMIT, short=SHORT_LIMIT)
-    tables = {"folders": folders, "default": default, "methods": totals(others, "method"), "others": others}
+    tables = {
+        "folders": folders,
+        "default": default,
+        "methods": totals(others, "method"),
+        "others": others,
+    }
     write("fclib_problems", "Problems of other codes", text, tables, {})

@@ -1,9 +1,11 @@
-"""Does the answer depend on the first mesh, and is its claimed error true? Five parts by Gmsh, six first meshes each.
+"""Does the answer depend on the first mesh, and is its claimed error true? Five parts by Gmsh, six
+first meshes each.
 
     python -m experiments.questions.first_meshes [quick] [PART ...]
 
-The meshes know neither where the parts touch nor their shape: curved boundaries are chords, or edges of second order, without
-a `curve`. References are made in another way: Lame's formulas, a half-plane without a mesh, or a mesh that Gmsh makes fine.
+The meshes know neither where the parts touch nor their shape: curved boundaries are chords, or
+edges of second order, without a `curve`. References are made in another way: Lame's formulas, a
+half-plane without a mesh, or a mesh that Gmsh makes fine.
 """
 
 from __future__ import annotations
@@ -18,7 +20,18 @@ from typing import Any
 
 import numpy as np
 
-from contactopt import BodyForce, HalfSpace, InputError, Material, Part, Rigid, Scene, Support, Traction, load_mesh
+from contactopt import (
+    BodyForce,
+    HalfSpace,
+    InputError,
+    Material,
+    Part,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    load_mesh,
+)
 from contactopt.accuracy import refine
 from contactopt.derivatives.outputs import find_quantity
 from contactopt.solving.limits import Limits
@@ -34,7 +47,9 @@ EFFECTIVE = 0.5, 3.0
 
 @dataclass(frozen=True)
 class First:
-    """A first mesh: size of the elements over that of the part, whether it is graded to the contact, order and degree."""
+    """A first mesh: size of the elements over that of the part, whether it is graded to the
+    contact, order and degree.
+    """
 
     size: float
     graded: bool
@@ -45,12 +60,18 @@ class First:
         return f"{'graded' if self.graded else 'even'} {self.size:g}, order {self.order}"
 
 
-MESHES = [First(size, graded, order) for order in (1, 2) for size, graded in ((1.0, False), (0.5, False), (1.0, True))]
+MESHES = [
+    First(size, graded, order)
+    for order in (1, 2)
+    for size, graded in ((1.0, False), (0.5, False), (1.0, True))
+]
 FINE = First(0.5, True, 2)
 
 
 class Mesher:
-    """Meshes of one scene, all of one kind; a graded one is fine where `distance`, a formula in x and y, is small."""
+    """Meshes of one scene, all of one kind; a graded one is fine where `distance`, a formula in x
+    and y, is small.
+    """
 
     def __init__(self, first: First, size: float, distance: str, small: float):
         self.first, self.size, self.distance, self.small = first, size * first.size, distance, small
@@ -81,11 +102,14 @@ class Mesher:
         field.setAsBackgroundMesh(number)
 
 
-ENDS = "min(sqrt((x-5.73)^2+(y-0.27)^2),sqrt((x-8.77)^2+(y+2.77)^2))"  # from where flanks meet roundings
+# from where flanks meet roundings
+ENDS = "min(sqrt((x-5.73)^2+(y-0.27)^2),sqrt((x-8.77)^2+(y+2.77)^2))"
 
 
 def dovetail(first: First, small: float = 0.3) -> Scene:
-    """Half a blade that is pulled out of a slot; both ends of its flat flank are rounded, one on each body."""
+    """Half a blade that is pulled out of a slot; both ends of its flat flank are rounded, one on
+    each body.
+    """
     mesh = Mesher(first, 1.5, ENDS, small)
 
     def side(centre: np.ndarray, kind: str, length: float) -> str:
@@ -106,7 +130,9 @@ def dovetail(first: First, small: float = 0.3) -> Scene:
     return Scene("dovetail", *bodies, 0.2, degree=first.order, copies=2)
 
 
-def _round(first: First, pin: float, hole: float, outer: float, drop: float, small: float) -> tuple[Any, Any]:
+def _round(
+    first: First, pin: float, hole: float, outer: float, drop: float, small: float
+) -> tuple[Any, Any]:
     """Meshes of a pin and of a ring around it."""
     mesh = Mesher(first, outer / 6, f"abs(sqrt(x^2+y^2)-{hole})", small)
 
@@ -115,7 +141,9 @@ def _round(first: First, pin: float, hole: float, outer: float, drop: float, sma
 
     def ring(gmsh: Any) -> Any:
         occ = gmsh.model.occ
-        return occ.cut([(2, occ.addDisk(0, 0, 0, outer, outer))], [(2, occ.addDisk(0, 0, 0, hole, hole))])[0]
+        return occ.cut(
+            [(2, occ.addDisk(0, 0, 0, outer, outer))], [(2, occ.addDisk(0, 0, 0, hole, hole))]
+        )[0]
 
     disc = mesh("pin", lambda gmsh: [(2, gmsh.model.occ.addDisk(0, -drop, 0, pin, pin))], side)
     return disc, mesh("ring", ring, side)
@@ -147,7 +175,9 @@ def press_fit(first: First, small: float = 0.8) -> Scene:
     def tube(inner: float, outer: float) -> Callable[[Any], Any]:
         def make(gmsh: Any) -> Any:
             occ = gmsh.model.occ
-            ring = occ.cut([(2, occ.addDisk(0, 0, 0, outer, outer))], [(2, occ.addDisk(0, 0, 0, inner, inner))])[0]
+            ring = occ.cut(
+                [(2, occ.addDisk(0, 0, 0, outer, outer))], [(2, occ.addDisk(0, 0, 0, inner, inner))]
+            )[0]
             return occ.intersect(ring, [(2, occ.addRectangle(0, 0, 0, outer, outer))])[0]
 
         return make
@@ -162,8 +192,14 @@ def press_fit(first: First, small: float = 0.8) -> Scene:
         return name
 
     held = Support("x", {"x": 0.0}), Support("y", {"y": 0.0})
-    shaft = mesh("shaft", tube(INNER, JOINT + OVER), side(("bore", "contact"), np.pi / 2 * (INNER + JOINT) / 2))
-    hub = mesh("hub", tube(JOINT, OUTER), side(("contact", "outer"), np.pi / 2 * (JOINT + OUTER) / 2))
+    shaft = mesh(
+        "shaft",
+        tube(INNER, JOINT + OVER),
+        side(("bore", "contact"), np.pi / 2 * (INNER + JOINT) / 2),
+    )
+    hub = mesh(
+        "hub", tube(JOINT, OUTER), side(("contact", "outer"), np.pi / 2 * (JOINT + OUTER) / 2)
+    )
     bodies = Part("shaft", shaft, STEEL, held), Part("hub", hub, STEEL, held)
     return Scene("press fit", *bodies, 0.0, law="frictionless", copies=4, degree=first.order)
 
@@ -175,7 +211,10 @@ def lame() -> dict[str, float]:
     shaft = JOINT / E * ((JOINT**2 + INNER**2) / (JOINT**2 - INNER**2) - nu)
     pressure = OVER / (hub + shaft)
     hoop = 2 * pressure * JOINT**2 / (JOINT**2 - INNER**2)
-    return {"pressure": pressure, "von_mises:shaft:bore": hoop * np.sqrt(1 - STEEL.nu + STEEL.nu**2)}
+    return {
+        "pressure": pressure,
+        "von_mises:shaft:bore": hoop * np.sqrt(1 - STEEL.nu + STEEL.nu**2),
+    }
 
 
 FLAT, ROUNDING, FORCE = 1.0, 10.0, 20e3
@@ -210,12 +249,17 @@ def half_plane() -> dict[str, float]:
 def values(scene: Scene, quantities: tuple[str, ...]) -> dict[str, float]:
     """Quantities of a scene on its own mesh."""
     solved = solve_scene(scene)
-    return {name: find_quantity(name, scene).read(solved.reduction, solved.solution).value for name in quantities}
+    return {
+        name: find_quantity(name, scene).read(solved.reduction, solved.solution).value
+        for name in quantities
+    }
 
 
 @dataclass(frozen=True)
 class Case:
-    """make  (first mesh, size at the contact) -> scene;   exact  quantities known in another way;   small  for references"""
+    """make  (first mesh, size at the contact) -> scene;   exact  quantities known in another way;
+    small  for references
+    """
 
     make: Callable[..., Scene]
     quantities: tuple[str, ...]
@@ -223,11 +267,17 @@ class Case:
     exact: Callable[[], dict[str, float]] | None = None
 
     def reference(self) -> tuple[dict[str, float], dict[str, float]]:
-        """The references, and their relative errors: that of a mesh is by how much one twice as coarse differs."""
+        """The references, and their relative errors: that of a mesh is by how much one twice as
+        coarse differs.
+        """
         if self.exact is not None:
             return self.exact(), dict.fromkeys(self.quantities, SURE)
-        coarse, fine = (values(self.make(FINE, factor * self.small), self.quantities) for factor in (2, 1))
-        return fine, {name: max(abs(coarse[name] / fine[name] - 1), SURE) for name in self.quantities}
+        coarse, fine = (
+            values(self.make(FINE, factor * self.small), self.quantities) for factor in (2, 1)
+        )
+        return fine, {
+            name: max(abs(coarse[name] / fine[name] - 1), SURE) for name in self.quantities
+        }
 
 
 CASES = {
@@ -252,7 +302,9 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
                        "refined": "locally" if adaptive else "everywhere"}  # fmt: skip
                 try:
                     scene = case.make(first)
-                    _, found = refine([scene], quantity, TARGET, limits=Limits(seconds=SECONDS), adaptive=adaptive)
+                    _, found = refine(
+                        [scene], quantity, TARGET, limits=Limits(seconds=SECONDS), adaptive=adaptive
+                    )
                 except InputError as error:
                     rows.append(row | {"said": str(error)[:60]})
                     print(rows[-1], flush=True)
@@ -269,7 +321,10 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
                         "unknowns": found.levels[-1].unknowns, "seconds": time.process_time() - begin, "said": "",
                     }
                 )  # fmt: skip
-                print({key: f"{x:.4g}" if isinstance(x, float) else x for key, x in rows[-1].items()}, flush=True)
+                print(
+                    {key: f"{x:.4g}" if isinstance(x, float) else x for key, x in rows[-1].items()},
+                    flush=True,
+                )
     return rows
 
 
@@ -277,29 +332,45 @@ def main(arguments: list[str]) -> None:
     quick = "quick" in arguments
     chosen = [name for name in arguments if name in CASES] or list(CASES)
     meshes = MESHES[::3] if quick else MESHES
-    rows = [row for name in chosen for row in rows_of(name, meshes, (True,) if quick else (True, False))]
+    rows = [
+        row for name in chosen for row in rows_of(name, meshes, (True,) if quick else (True, False))
+    ]
     done = [row for row in rows if "value" in row]
     reached = [row for row in done if row["reached"]]
-    sized = [row for row in reached if row["true error"] > TARGET / 20]  # smaller errors are luck, or the reference's
+    # smaller errors are luck, or the reference's
+    sized = [row for row in reached if row["true error"] > TARGET / 20]
     good = sum(EFFECTIVE[0] <= row["effectivity"] <= EFFECTIVE[1] for row in sized)
-    missed = [f"{row['part']}, {row['quantity']}, {row['first mesh']}" for row in done if not row["within"]]
-    refused = [f"{row['part']}, {row['quantity']}, {row['first mesh']}: {row['said']}" for row in rows if row["said"]]
+    missed = [
+        f"{row['part']}, {row['quantity']}, {row['first mesh']}"
+        for row in done
+        if not row["within"]
+    ]
+    refused = [
+        f"{row['part']}, {row['quantity']}, {row['first mesh']}: {row['said']}"
+        for row in rows
+        if row["said"]
+    ]
     text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that agrees with the reference within their
-claimed error. {len(reached)} of them reached the target, {sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed
-error over the true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)} searches that reached the target
-with a true error above {TARGET / 20:g}. Smaller true errors are luck, or those of the reference.
+claimed error. {len(reached)} of them reached the target, {sum(row["within"] for row in reached)} of
+these agree. The effectivity, the claimed error over the true one, lies between {EFFECTIVE[0]} and
+{EFFECTIVE[1]} for {good} of {len(sized)} searches that reached the target with a true error above
+{TARGET / 20:g}. Smaller true errors are luck, or those of the reference.
 
-Outside their claims are: {"; ".join(missed) or "none"}. No answer came from: {"; ".join(refused) or "none"}.
+Outside their claims are: {"; ".join(missed) or "none"}. No answer came from:
+{"; ".join(refused) or "none"}.
 
-The pressure of the dovetail has no limit in the linearised model. Where the flank meets the rounding, the curvature of the
-surface jumps. The normals there turn, and a blade that slides by u closes the gap by u times their angle. So the gap
-has a kink. For a jump k of the curvature the pressure there grows by E* k u ln 2 / (2 pi) with every halving of the elements
-once they are smaller than about u. Searches that go so far say that no mesh bounds it. Their claim is then infinite, and counts as agreeing.
-The reference of the dovetail, whose elements are about as large as u there, does not show this.
+The pressure of the dovetail has no limit in the linearised model. Where the flank meets the
+rounding, the curvature of the surface jumps. The normals there turn, and a blade that slides by u
+closes the gap by u times their angle. So the gap has a kink. For a jump k of the curvature the
+pressure there grows by E* k u ln 2 / (2 pi) with every halving of the elements once they are
+smaller than about u. Searches that go so far say that no mesh bounds it. Their claim is then
+infinite, and counts as agreeing. The reference of the dovetail, whose elements are about as large
+as u there, does not show this.
 
-Each search asked for {TARGET:g} within {SECONDS:g} s{", of two first meshes (`quick`)" if quick else ""}. The meshes know neither where the parts touch nor their shape. A reference
-is Lame's formula, a half-plane of 8,192 points, or a mesh that Gmsh makes fine; its error is then its difference
-from one that is twice as coarse.
+Each search asked for {TARGET:g} within {SECONDS:g}
+s{", of two first meshes (`quick`)" if quick else ""}. The meshes know neither where the parts touch
+nor their shape. A reference is Lame's formula, a half-plane of 8,192 points, or a mesh that Gmsh
+makes fine; its error is then its difference from one that is twice as coarse.
 
 {{searches}}
 """

@@ -1,4 +1,6 @@
-"""What does the benchmark harness itself cost? 10,000 runs of next to nothing: time and memory per run."""
+"""What does the benchmark harness itself cost? 10,000 runs of next to nothing: time and memory per
+run.
+"""
 
 from __future__ import annotations
 
@@ -45,8 +47,14 @@ def measure(jobs: int) -> dict[str, object]:
         folder = Path(name)
         (folder / "nothing.py").write_text(PLUGIN)
         (folder / "overhead.toml").write_text(EXPERIMENT)
-        start, cpu, before = time.perf_counter(), cpu_seconds(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        out = benchmark.run_campaign(folder / "overhead.toml", folder / "out", jobs=jobs, quiet=True)
+        start, cpu, before = (
+            time.perf_counter(),
+            cpu_seconds(),
+            resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+        )
+        out = benchmark.run_campaign(
+            folder / "overhead.toml", folder / "out", jobs=jobs, quiet=True
+        )
         wall, cpu = time.perf_counter() - start, cpu_seconds() - cpu
         rows = benchmark.load(out)
     spent = rows["call_seconds"].sum()
@@ -65,14 +73,22 @@ def measure(jobs: int) -> dict[str, object]:
 
 
 TEXT = """How much time does the benchmark harness add to a run? A method that returns zeros at once is run on ten problems of ten contacts. The
-overhead is everything but the method's own call: the start of the worker processes, the making of the problems, the messages between processes, the
-certificates, the rows on disk, and the Parquet file at the end.
+overhead is everything but the method's own call: the start of the worker processes, the making of
+the problems, the messages between processes, the certificates, the rows on disk, and the Parquet
+file at the end.
 
-On a busy machine the CPU time of the workers and the parent process together tells more than the wall time. The memory is resident
-memory. That of the parent process grows by the package Pandas and by the table of all rows.
+On a busy machine the CPU time of the workers and the parent process together tells more than the
+wall time. The memory is resident memory. That of the parent process grows by the package Pandas and
+by the table of all rows.
 
 {rows}
 """
 
 if __name__ == "__main__":
-    write("harness_overhead", "Overhead of the benchmark harness", TEXT, {"rows": [measure(j) for j in (1, JOBS)]}, {})
+    write(
+        "harness_overhead",
+        "Overhead of the benchmark harness",
+        TEXT,
+        {"rows": [measure(j) for j in (1, JOBS)]},
+        {},
+    )

@@ -1,8 +1,8 @@
 """Are bodies solved that nothing but friction holds, in the plane and in space?
 
-A rigid or an elastic body is pressed on an elastic block along the block's normal, or inside the friction cone about it. No
-support holds it across the normal. Where friction is small nearly all contacts slip away from one that sticks, and where that
-one lies is a median of the others.
+A rigid or an elastic body is pressed on an elastic block along the block's normal, or inside the
+friction cone about it. No support holds it across the normal. Where friction is small nearly all
+contacts slip away from one that sticks, and where that one lies is a median of the others.
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ def frame(random: np.random.Generator, dim: int) -> np.ndarray:
     return Q
 
 
-def box(random: np.random.Generator, turned: np.ndarray, elements: int, up: bool, width: float) -> object:
+def box(
+    random: np.random.Generator, turned: np.ndarray, elements: int, up: bool, width: float
+) -> object:
     """A block whose contact surface is at height zero, graded at random, turned about the origin."""
     dim = len(turned)
     sides = [np.cumsum(np.append(0, random.uniform(0.6, 1.6, elements))) for _ in range(dim - 1)]
@@ -71,7 +73,10 @@ def held(seed: int, dim: int) -> tuple[InterfaceProblem, float, int]:
     slope *= random.choice([0.0, random.uniform(0, 0.8)]) * mu / np.linalg.norm(slope)
     press = stress * length ** (dim - 1) * 10.0 ** random.uniform(-4, -2)
     force = press * (turned[:, :-1] @ slope - turned[:, -1])
-    radius, middle = length * 10.0 ** random.uniform(0, 2), random.uniform(-0.2, 0.2, dim - 1) * length
+    radius, middle = (
+        length * 10.0 ** random.uniform(0, 2),
+        random.uniform(-0.2, 0.2, dim - 1) * length,
+    )
     soft = Material(stress, random.uniform(0, 0.45))
 
     def gap(x: np.ndarray) -> np.ndarray:
@@ -87,13 +92,18 @@ def held(seed: int, dim: int) -> tuple[InterfaceProblem, float, int]:
         stiff = Material(stress * 10.0 ** random.uniform(-1, 2), random.uniform(0, 0.45))
         upper = Part("body", mesh, stiff, (), (Plate("back", loads),))
     kind = "plane-strain" if dim == 2 else "solid"
-    return reduce_bodies(Scene("held by friction", upper, lower, mu, kind=kind)).problem, mu, elements
+    return (
+        reduce_bodies(Scene("held by friction", upper, lower, mu, kind=kind)).problem,
+        mu,
+        elements,
+    )
 
 
 def measured(seed: int, dim: int) -> dict[str, object]:
     problem, mu, elements = held(seed, dim)
     seconds = np.inf
-    for _ in range(REPEATS):  # the least time is that of the method, without what else the machine does
+    # the least time is that of the method, without what else the machine does
+    for _ in range(REPEATS):
         begin = time.process_time()
         solution = solve(problem, tol=TOL, time_limit=LIMIT)
         seconds = min(seconds, time.process_time() - begin)
@@ -131,9 +141,10 @@ def summary(rows: list[dict[str, object]]) -> list[dict[str, object]]:
 
 
 TEXT = """Is a body found that nothing but friction holds? A rigid paraboloid or an elastic body is pressed on an elastic block, along
-the block's normal or inside the friction cone about it. Directions, meshes, materials, units and the friction coefficient, from
-{least:g} to {most:g}, are random. The default method solves {count} problems in the plane and as many in space to a certificate of
-{tol:g}. Times are CPU seconds of one thread, the least of {repeats} solves.
+the block's normal or inside the friction cone about it. Directions, meshes, materials, units and
+the friction coefficient, from {least:g} to {most:g}, are random. The default method solves {count}
+problems in the plane and as many in space to a certificate of {tol:g}. Times are CPU seconds of one
+thread, the least of {repeats} solves.
 
 {{rows}}
 

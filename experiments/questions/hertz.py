@@ -32,9 +32,9 @@ def default() -> list[dict[str, object]]:
         "contact radius, relative error": zones[-1] / exact.half_width - 1,
         "approach, relative error (finite bodies)": -solution.multipliers[0] / exact.approach - 1,
         "force balance, relative error": solution.reactions[:, 0].sum() / 100 - 1,
-        "friction against none, change of the peak pressure": (smooth.reactions[:, 0] / problem.areas).max()
-        / pressure.max()
-        - 1,
+        "friction against none, change of the peak pressure": (
+            (smooth.reactions[:, 0] / problem.areas).max() / pressure.max() - 1
+        ),
         "friction against none, largest change over the peak": change.max() / exact.peak,
         "certificate": solution.residual,
     }
@@ -54,15 +54,21 @@ def errors(scene: Scene, elements: int) -> dict[str, object]:
         "nodes": fixed.contacts,
         "rounds": len(zones) - 1,
         "radius, loop": zones[-1] / exact.half_width - 1,
-        "radius, no loop, extrapolated": contact_edge(scene, fixed, single.reactions) / exact.half_width - 1,
-        "radius, no loop, nodes in contact": equivalent_half_width(scene, area) / exact.half_width - 1,
+        "radius, no loop, extrapolated": (
+            contact_edge(scene, fixed, single.reactions) / exact.half_width - 1
+        ),
+        "radius, no loop, nodes in contact": (
+            equivalent_half_width(scene, area) / exact.half_width - 1
+        ),
         "peak, loop": peak / exact.peak - 1,
         "peak, no loop": (single.reactions[:, 0] / fixed.areas).max() / exact.peak - 1,
     }
 
 
 def falling(force: float) -> dict[str, object]:
-    scene = scenes.sphere(radius=200.0, foundation_radius=400.0, foundation_height=400.0, force=force, elements=64)
+    scene = scenes.sphere(
+        radius=200.0, foundation_radius=400.0, foundation_height=400.0, force=force, elements=64
+    )
     exact = scene.reference
     solved = solve_zone(scene)
     reduction, solution, zones = solved.reduction, solved.solution, solved.zones
@@ -91,30 +97,39 @@ def draw(loop: list[dict], load: list[dict]) -> Figure:
     left.set(xlabel="contact nodes [-]", ylabel="relative error against Hertz [-]")
     left.legend(frameon=False, fontsize=8)
     ratio = [row["a / R"] for row in load]
-    for key, style, colour in (("radius", "o-", BLUE), ("peak", "o-", ORANGE), ("approach", "s--", GREY)):
-        right.loglog(ratio, [abs(row[key]) for row in load], style, color=colour, label=key, mfc="white")
+    for key, style, colour in (
+        ("radius", "o-", BLUE),
+        ("peak", "o-", ORANGE),
+        ("approach", "s--", GREY),
+    ):
+        right.loglog(
+            ratio, [abs(row[key]) for row in load], style, color=colour, label=key, mfc="white"
+        )
     right.set(xlabel="a / R [-]", ylabel="relative deviation from Hertz [-]")
     right.legend(frameon=False)
     return figure
 
 
 TEXT = """How accurate is Hertz contact, and what does the adaptation of the contact zone bring? The scene is the half sphere (R = 400 mm) on
-a foundation (800 x 800 mm). Both have E = 5 MPa and nu = .3. The force is 100 N and mu = .5. There are 32 elements across the
-contact radius, which is the default.
+a foundation (800 x 800 mm). Both have E = 5 MPa and nu = .3. The force is 100 N and mu = .5. There
+are 32 elements across the contact radius, which is the default.
 
 {default}
 
-**The zone loop.** The *zone loop* meshes the scene again until the edge of the contact zone is a node of the mesh. The table has the
-signed errors against Hertz on meshes with the same number of contact nodes: with the loop, and on a zone that is meshed 1.25
-times too wide. If the radius is read off the nodes in contact, its error is a matter of luck, within half an element. A run reports another
-half-width: it fits a parabola to the squares of the pressures, and takes the zero of this parabola. Its error falls
-smoothly, with and without the loop. With the loop every element of the zone is used.
+**The zone loop.** The *zone loop* meshes the scene again until the edge of the contact zone is a
+node of the mesh. The table has the signed errors against Hertz on meshes with the same number of
+contact nodes: with the loop, and on a zone that is meshed 1.25 times too wide. If the radius is
+read off the nodes in contact, its error is a matter of luck, within half an element. A run reports
+another half-width: it fits a parabola to the squares of the pressures, and takes the zero of this
+parabola. Its error falls smoothly, with and without the loop. With the loop every element of the
+zone is used.
 
 {loop}
 
-**Finite bodies.** The sphere is no half-space. At a fixed resolution (64 elements across the radius, R = 200 mm) the deviations of the
-peak pressure and of the approach fall with a / R. The deviation of the radius stays near the error of reading it on 64
-elements, which the table above shows.
+**Finite bodies.** The sphere is no half-space. At a fixed resolution (64 elements across the
+radius, R = 200 mm) the deviations of the peak pressure and of the approach fall with a / R. The
+deviation of the radius stays near the error of reading it on 64 elements, which the table above
+shows.
 
 {load}
 """
@@ -123,4 +138,10 @@ if __name__ == "__main__":
     loop = [errors(scenes.sphere(), elements) for elements in ELEMENTS]
     load = [falling(force) for force in FORCES]
     tables = {"default": default(), "loop": loop, "load": load}
-    write("hertz", "Hertz contact, with and without the contact-zone loop", TEXT, tables, {"errors": draw(loop, load)})
+    write(
+        "hertz",
+        "Hertz contact, with and without the contact-zone loop",
+        TEXT,
+        tables,
+        {"errors": draw(loop, load)},
+    )

@@ -1,7 +1,9 @@
-"""Does input of any kind end in an answer or in one sentence? Random wrong arguments through the public API and the command line.
+"""Does input of any kind end in an answer or in one sentence? Random wrong arguments through the
+public API and the command line.
 
-`python -m experiments.questions.hostile_input [CASES]`. Counted are exceptions that are not the project's own (InputError,
-BackendError; SystemExit of the command line), and solves that overrun their time limit by more than a second.
+`python -m experiments.questions.hostile_input [CASES]`. Counted are exceptions that are not the
+project's own (InputError, BackendError; SystemExit of the command line), and solves that overrun
+their time limit by more than a second.
 """
 
 from __future__ import annotations
@@ -52,7 +54,11 @@ def good(rng: np.random.Generator) -> dict[str, Any]:
         Q = sp.csr_array(Q)
     p = int(rng.integers(0, 3))
     return dict(
-        Q=Q, q=rng.normal(size=(k, d)), mu=rng.uniform(0, 3, k), V=rng.normal(size=(k * d, p)), s=rng.normal(size=p)
+        Q=Q,
+        q=rng.normal(size=(k, d)),
+        mu=rng.uniform(0, 3, k),
+        V=rng.normal(size=(k * d, p)),
+        s=rng.normal(size=p),
     )
 
 
@@ -71,10 +77,24 @@ def problems(rng: np.random.Generator, folder: Path) -> None:
 def solves(rng: np.random.Generator, folder: Path) -> None:
     """Solves of sound and degenerate problems by every method, with one setting of another kind."""
     problem = co.InterfaceProblem(**good(rng))
-    settings: dict[str, Any] = dict(tol=10.0 ** rng.integers(-16, -3), time_limit=LIMIT, max_iterations=200)
+    settings: dict[str, Any] = dict(
+        tol=10.0 ** rng.integers(-16, -3), time_limit=LIMIT, max_iterations=200
+    )
     method: Any = any_of(rng, list(METHODS))
     spoilt = any_of(
-        rng, ["", "", "", "method", "tol", "time_limit", "max_iterations", "change_tol", "start", "relaxation"]
+        rng,
+        [
+            "",
+            "",
+            "",
+            "method",
+            "tol",
+            "time_limit",
+            "max_iterations",
+            "change_tol",
+            "start",
+            "relaxation",
+        ],
     )
     if spoilt == "method":
         method = any_of(rng, JUNK)
@@ -115,7 +135,9 @@ def files(rng: np.random.Generator, folder: Path) -> None:
         data = bytearray(sound.read_bytes())
         for _ in range(int(rng.integers(1, 20))):
             data[int(rng.integers(len(data)))] = int(rng.integers(256))
-        target.write_bytes(bytes(data[: int(rng.integers(len(data)))] if rng.random() < 0.3 else data))
+        target.write_bytes(
+            bytes(data[: int(rng.integers(len(data)))] if rng.random() < 0.3 else data)
+        )
     elif kind == "external":
         import h5py
 
@@ -123,16 +145,36 @@ def files(rng: np.random.Generator, folder: Path) -> None:
             file["fclib_local"] = h5py.ExternalLink("sound.hdf5", "/fclib_local")
     else:
         text = [
-            str(any_of(rng, [2, 3, 1, 0, -1, 1e9, "nan", "x", "10000000000"])) for _ in range(int(rng.integers(0, 30)))
+            str(any_of(rng, [2, 3, 1, 0, -1, 1e9, "nan", "x", "10000000000"]))
+            for _ in range(int(rng.integers(0, 30)))
         ]
-        target.write_bytes(any_of(rng, [" ".join(text).encode(), rng.bytes(50), b"\x89HDF\r\n\x1a\n" + rng.bytes(50)]))
+        target.write_bytes(
+            any_of(
+                rng, [" ".join(text).encode(), rng.bytes(50), b"\x89HDF\r\n\x1a\n" + rng.bytes(50)]
+            )
+        )
     co.fclib.read(target)
 
 
 def scenes(rng: np.random.Generator, folder: Path) -> None:
-    """Scenes, parts, loads and supports of wrong kinds; two bodies of one name; a path of unlike states."""
+    """Scenes, parts, loads and supports of wrong kinds; two bodies of one name; a path of unlike
+    states.
+    """
     scene = co.scenes.flat_punch(dim=2)
-    kind = any_of(rng, ["material", "support", "traction", "replace", "part", "follow", "reduce", "name", "body force"])
+    kind = any_of(
+        rng,
+        [
+            "material",
+            "support",
+            "traction",
+            "replace",
+            "part",
+            "follow",
+            "reduce",
+            "name",
+            "body force",
+        ],
+    )
     if kind == "material":
         co.Material(any_of(rng, [1.0, *JUNK]), any_of(rng, [0.3, *JUNK]))
     elif kind in ("support", "traction", "body force"):
@@ -142,14 +184,18 @@ def scenes(rng: np.random.Generator, folder: Path) -> None:
         co.reduce(replace(scene, upper=part), elements=1)
     elif kind == "part":
         field = any_of(rng, list(scene.upper.__dataclass_fields__))
-        co.reduce(replace(scene, upper=replace(scene.upper, **{field: any_of(rng, JUNK)})), elements=1)
+        co.reduce(
+            replace(scene, upper=replace(scene.upper, **{field: any_of(rng, JUNK)})), elements=1
+        )
     elif kind == "name":
         co.reduce(replace(scene, upper=replace(scene.upper, name=scene.lower.name)), elements=1)
     elif kind == "replace":
         field = any_of(rng, list(scene.__dataclass_fields__))
         co.reduce(replace(scene, **{field: any_of(rng, JUNK)}), elements=1)
     elif kind == "reduce":
-        co.reduce(scene, **{any_of(rng, ["elements", "zone", "Q", "solver"]): any_of(rng, [*JUNK, "zz"])})
+        co.reduce(
+            scene, **{any_of(rng, ["elements", "zone", "Q", "solver"]): any_of(rng, [*JUNK, "zz"])}
+        )
     else:
         stiff = replace(scene, upper=replace(scene.upper, material=co.Material(7.0, 0.1)))
         co.follow(any_of(rng, [[scene, stiff], [scene, "x"], [], *JUNK]), elements=1)
@@ -159,7 +205,21 @@ def commands(rng: np.random.Generator, folder: Path) -> None:
     """The command line."""
     from contactopt.cli import main
 
-    words = ["x", "-1", "0", "nan", "1e308", "1000000000", "", "../..", "--zz", "punch-2d", "é", "\x00", "inf"]
+    words = [
+        "x",
+        "-1",
+        "0",
+        "nan",
+        "1e308",
+        "1000000000",
+        "",
+        "../..",
+        "--zz",
+        "punch-2d",
+        "é",
+        "\x00",
+        "inf",
+    ]
     options = [
         "--mu",
         "--force",
@@ -180,7 +240,14 @@ def commands(rng: np.random.Generator, folder: Path) -> None:
     main(line)
 
 
-DOORS: tuple[Callable[[np.random.Generator, Path], None], ...] = (problems, solves, starts, files, scenes, commands)
+DOORS: tuple[Callable[[np.random.Generator, Path], None], ...] = (
+    problems,
+    solves,
+    starts,
+    files,
+    scenes,
+    commands,
+)
 
 
 def judge(seed: int) -> tuple[str, str, str]:
@@ -207,7 +274,9 @@ def judge(seed: int) -> tuple[str, str, str]:
             place = error.__traceback__
             while place is not None and place.tb_next is not None:
                 place = place.tb_next
-            line = f"{Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}" if place else ""
+            line = (
+                f"{Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}" if place else ""
+            )
             kind = "overrun" if isinstance(error, TimeoutError) else "broken"
             return door.__name__, kind, f"{type(error).__name__} at {line}: {str(error)[:80]}"
         finally:
@@ -216,11 +285,13 @@ def judge(seed: int) -> tuple[str, str, str]:
 
 
 TEXT = """What does contactopt do with input that makes no sense? {cases} random inputs (seeds 0 to {last}) are given in turn to the constructors, to
-`solve` with every method, to its start, to the readers of files, to scenes, and to the command line. Each input has at least one value that is not of the kind,
-the shape or the size that is asked for, or it is a degenerate problem. The time limits are {limit:g} s. Every input should be
-solved, or be refused by one of contactopt's own errors.
+`solve` with every method, to its start, to the readers of files, to scenes, and to the command
+line. Each input has at least one value that is not of the kind, the shape or the size that is asked
+for, or it is a degenerate problem. The time limits are {limit:g} s. Every input should be solved,
+or be refused by one of contactopt's own errors.
 
-Exceptions that are not contactopt's own: {broken}. Time limits overrun by more than {slack:g} s: {overrun}.
+Exceptions that are not contactopt's own: {broken}. Time limits overrun by more than {slack:g} s:
+{overrun}.
 
 {{table}}
 
@@ -235,8 +306,13 @@ def main(cases: int) -> None:
         results = list(pool.map(judge, range(cases), chunksize=20))
     counts = Counter((door, ending) for door, ending, _ in results)
     endings = ("answered", "refused", "broken", "overrun")
-    rows = [{"door": d.__name__} | {ending: counts[d.__name__, ending] for ending in endings} for d in DOORS]
-    wrong = [f"seed {seed} ({door}): {what}" for seed, (door, _, what) in enumerate(results) if what]
+    rows = [
+        {"door": d.__name__} | {ending: counts[d.__name__, ending] for ending in endings}
+        for d in DOORS
+    ]
+    wrong = [
+        f"seed {seed} ({door}): {what}" for seed, (door, _, what) in enumerate(results) if what
+    ]
     text = TEXT.format(
         cases=cases,
         last=cases - 1,

@@ -1,4 +1,6 @@
-"""How often does a path that may turn back reach a solution of a jammed packing where interior points do not?"""
+"""How often does a path that may turn back reach a solution of a jammed packing where interior
+points do not?
+"""
 
 from __future__ import annotations
 
@@ -22,14 +24,20 @@ from contactopt.problem import dimensionless  # noqa: E402
 from experiments.questions.granular import packing  # noqa: E402
 from experiments.report import write  # noqa: E402
 
-FAMILIES = ((2, 25, 1), (2, 64, 2), (3, 18, 3), (3, 27, 2))  # dimension, bodies, contacts of a pair of bodies
+# dimension, bodies, contacts of a pair of bodies
+FAMILIES = ((2, 25, 1), (2, 64, 2), (3, 18, 3), (3, 27, 2))
 FRICTION, SEEDS = (0.5, 0.8, 1.5), range(4)
-REACHED, SYSTEMS, LIMIT = 1e-8, 1000, 1000  # error of a path's end; linear systems of it; iterations of auto
+# error of a path's end; linear systems of it; iterations of auto
+REACHED, SYSTEMS, LIMIT = 1e-8, 1000, 1000
 
 
 def interior(problem: InterfaceProblem, matrix: Blocks) -> float:
     """The least error on the two interior-point paths that the default method begins with."""
-    return min(error for full in (True, False) for _, error in interior_iterates(problem, matrix, Path(full)))
+    return min(
+        error
+        for full in (True, False)
+        for _, error in interior_iterates(problem, matrix, Path(full))
+    )
 
 
 def turning(problem: InterfaceProblem, matrix: Blocks) -> float:
@@ -37,7 +45,9 @@ def turning(problem: InterfaceProblem, matrix: Blocks) -> float:
     return min((error for _, error in homotopy_iterates(problem, matrix, SYSTEMS)), default=np.inf)
 
 
-def reached(problem: InterfaceProblem, follow: Callable[[InterfaceProblem, Blocks], float]) -> tuple[bool, float]:
+def reached(
+    problem: InterfaceProblem, follow: Callable[[InterfaceProblem, Blocks], float]
+) -> tuple[bool, float]:
     """Whether the path ends at a solution, and the processor seconds."""
     scaled = dimensionless(problem)[0]
     matrix = block_matrix(scaled.Q, scaled.dim)
@@ -57,7 +67,12 @@ def certified(problem: InterfaceProblem) -> tuple[bool, float]:
 def measure(dim: int, bodies: int, points: int, mu: float) -> dict[str, Any]:
     """One row: packings that differ by their seed."""
     problems = [packing(dim, bodies, seed, mu, points) for seed in SEEDS]
-    row: dict[str, Any] = {"dimension": dim, "bodies": bodies, "contacts of a pair": points, "mu": mu}
+    row: dict[str, Any] = {
+        "dimension": dim,
+        "bodies": bodies,
+        "contacts of a pair": points,
+        "mu": mu,
+    }
     row["contacts"] = round(statistics.mean(problem.contacts for problem in problems))
     for label, found in (
         ("interior points", [reached(problem, interior) for problem in problems]),
@@ -71,8 +86,9 @@ def measure(dim: int, bodies: int, points: int, mu: float) -> dict[str, Any]:
 
 
 TEXT = """Packings of {seeds} seeds in each row. How many end at a solution: on the two interior-point paths that the default method begins with,
-and on the path that turns back where it must (`contactopt.methods.kernels.homotopy`, at most {systems} linear systems), with an error of
-at most {reached:g}; and how many the default method certifies within {limit} iterations. Medians of processor seconds, one thread.
+and on the path that turns back where it must (`contactopt.methods.kernels.homotopy`, at most
+{systems} linear systems), with an error of at most {reached:g}; and how many the default method
+certifies within {limit} iterations. Medians of processor seconds, one thread.
 
 {{rows}}
 """

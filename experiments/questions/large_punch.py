@@ -1,7 +1,8 @@
 """What does friction cost beside one linear solve, up to a punch of a million unknowns in 3D?
 
-`python -m experiments.questions.large_punch [elements ...]` measures the sizes and writes the report, `--phases [elements]` measures
-the phases on one core and on two. Wall times mean something only where no other program has a share of the cores. The phases come first.
+`python -m experiments.questions.large_punch [elements ...]` measures the sizes and writes the
+report, `--phases [elements]` measures the phases on one core and on two. Wall times mean something
+only where no other program has a share of the cores. The phases come first.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ from experiments.report import REPORTS, markdown, merged, write
 
 SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch
 FRICTION = (0.1, 0.2, 0.3, 0.4, 0.5)
-COMPARED = (20, 32)  # sizes at which all friction coefficients and the products with Q are tried as well
+# sizes at which all friction coefficients and the products with Q are tried as well
+COMPARED = (20, 32)
 ACCURACY = 1e-8  # of the product whose V-cycles are counted
 WAYS = {"coupled": "coupled", "products": "krylov"}  # -> Newton's linear solver
 KEYS = ("elements", "way", "mu")
@@ -81,11 +83,17 @@ def cycles_of_product(reduction) -> int:  # type: ignore[no-untyped-def]
     total = 0
     for body, B in zip(reduction.bodies, reduction.maps):
         solver = body.solver
-        total += conjugate_gradients(solver.A, solver.cycle, (B.T @ r)[body.body.free], ACCURACY).cycles
+        total += conjugate_gradients(
+            solver.A, solver.cycle, (B.T @ r)[body.body.free], ACCURACY
+        ).cycles
     return total
 
 
-CONFIGURATIONS = {"one core": (1, True), "two cores": (2, True), "two cores, BLAS threads left alone": (2, False)}
+CONFIGURATIONS = {
+    "one core": (1, True),
+    "two cores": (2, True),
+    "two cores, BLAS threads left alone": (2, False),
+}
 
 
 def phases(elements: int, cores: int) -> list[dict[str, object]]:
@@ -97,12 +105,18 @@ def phases(elements: int, cores: int) -> list[dict[str, object]]:
         begin = time.perf_counter(), time.process_time()
         made = act()
         rows.append(
-            {"phase": phase, "wall [s]": time.perf_counter() - begin[0], "CPU [s]": time.process_time() - begin[1]}
+            {
+                "phase": phase,
+                "wall [s]": time.perf_counter() - begin[0],
+                "CPU [s]": time.process_time() - begin[1],
+            }
         )
         return made
 
     scene = scenes.flat_punch(3)
-    assembled = timed("assembly", lambda: each(lambda part: assemble(scene, part, elements, None), scene.parts))
+    assembled = timed(
+        "assembly", lambda: each(lambda part: assemble(scene, part, elements, None), scene.parts)
+    )
     with one_blas_thread():
         timed("hierarchies", lambda: each(lambda body: body.prepare("multigrid", False), assembled))
     reduction = reduce_bodies(scene, elements, solver="multigrid")
@@ -115,7 +129,9 @@ def phase_table(elements: int) -> list[dict[str, object]]:
     table: dict[str, dict[str, object]] = {}
     for name, (cores, limited) in CONFIGURATIONS.items():
         limits = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} if limited else {}
-        environment = {key: value for key, value in os.environ.items() if not key.endswith("NUM_THREADS")} | limits
+        environment = {
+            key: value for key, value in os.environ.items() if not key.endswith("NUM_THREADS")
+        } | limits
         command = [sys.executable, "-m", MODULE, "--phases-once", str(elements), str(cores)]
         done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
         for row in json.loads(done.stdout.splitlines()[-1]):
@@ -156,11 +172,13 @@ def draw(rows: list[dict]) -> Figure:
 TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d with `elements` elements across the half-width of the
 punch. It is solved from a cold start to a certificate of 1e-8. Both bodies are solved by multigrid.
 
-There are two ways. `coupled` is Newton's method on displacements and contact forces at once. `products` is Newton's method that takes
-products with Q, and each of these products solves with both bodies. V-cycles are the steps of multigrid. The column counts those of
-both bodies together, without the V-cycles inside products. Set-up is the assembly and the making of the multigrid hierarchies. Every
-run has a process of its own with one BLAS thread, and the memory is the peak of this process. Other programs had a share of the two
-cores. Compare CPU times, therefore, and not wall times.
+There are two ways. `coupled` is Newton's method on displacements and contact forces at once.
+`products` is Newton's method that takes products with Q, and each of these products solves with
+both bodies. V-cycles are the steps of multigrid. The column counts those of both bodies together,
+without the V-cycles inside products. Set-up is the assembly and the making of the multigrid
+hierarchies. Every run has a process of its own with one BLAS thread, and the memory is the peak of
+this process. Other programs had a share of the two cores. Compare CPU times, therefore, and not
+wall times.
 
 {sizes}
 
@@ -170,9 +188,10 @@ cores. Compare CPU times, therefore, and not wall times.
 - V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
 - CPU time of `products` over that of `coupled`, set-up included: {faster}.
 
-The last table has the wall time over the CPU time of every phase. One half is the best that two cores can reach. These runs had real-time
-priority, so that other programs did not disturb them. The threads are those that share the bodies and the products. BLAS has one
-thread, except in the last columns.
+The last table has the wall time over the CPU time of every phase. One half is the best that two
+cores can reach. These runs had real-time priority, so that other programs did not disturb them. The
+threads are those that share the bodies and the products. BLAS has one thread, except in the last
+columns.
 
 {phases}
 """
@@ -184,17 +203,26 @@ def report(rows: list[dict]) -> str:
     n, cpu = (np.log([float(row[key]) for row in largest]) for key in ("unknowns", "CPU [s]"))
     slope = np.polyfit(n, cpu, 1)[0] if len(n) > 1 else np.nan
     linear = [
-        float(row["CPU [s]"]) / (float(row["set-up CPU [s]"]) + float(row["CPU of one product [s]"])) for row in largest
+        float(row["CPU [s]"])
+        / (float(row["set-up CPU [s]"]) + float(row["CPU of one product [s]"]))
+        for row in largest
     ]
-    ratios = ", ".join(f"{value:.2f} ({int(row['unknowns']):,} unknowns)" for value, row in zip(linear, largest))
+    ratios = ", ".join(
+        f"{value:.2f} ({int(row['unknowns']):,} unknowns)" for value, row in zip(linear, largest)
+    )
     over = [float(row["V-cycles"]) / float(row["V-cycles of one product"]) for row in coupled]
     same = {(row["elements"], row["mu"]): float(row["CPU [s]"]) for row in coupled}
     slow = [row for row in rows if row["way"] == "products"]
     faster = ", ".join(
-        f"{float(row['CPU [s]']) / same[row['elements'], row['mu']]:.1f} ({int(row['unknowns']):,} unknowns, mu = {row['mu']})"
+        f"{float(row['CPU [s]']) / same[row['elements'], row['mu']]:.1f} ({int(row['unknowns']):,}"
+        f" unknowns, mu = {row['mu']})"
         for row in slow
     )
-    text = TEXT.replace("{slope}", f"{slope:.2f}").replace("{ratios}", ratios).replace("{faster}", faster)
+    text = (
+        TEXT.replace("{slope}", f"{slope:.2f}")
+        .replace("{ratios}", ratios)
+        .replace("{faster}", faster)
+    )
     return text.replace("{least}", f"{min(over):.1f}").replace("{most}", f"{max(over):.1f}")
 
 
@@ -212,4 +240,10 @@ if __name__ == "__main__":
         rows = merged("large_punch", "sizes", rows, KEYS)
         rows = sorted(rows, key=lambda row: (int(row["unknowns"]), row["way"], float(row["mu"])))
         tables = {"sizes": rows, "phases": json.loads(PHASES.read_text())}
-        write("large_punch", "Friction beside one linear solve", report(rows), tables, {"growth": draw(rows)})
+        write(
+            "large_punch",
+            "Friction beside one linear solve",
+            report(rows),
+            tables,
+            {"growth": draw(rows)},
+        )

@@ -51,12 +51,19 @@ def growing(mu: float, steps: int) -> dict[str, object]:
     return {
         "mu": mu,
         "increments": steps,
-        "c / a": float(np.mean(history["stick_half_width"][last] / history["contact_half_width"][last])),
+        "c / a": float(
+            np.mean(history["stick_half_width"][last] / history["contact_half_width"][last])
+        ),
         "exact": ratio,
-        "error": float(np.mean(history["stick_half_width"][last] / history["contact_half_width"][last])) - ratio,
+        "error": (
+            float(np.mean(history["stick_half_width"][last] / history["contact_half_width"][last]))
+            - ratio
+        ),
         "a, rel. error": history["contact_half_width"][-1] / exact.half_width - 1,
         "approach, rel. error": history["approach"][-1] / exact.approach - 1,
-        "friction work / external work": history["friction_work"][-1] / history["external_work"][-1],
+        "friction work / external work": (
+            history["friction_work"][-1] / history["external_work"][-1]
+        ),
         "energy balance": float(history["energy_error"].max()),
     }
 
@@ -75,7 +82,11 @@ def draw_growing(rows: list[dict]) -> Figure:
     for mu, colour in zip(FRICTION, (BLUE, ORANGE, GREY)):
         chosen = [row for row in rows if row["mu"] == mu]
         ax.semilogx(
-            [r["increments"] for r in chosen], [r["c / a"] for r in chosen], "o-", color=colour, label=f"mu = {mu:g}"
+            [r["increments"] for r in chosen],
+            [r["c / a"] for r in chosen],
+            "o-",
+            color=colour,
+            label=f"mu = {mu:g}",
         )
         ax.axhline(chosen[0]["exact"], color=colour, ls="--", lw=1)
     ax.set(xlabel="load increments [-]", ylabel="stick ratio c / a [-] (dashed: exact)")
@@ -84,21 +95,24 @@ def draw_growing(rows: list[dict]) -> Figure:
 
 
 TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared to and fro by .9 of the friction bound. At every
-step the energies balance to rounding: external work = elastic energy + friction work + error of the steps.
+step the energies balance to rounding: external work = elastic energy + friction work + error of the
+steps.
 
 ![film](film.gif)
 
-**How many states does a cycle need?** The scene is in plane strain with T = .9 mu P. The table compares the loss over the closed cycle, from the first
-+T on, with the exact one. The friction work is right even with few steps from turn to turn, because slip goes one way between turns. The
-area of the loop becomes worse with few states, because it is drawn through them.
+**How many states does a cycle need?** The scene is in plane strain with T = .9 mu P. The table
+compares the loss over the closed cycle, from the first +T on, with the exact one. The friction work
+is right even with few steps from turn to turn, because slip goes one way between turns. The area of
+the loop becomes worse with few states, because it is drawn through them.
 
 {cycles}
 
-**Growing contact of dissimilar bodies.** A rigid sphere is pressed on an elastic half-space (nu = .3). With friction the stick zone is a
-fixed share c/a of the contact, and one large step misses this share by far. The load grows to 100 N in such a way that the contact radius grows
-evenly. There are 160 elements across the last radius. c/a is the mean over the last eighth of the increments. The error is about of
-first order in the increment, because a point that stops slipping within a step keeps the displacement that it had at the start of
-the step.
+**Growing contact of dissimilar bodies.** A rigid sphere is pressed on an elastic half-space (nu =
+.3). With friction the stick zone is a fixed share c/a of the contact, and one large step misses
+this share by far. The load grows to 100 N in such a way that the contact radius grows evenly. There
+are 160 elements across the last radius. c/a is the mean over the last eighth of the increments. The
+error is about of first order in the increment, because a point that stops slipping within a step
+keeps the displacement that it had at the start of the step.
 
 {increments}
 """

@@ -16,10 +16,18 @@ from experiments.report import PAPER, write  # noqa: E402
 
 FRICTION = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 SERIES = {
-    "punch-2d, mu = .3": (lambda n: scenes.flat_punch(2, elements=n, mu=0.3), (8, 16, 32, 64, 128, 256, 512, 1024)),
+    "punch-2d, mu = .3": (
+        lambda n: scenes.flat_punch(2, elements=n, mu=0.3),
+        (8, 16, 32, 64, 128, 256, 512, 1024),
+    ),
     "rigid punch on a half-plane, mu = .3": (
         lambda n: scenes.flat_punch(
-            2, elements=n, mu=0.3, rigid="punch", foundation_width=25600.0, foundation_height=12800.0
+            2,
+            elements=n,
+            mu=0.3,
+            rigid="punch",
+            foundation_width=25600.0,
+            foundation_height=12800.0,
         ),
         (16, 32, 64, 128, 256, 512),
     ),
@@ -61,14 +69,16 @@ def friction(name: str) -> dict[str, object]:
     row: dict[str, object] = {"scene": name}
     for mu in FRICTION:
         solution = solve(reduce(make_scene(name, mu=mu)), tol=1e-8)
-        row[f"mu = {mu:g}"] = f"{solution.status}, {solution.iterations - 1}, {solution.residual:.0e}"
+        row[f"mu = {mu:g}"] = (
+            f"{solution.status}, {solution.iterations - 1}, {solution.residual:.0e}"
+        )
     return row
 
 
 TEXT = """How many steps does Newton's method take? The method is `auto`. In all of these problems its first part, Newton's method, converges alone. The
-certificate is 1e-8, and BLAS has one thread. A *cold* run starts from the solution of bonded surfaces. The time includes this solution,
-but it does not count as a step. A *warm* run starts from the tractions on the mesh before, which is half as fine. The first iterate is
-the start itself.
+certificate is 1e-8, and BLAS has one thread. A *cold* run starts from the solution of bonded
+surfaces. The time includes this solution, but it does not count as a step. A *warm* run starts from
+the tractions on the mesh before, which is half as fine. The first iterate is the start itself.
 
 {steps}
 
@@ -79,4 +89,10 @@ The second table has the three scenes at their default size: status, Newton step
 
 if __name__ == "__main__":
     rows = [row for series in SERIES for row in steps(series)]
-    write("newton_steps", "Newton steps", TEXT, {"steps": rows, "friction": [friction(name) for name in PAPER]}, {})
+    write(
+        "newton_steps",
+        "Newton steps",
+        TEXT,
+        {"steps": rows, "friction": [friction(name) for name in PAPER]},
+        {},
+    )

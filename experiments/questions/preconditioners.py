@@ -1,4 +1,6 @@
-"""How good are the paper's H^1/2 preconditioners, what beats them, and what do products with Q cost?"""
+"""How good are the paper's H^1/2 preconditioners, what beats them, and what do products with Q
+cost?
+"""
 
 from __future__ import annotations
 
@@ -47,9 +49,15 @@ COLOURS = {"none": GREY, "p21": ORANGE, "p22": GREEN, "neumann": BLUE}
 
 
 def blocks(
-    k: int, upper: float, lower: float, nu: float, zone: np.ndarray | None = None, Q: str = "explicit"
+    k: int,
+    upper: float,
+    lower: float,
+    nu: float,
+    zone: np.ndarray | None = None,
+    Q: str = "explicit",
 ) -> InterfaceProblem:
-    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below; k nodes on the contact line.
+    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below; k nodes on the
+    contact line.
 
     zone  their places in [-2, 2], evenly spaced by default
     """
@@ -57,25 +65,43 @@ def blocks(
     h = zone[-1] - zone[-2]
     punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")
     pin = zone[k // 2 + 1] if k % 2 else zone[k // 2]
-    punch = punch.with_boundaries({"pin": lambda x: (x[1] > 4 - 1e-9) & (np.abs(x[0] - pin / 2) < pin / 2)})
+    punch = punch.with_boundaries(
+        {"pin": lambda x: (x[1] > 4 - 1e-9) & (np.abs(x[0] - pin / 2) < pin / 2)}
+    )
     out = 2 + graded(6, h * 1.15, 1.15)[1:]
     ground = tensor_mesh(np.concatenate([-out[::-1], zone, out]), -graded(8, h, 1.15)[::-1])
-    ground = rename(ground, bottom="y-").with_boundaries({"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)})
-    first = Part("punch", punch, Material(upper, nu), (Support("top", {"y": 0.0}), Support("pin", {"x": 0.0})))
+    ground = rename(ground, bottom="y-").with_boundaries(
+        {"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)}
+    )
+    first = Part(
+        "punch",
+        punch,
+        Material(upper, nu),
+        (Support("top", {"y": 0.0}), Support("pin", {"x": 0.0})),
+    )
     second = Part("ground", ground, Material(lower, nu), (Support("bottom"),))
     return reduce(Scene("blocks", first, second, 0.5), Q=Q)
 
 
 def solids(
-    n: int, upper: float, lower: float, zone: np.ndarray | None = None, Q: str = "explicit", nu: float = 0.3
+    n: int,
+    upper: float,
+    lower: float,
+    zone: np.ndarray | None = None,
+    Q: str = "explicit",
+    nu: float = 0.3,
 ) -> InterfaceProblem:
-    """The same bodies in 3D (16 x 16 x 8 foundation, growth 1.3), the punch held on top; n x n contact nodes."""
+    """The same bodies in 3D (16 x 16 x 8 foundation, growth 1.3), the punch held on top; n x n
+    contact nodes.
+    """
     zone = np.linspace(-2, 2, n) if zone is None else zone
     h = zone[-1] - zone[-2]
     out = 2 + graded(6, 1.3 * h, 1.3)[1:]
     across = np.concatenate([-out[::-1], zone, out])
     punch = rename(tensor_mesh(zone, zone, graded(4, h, 1.3)), contact="z-", top="z+")
-    ground = rename(tensor_mesh(across, across, -graded(8, h, 1.3)[::-1]), bottom="z-").with_boundaries(
+    ground = rename(
+        tensor_mesh(across, across, -graded(8, h, 1.3)[::-1]), bottom="z-"
+    ).with_boundaries(
         {"contact": lambda x: (x[2] > -1e-9) & (np.abs(x[0]) < 2) & (np.abs(x[1]) < 2)}
     )
     first = Part("punch", punch, Material(upper, nu), (Support("top"),))
@@ -104,13 +130,19 @@ def iterations(P: np.ndarray | LinearOperator | None, Q: Interface) -> int:
 
 
 def choices(problem: InterfaceProblem) -> dict[str, Preconditioner | None]:
-    """No preconditioner, each by itself, each with the smooth motions deflated; without the entries of Q the best alone."""
+    """No preconditioner, each by itself, each with the smooth motions deflated; without the entries
+    of Q the best alone.
+    """
     plain: dict[str, Preconditioner | None] = {"none": None}
     known = [name for name in PRECONDITIONERS if problem.dim == 2 or name != "p22"]
     plain |= {name: preconditioner(problem, name) for name in known}
     Z = smooth_motions(problem)
     if isinstance(problem.Q, np.ndarray):
-        return plain | {f"{name}, deflated": deflated(P, problem.Q, Z) for name, P in plain.items() if P is not None}
+        return plain | {
+            f"{name}, deflated": deflated(P, problem.Q, Z)
+            for name, P in plain.items()
+            if P is not None
+        }
     return {"neumann, deflated": deflated(plain["neumann"], problem.Q, Z)}
 
 
@@ -138,24 +170,34 @@ def of_bodies(problem: InterfaceProblem, name: str) -> dict[str, object]:
 
 
 def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
-    """Only the contacts in the middle are active: half-width `share` of that of the contact surface."""
+    """Only the contacts in the middle are active: half-width `share` of that of the contact
+    surface.
+    """
     x = problem.coordinates[: problem.dim - 1]
     inside = np.sqrt(np.sum(x**2, axis=0)) <= 2 * share + 1e-9
     active = np.flatnonzero(np.repeat(inside, problem.dim))
     U, zero = selection(problem.q.size, active), np.zeros(len(active))
     Q = problem.Q[np.ix_(active, active)]
-    row: dict[str, object] = {"dim": problem.dim, "zone / surface": share, "active contacts": int(inside.sum())}
+    row: dict[str, object] = {
+        "dim": problem.dim,
+        "zone / surface": share,
+        "active contacts": int(inside.sum()),
+    }
     for name, P in choices(problem).items():
         if P is not None and "deflated" in name:
             rows = U.T @ (P @ U.toarray())
             row[f"{name}: rows of P"] = condition(rows, Q)
             if P.model is not None:
-                row[f"{name}: inverse of G_AA"] = condition(restricted(P, U, zero) @ np.eye(len(active)), Q)
+                row[f"{name}: inverse of G_AA"] = condition(
+                    restricted(P, U, zero) @ np.eye(len(active)), Q
+                )
     return row
 
 
 def product_costs(dim: int, elements: int) -> dict[str, object]:
-    """Seconds of one product with Q in each form and with the preconditioner, and of whole frictional solves."""
+    """Seconds of one product with Q in each form and with the preconditioner, and of whole
+    frictional solves.
+    """
     scene = scenes.flat_punch(dim, elements=elements, mu=0.3)
     row: dict[str, object] = {"dim": dim}
     for form in ("explicit", "implicit"):
@@ -164,7 +206,10 @@ def product_costs(dim: int, elements: int) -> dict[str, object]:
         solution = solve(problem)
         total = time.perf_counter() - begin
         assert solution.solved, solution.message
-        row |= {"contacts": problem.contacts, f"{form}: product [s]": seconds(lambda p=problem: p.Q @ p.q.ravel())}
+        row |= {
+            "contacts": problem.contacts,
+            f"{form}: product [s]": seconds(lambda p=problem: p.Q @ p.q.ravel()),
+        }
         row |= {f"{form}: scene solved [s]": total, "products": solution.products}
     P = preconditioner(problem, "neumann")
     return row | {"neumann: product [s]": seconds(lambda: P @ problem.q.ravel())}
@@ -185,12 +230,27 @@ def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
     for ax, key in zip(figure.subplots(2, 1), ("condition, full", "PCG iterations, full")):
         for name, colour in COLOURS.items():
             for suffix, style in (("", "o--"), (", deflated", "s-")):
-                chosen = [row for row in rows if row["preconditioner"] == name + suffix and row[key] != ""]
+                chosen = [
+                    row for row in rows if row["preconditioner"] == name + suffix and row[key] != ""
+                ]
                 if chosen:
                     k = [row["contacts"] for row in chosen]
-                    ax.loglog(k, [row[key] for row in chosen], style, color=colour, mfc="white", label=name + suffix)
+                    ax.loglog(
+                        k,
+                        [row[key] for row in chosen],
+                        style,
+                        color=colour,
+                        mfc="white",
+                        label=name + suffix,
+                    )
         if key.startswith("condition"):
-            ax.loglog(sizes, [np.log(k) ** 2 for k in sizes], ":", color="black", label="log^2 N (the paper's growth)")
+            ax.loglog(
+                sizes,
+                [np.log(k) ** 2 for k in sizes],
+                ":",
+                color="black",
+                label="log^2 N (the paper's growth)",
+            )
             ax.legend(frameon=False, fontsize=8, loc="upper left")
             ax.set_ylim(top=2e4)
         ax.set(xlabel="contact nodes N [-]", ylabel=key + " [-]")
@@ -210,7 +270,12 @@ def draw_costs(rows: list[dict]) -> Figure:
                     what = "preconditioner" if form == "neumann" else f"{form} Q"
                     k = [row["contacts"] for row in chosen]
                     ax.loglog(
-                        k, [row[key] for row in chosen], style, color=colour, mfc="white", label=f"{what}, {dim}D"
+                        k,
+                        [row[key] for row in chosen],
+                        style,
+                        color=colour,
+                        mfc="white",
+                        label=f"{what}, {dim}D",
                     )
         ax.set(
             xlabel="contact nodes N [-]",
@@ -221,7 +286,8 @@ def draw_costs(rows: list[dict]) -> Figure:
 
 
 TEXT = """How many iterations do linear systems with Q take, if Q is known by its products only? The paper (A. Lotfi, section 5.2) claims a condition number that
-grows like log^2 N with the number N of contacts. The best preconditioner here does not grow. PCG stands for preconditioned conjugate gradients.
+grows like log^2 N with the number N of contacts. The best preconditioner here does not grow. PCG
+stands for preconditioned conjugate gradients.
 
 1. `neumann`, with the smooth motions deflated (solved for exactly), needs at most {worst_2d} PCG iterations in 2D and {worst_3d} in 3D,
    whatever the number of contacts. Without a preconditioner there are {none_2d} at {last} contacts.
@@ -230,48 +296,64 @@ grows like log^2 N with the number N of contacts. The best preconditioner here d
 3. All preconditioners become worse if Poisson's ratio nu comes near .5. Short tangential waves then lock in bilinear elements, and the
    models of Q do not contain this. (At nu = .49 the eigenvectors of the smallest eigenvalues are alternating tangential forces.)
 
-**2D.** A punch, 4 wide and 4 high and held at its top, stands on a foundation of 16 x 8 that is clamped below. Both are in plane strain with
-E = 5 and nu = .3. The nodes are evenly spaced on the whole contact line, and the meshes grow by 1.15 away from it. P21 and P22 are
-equations (25) and (26) of the paper. `neumann` is the square root of the Laplacian, by the cosine transform. "deflated" means that two
-translations, tilt and stretch are solved for exactly. PCG runs from a random right-hand side to 1e-8, with normal and tangential
-components together.
+**2D.** A punch, 4 wide and 4 high and held at its top, stands on a foundation of 16 x 8 that is
+clamped below. Both are in plane strain with E = 5 and nu = .3. The nodes are evenly spaced on the
+whole contact line, and the meshes grow by 1.15 away from it. P21 and P22 are equations (25) and
+(26) of the paper. `neumann` is the square root of the Laplacian, by the cosine transform.
+"deflated" means that two translations, tilt and stretch are solved for exactly. PCG runs from a
+random right-hand side to 1e-8, with normal and tangential components together.
 
 {sizes}
 
-**Other bodies**, with 129 contacts. The entries are condition numbers, with the PCG iterations in brackets. In the last row the spacing
-grows by 1.05 from node to node, and is 5 times smaller at the ends than in the middle.
+**Other bodies**, with 129 contacts. The entries are condition numbers, with the PCG iterations in
+brackets. In the last row the spacing grows by 1.05 from node to node, and is 5 times smaller at the
+ends than in the middle.
 
 {bodies}
 
-**3D.** The bodies are the same (foundation 16 x 16 x 8, growth 1.3, the punch held at its top in every direction), with n x n contacts on
-the whole contact surface. P21 is summed along both directions, which is the P31 of the paper. Nine smooth motions are deflated. From 33
-x 33 contacts on, Q is known by its products only, and the bodies are solved by multigrid. There only the best preconditioner is measured.
+**3D.** The bodies are the same (foundation 16 x 16 x 8, growth 1.3, the punch held at its top in
+every direction), with n x n contacts on the whole contact surface. P21 is summed along both
+directions, which is the P31 of the paper. Nine smooth motions are deflated. From 33 x 33 contacts
+on, Q is known by its products only, and the bodies are solved by multigrid. There only the best
+preconditioner is measured.
 
 {surface}
 
-Other stiffness ratios, and a graded surface whose spacing is 5 times smaller at the ends, with 169 contacts:
+Other stiffness ratios, and a graded surface whose spacing is 5 times smaller at the ends, with 169
+contacts:
 
 {ratios}
 
-**A zone in the middle of the surface** (129 and 13 x 13 contacts). The table has the condition number on the active contacts. One way takes
-the rows and columns of P. The other way takes the inverse of the block G_AA of the model, by an inner PCG that needs no body.
+**A zone in the middle of the surface** (129 and 13 x 13 contacts). The table has the condition
+number on the active contacts. One way takes the rows and columns of P. The other way takes the
+inverse of the block G_AA of the model, by an inner PCG that needs no body.
 
 {zones}
 
-**Cost.** Times are medians of 7 products. The scenes punch-2d and punch-3d have mu = .3, and are reduced and solved to 1e-8 once each. An
-implicit product is one solve with each body, from its factors. An explicit product is one with an array.
+**Cost.** Times are medians of 7 products. The scenes punch-2d and punch-3d have mu = .3, and are
+reduced and solved to 1e-8 once each. An implicit product is one solve with each body, from its
+factors. An explicit product is one with an array.
 
 {costs}
 
-Another report measures what a whole frictional solve costs, over one linear solve of the bonded bodies: [the price of friction](../cost_ratio/report.md).
+Another report measures what a whole frictional solve costs, over one linear solve of the bonded
+bodies: [the price of friction](../cost_ratio/report.md).
 """
 
 
 def main() -> None:
     rows = [row for k in SIZES for row in by_size(blocks(k, *STIFFNESS[0]))]
     even = [of_bodies(blocks(129, *material), BODIES.format(*material)) for material in STIFFNESS]
-    even.append(of_bodies(blocks(129, *STIFFNESS[0], refined(129, 5 ** (1 / 64))), "E1 = E2 = 5, nu = 0.3, graded"))
-    surface = [row for n in SIDES for row in by_size(solids(n, 5.0, 5.0, Q="explicit" if n < 30 else "implicit"))]
+    even.append(
+        of_bodies(
+            blocks(129, *STIFFNESS[0], refined(129, 5 ** (1 / 64))), "E1 = E2 = 5, nu = 0.3, graded"
+        )
+    )
+    surface = [
+        row
+        for n in SIDES
+        for row in by_size(solids(n, 5.0, 5.0, Q="explicit" if n < 30 else "implicit"))
+    ]
     pairs = ((5.0, 5.0), (5e4, 5.0), (5.0, 5e4))
     ratios = [of_bodies(solids(13, *pair), BODIES.format(*pair, 0.3)) for pair in pairs]
     graded_ = refined(13, 5 ** (1 / 6))
@@ -280,8 +362,14 @@ def main() -> None:
     zones = [in_zone(p, share) for p in (plane, solid) for share in (0.8, 0.4, 0.2)]
     zones = [{key: row.get(key, "") for key in zones[0]} for row in zones]
     costs = [product_costs(dim, elements) for dim, sizes in ELEMENTS.items() for elements in sizes]
-    best = [row["PCG iterations, full"] for row in rows if row["preconditioner"] == "neumann, deflated"]
-    solid_best = [row["PCG iterations, full"] for row in surface if row["preconditioner"] == "neumann, deflated"]
+    best = [
+        row["PCG iterations, full"] for row in rows if row["preconditioner"] == "neumann, deflated"
+    ]
+    solid_best = [
+        row["PCG iterations, full"]
+        for row in surface
+        if row["preconditioner"] == "neumann, deflated"
+    ]
     none = [row for row in rows if row["preconditioner"] == "none"][-1]
     facts = {
         "worst_2d": max(best),
@@ -292,13 +380,27 @@ def main() -> None:
     text = TEXT
     for key, value in facts.items():
         text = text.replace(f"{{{key}}}", str(value))
-    tables = {"sizes": rows, "bodies": even, "surface": surface, "ratios": ratios, "zones": zones, "costs": costs}
+    tables = {
+        "sizes": rows,
+        "bodies": even,
+        "surface": surface,
+        "ratios": ratios,
+        "zones": zones,
+        "costs": costs,
+    }
     figures = {
         "line": draw(rows, SIZES, "contact line (2D)"),
         "surface": draw(surface, tuple(n * n for n in SIDES), "contact surface (3D)"),
         "costs": draw_costs(costs),
     }
-    write("preconditioners", "Preconditioners of the interface operator", text, tables, figures, "{name}.md")
+    write(
+        "preconditioners",
+        "Preconditioners of the interface operator",
+        text,
+        tables,
+        figures,
+        "{name}.md",
+    )
 
 
 if __name__ == "__main__":

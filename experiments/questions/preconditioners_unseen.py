@@ -1,4 +1,6 @@
-"""Do the constants of `neumann`, fitted on a few bodies, hold on bodies that had no part in the fit?"""
+"""Do the constants of `neumann`, fitted on a few bodies, hold on bodies that had no part in the
+fit?
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ def plane(
 ) -> InterfaceProblem:
     """A block on a foundation, held on top and below, in contact along `line` [length].
 
-    height  of the block;  margin, depth  of the foundation beside and below the contact;  cut  into triangles
+    height  of the block;  margin, depth  of the foundation beside and below the contact;  cut  into
+            triangles
     notch   the block is an L: its right half ends at a quarter of its height
     """
     h = float(np.diff(line).min())
@@ -49,7 +52,9 @@ def plane(
     across = np.concatenate([line[0] - out[::-1], line, line[-1] + out])
     ground = rename(tensor_mesh(across, -graded(depth, h, growth)[::-1]), bottom="y-")
     low, high = line[0], line[-1]
-    ground = ground.with_boundaries({"contact": lambda x: (x[1] > -1e-9) & (x[0] > low) & (x[0] < high)})
+    ground = ground.with_boundaries(
+        {"contact": lambda x: (x[1] > -1e-9) & (x[0] > low) & (x[0] < high)}
+    )
     meshes = [simplices(mesh) if cut else mesh for mesh in (block, ground)]
     first = Part("block", meshes[0], upper, (Support("top"),))
     second = Part("ground", meshes[1], lower, (Support("bottom"),))
@@ -57,7 +62,11 @@ def plane(
 
 
 def solid(
-    sides: tuple[np.ndarray, np.ndarray], height: float, margin: float, upper: Material, lower: Material
+    sides: tuple[np.ndarray, np.ndarray],
+    height: float,
+    margin: float,
+    upper: Material,
+    lower: Material,
 ) -> InterfaceProblem:
     """The same in space: contact on the rectangle of two lines."""
     h = min(float(np.diff(side).min()) for side in sides)
@@ -67,9 +76,16 @@ def solid(
     ground = rename(tensor_mesh(*across, -graded(2 * margin, h, 1.4)[::-1]), bottom="z-")
     x, y = sides
     ground = ground.with_boundaries(
-        {"contact": lambda p: (p[2] > -1e-9) & (p[0] > x[0]) & (p[0] < x[-1]) & (p[1] > y[0]) & (p[1] < y[-1])}
+        {
+            "contact": lambda p: (
+                (p[2] > -1e-9) & (p[0] > x[0]) & (p[0] < x[-1]) & (p[1] > y[0]) & (p[1] < y[-1])
+            )
+        }
     )
-    first, second = Part("block", block, upper, (Support("top"),)), Part("ground", ground, lower, (Support("bottom"),))
+    first, second = (
+        Part("block", block, upper, (Support("top"),)),
+        Part("ground", ground, lower, (Support("bottom"),)),
+    )
     return reduce(Scene("unseen", first, second, 0.5, kind="solid"), Q="explicit")
 
 
@@ -80,7 +96,9 @@ def towards_one_end(k: int, ratio: float) -> np.ndarray:
 
 
 def jumps(k: int) -> np.ndarray:
-    """k places in [-2, 2] whose spacing alternates between coarse and fine stretches, three times finer."""
+    """k places in [-2, 2] whose spacing alternates between coarse and fine stretches, three times
+    finer.
+    """
     steps = np.where((np.arange(k - 1) // 8) % 2 == 0, 3.0, 1.0)
     return np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum() * 4 - 2
 
@@ -112,7 +130,9 @@ def in_space() -> dict[str, InterfaceProblem]:
         "rectangle 3 by 1, even cells": solid(
             (np.linspace(-3, 3, 19), np.linspace(-1, 1, 7)), 4.0, 4.0, rubber, rubber
         ),
-        "cells 3 times as long as wide": solid((np.linspace(-6, 6, 11), side), 4.0, 4.0, rubber, rubber),
+        "cells 3 times as long as wide": solid(
+            (np.linspace(-6, 6, 11), side), 4.0, 4.0, rubber, rubber
+        ),
         "column, 4 times as high as wide": solid((side, side), 16.0, 4.0, rubber, rubber),
         "plate, an eighth as high as wide": solid((side, side), 0.5, 4.0, rubber, rubber),
         "spacing 6 times smaller at one end, both ways": solid(
@@ -123,7 +143,9 @@ def in_space() -> dict[str, InterfaceProblem]:
 
 
 def judge(name: str, problem: InterfaceProblem) -> dict[str, object]:
-    """Condition numbers and PCG iterations on one pair of bodies; all with the smooth motions deflated, but for none."""
+    """Condition numbers and PCG iterations on one pair of bodies; all with the smooth motions
+    deflated, but for none.
+    """
     row: dict[str, object] = {"bodies": name, "contacts": problem.contacts}
     Z = smooth_motions(problem)
     for choice in CHOICES:
@@ -153,9 +175,10 @@ def helped(rows: list[dict[str, object]]) -> str:
 
 
 TEXT = """Does the preconditioner `neumann` also work on bodies that it was not fitted on? Its constants (`contactopt/methods/preconditioners/constants.py`)
-were fitted on the bodies of [Preconditioners](../preconditioners.md). Here it meets bodies that had no part in the fit. The entries are condition
-numbers, with the iterations of preconditioned conjugate gradients from a random right-hand side to 1e-8 in brackets. Smooth motions are
-deflated (solved for exactly), except in the column "none".
+were fitted on the bodies of [Preconditioners](../preconditioners.md). Here it meets bodies that had
+no part in the fit. The entries are condition numbers, with the iterations of preconditioned
+conjugate gradients from a random right-hand side to 1e-8 in brackets. Smooth motions are deflated
+(solved for exactly), except in the column "none".
 
 1. **In the plane** the worst of {plane_count} unseen pairs has condition {plane_worst} and takes {plane_steps} iterations; the pair
    that was fitted on takes {plane_fitted}. Without any fitted constant the worst is {plane_free}. The fit helps on {plane_helped}.
@@ -191,14 +214,20 @@ def main() -> None:
             f"{key}_free": f"{worst(rows, CHOICES[2])[0]:g}",
             f"{key}_helped": helped(rows),
             f"{key}_name": next(
-                f'"{row["bodies"]}"' for row in rows[1:] if float(str(row["neumann"]).split(" ")[0]) == number
+                f'"{row["bodies"]}"'
+                for row in rows[1:]
+                if float(str(row["neumann"]).split(" ")[0]) == number
             ),
         }
     text = TEXT
     for key, value in facts.items():
         text = text.replace(f"{{{key}}}", str(value))
     write(
-        "preconditioners_unseen", "The preconditioner `neumann` on bodies that it was not fitted on", text, tables, {}
+        "preconditioners_unseen",
+        "The preconditioner `neumann` on bodies that it was not fitted on",
+        text,
+        tables,
+        {},
     )
 
 

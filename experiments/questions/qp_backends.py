@@ -11,7 +11,8 @@ from experiments.report import write
 
 REPEATS = 5
 SCENES = (("punch-2d", {}), ("sphere", {}), ("punch-3d", {"elements": 8}))
-UNITS = {"N, mm": (1.0, 1.0), "kN, m": (1e-3, 1e-3), "uN, nm": (1e6, 1e6), "GN, km": (1e-9, 1e-6)}  # force, length
+# force, length
+UNITS = {"N, mm": (1.0, 1.0), "kN, m": (1e-3, 1e-3), "uN, nm": (1e6, 1e6), "GN, km": (1e-9, 1e-6)}
 
 
 def measure(name: str, exact, problem) -> dict[str, object]:  # type: ignore[no-untyped-def]
@@ -27,7 +28,9 @@ def measure(name: str, exact, problem) -> dict[str, object]:  # type: ignore[no-
         "status": str(solution.status),
         "residual": solution.residual,
         "approach, relative difference": abs(solution.multipliers[0] / exact.multipliers[0] - 1),
-        "peak, relative difference": abs(solution.reactions[:, 0].max() / exact.reactions[:, 0].max() - 1),
+        "peak, relative difference": abs(
+            solution.reactions[:, 0].max() / exact.reactions[:, 0].max() - 1
+        ),
         "status without crossover": str(raw.status),
         "residual without crossover": raw.residual,
         "median seconds": sorted(times)[REPEATS // 2],
@@ -38,13 +41,17 @@ def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
     saved = splitting.certified
     splitting.certified = as_it_comes
     try:
-        return solve(problem, "alternating", normal=name, tangential=name, tol=1e-9, max_iterations=40)
+        return solve(
+            problem, "alternating", normal=name, tangential=name, tol=1e-9, max_iterations=40
+        )
     finally:
         splitting.certified = saved
 
 
 def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
-    """The first answer of the first try, in place of contactopt.methods.kernels.semismooth.certified."""
+    """The first answer of the first try, in place of
+    contactopt.methods.kernels.semismooth.certified.
+    """
     r, multipliers = next(iter(solvers))[1]()
     return r.reshape(equations.q.shape), multipliers
 
@@ -64,13 +71,15 @@ def in_all_units(name: str) -> dict[str, object]:
 
 
 TEXT = """Do all solvers of quadratic programs lead to the same answer? The problem is the default `punch-2d` (17 contacts, mu = .5). The same backend
-solves its normal and its tangential problem, at the tight settings of contactopt.methods.backends. The answer is certified at
-1e-9. Differences are relative to a solve at 1e-13. contactopt makes the answer of a backend exact by a few more steps, which is called
-crossover. "Without crossover" takes the answers of the backend as they come, for at most 40 iterations.
+solves its normal and its tangential problem, at the tight settings of contactopt.methods.backends.
+The answer is certified at 1e-9. Differences are relative to a solve at 1e-13. contactopt makes the
+answer of a backend exact by a few more steps, which is called crossover. "Without crossover" takes
+the answers of the backend as they come, for at most 40 iterations.
 
 {rows}
 
-The next table has the normal problems (mu = 0) of the three scenes, with the certificate 1e-10 and the input written in other units:
+The next table has the normal problems (mu = 0) of the three scenes, with the certificate 1e-10 and
+the input written in other units:
 
 {units}
 """
@@ -80,4 +89,10 @@ if __name__ == "__main__":
     exact = solve(problem, tol=1e-13)
     rows = [measure(name, exact, problem) for name in QP if QP[name].installed]
     units = [in_all_units(name) for name in QP if QP[name].installed]
-    write("qp_backends", "The same answer from every QP backend", TEXT, {"rows": rows, "units": units}, {})
+    write(
+        "qp_backends",
+        "The same answer from every QP backend",
+        TEXT,
+        {"rows": rows, "units": units},
+        {},
+    )

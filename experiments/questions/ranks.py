@@ -1,4 +1,6 @@
-"""Do bodies on ranks of their own give the same answers, how evenly do the ranks work, and what travels between them?"""
+"""Do bodies on ranks of their own give the same answers, how evenly do the ranks work, and what
+travels between them?
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ EQUAL = {
 }
 RANKS = (4, 8, 16)
 HEIGHTS = (80.0, 640.0)  # of the foundation that is cut into slices [mm]
-SLICED = {4: 12, 8: 12, 16: 32}  # elements across the contact half-width there, by the number of ranks
+# elements across the contact half-width there, by the number of ranks
+SLICED = {4: 12, 8: 12, 16: 32}
 
 
 def equal_bodies(dim: int, elements: int) -> Scene:
@@ -38,10 +41,12 @@ def equal_bodies(dim: int, elements: int) -> Scene:
 
 
 class Clocks:
-    """The length of the critical path in CPU seconds, as the messages show it, whatever else the machine is doing.
+    """The length of the critical path in CPU seconds, as the messages show it, whatever else the
+    machine is doing.
 
-    A clock runs with the CPU time of its process. An order carries the clock of rank 0, and its rank sets its own forward
-    to it before the work; so does rank 0 with the clock that a reply carries.
+    A clock runs with the CPU time of its process. An order carries the clock of rank 0, and its
+    rank sets its own forward to it before the work; so does rank 0 with the clock that a reply
+    carries.
     """
 
     def __init__(self) -> None:
@@ -49,7 +54,9 @@ class Clocks:
         self._lock = threading.Lock()
 
     def read(self, other: float = 0.0, waited: float = 0.0) -> float:
-        """The clock without the CPU time that looking for messages took, set forward to another one."""
+        """The clock without the CPU time that looking for messages took, set forward to another
+        one.
+        """
         with self._lock:
             cpu = time.process_time()
             self.now, self._last = max(self.now + cpu - self._last - waited, other), cpu
@@ -133,17 +140,26 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
 
 
 def traffic(team: Team, height: float) -> dict[str, Any]:
-    """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the answer."""
+    """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the
+    answer.
+    """
     scene = sliced(
-        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1
+        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height),
+        "foundation",
+        team.size - 1,
     )
-    one, many = (reduce_bodies(given, Q="implicit", solver="superlu") for given in (scene, spread(scene, team)))
+    one, many = (
+        reduce_bodies(given, Q="implicit", solver="superlu")
+        for given in (scene, spread(scene, team))
+    )
     r = np.random.default_rng(0).normal(size=many.problem.q.size)
     expected = one.problem.Q @ r
     before = (team.traffic.messages, team.traffic.length)
     product = many.problem.Q @ r
     sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
-    answers = [solve(reduce(given, Q="explicit"), tol=TOL) for given in (scene, spread(scene, team))]
+    answers = [
+        solve(reduce(given, Q="explicit"), tol=TOL) for given in (scene, spread(scene, team))
+    ]
     size = np.abs(answers[0].reactions).max()
     return {
         "ranks": team.size,
@@ -154,14 +170,18 @@ def traffic(team: Team, height: float) -> dict[str, Any]:
         "products differ by": float(np.abs(product - expected).max() / np.abs(expected).max()),
         "steps": f"{answers[0].iterations}, {answers[1].iterations}",
         "residuals": f"{answers[0].residual:.1e}, {answers[1].residual:.1e}",
-        "answers differ by": float(np.abs(answers[0].reactions - answers[1].reactions).max() / size),
+        "answers differ by": float(
+            np.abs(answers[0].reactions - answers[1].reactions).max() / size
+        ),
     }
 
 
 def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     """The same bodies solved by multigrid: what the whole solution sends."""
     scene = sliced(
-        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1
+        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height),
+        "foundation",
+        team.size - 1,
     )
     problem = reduce(spread(scene, team), solver="multigrid")
     before = (team.traffic.messages, team.traffic.length)
@@ -183,33 +203,38 @@ def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
 
 
 TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the bodies of a scene among N processes, which are called ranks. Each process assembles its
-bodies and solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on the interfaces travel.
+bodies and solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on
+the interfaces travel.
 
 ## Two bodies of equal size on two ranks
 
-The times are those of reduction and solution to a residual of 1e-8, with the set-up and with one BLAS thread. The *critical path* is the longest
-chain of work that waits for other work. It is measured in CPU seconds, by clocks that the messages carry. Other programs influence it only as far
-as programs take caches and memory from each other. *Efficiency* is the time of one process over twice that of two ranks. The wall times are
-those of the same run. They also contain what the ranks sleep between two looks for a message, and the share of the cores that other
-programs take.
+The times are those of reduction and solution to a residual of 1e-8, with the set-up and with one
+BLAS thread. The *critical path* is the longest chain of work that waits for other work. It is
+measured in CPU seconds, by clocks that the messages carry. Other programs influence it only as far
+as programs take caches and memory from each other. *Efficiency* is the time of one process over
+twice that of two ranks. The wall times are those of the same run. They also contain what the ranks
+sleep between two looks for a message, and the share of the cores that other programs take.
 
 {efficiency}
 
-The aim is 75 % in every case. The time that is lost on the critical path is that of the steps on the interface. Rank 0 makes these steps
-alone while the other rank waits: the model of Q in the preconditioner, the dense system, the coupling of the surfaces.
+The aim is 75 % in every case. The time that is lost on the critical path is that of the steps on
+the interface. Rank 0 makes these steps alone while the other rank waits: the model of Q in the
+preconditioner, the dense system, the coupling of the surfaces.
 
 
 ## What travels
 
-A punch stands on a foundation that is cut into slices tied to each other. Each rank has one body, and there are more ranks than cores. The
-higher foundation has more unknowns within its slices and the same interfaces. With factors, a product with Q takes one order to each rank,
-and its reply. An array Q is made once, and then the steps send nothing.
+A punch stands on a foundation that is cut into slices tied to each other. Each rank has one body,
+and there are more ranks than cores. The higher foundation has more unknowns within its slices and
+the same interfaces. With factors, a product with Q takes one order to each rank, and its reply. An
+array Q is made once, and then the steps send nothing.
 
 {traffic}
 
-With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration such as conjugate gradients) send an
-order for each operation on them, and receive scalar products and displacements on the interface. How many V-cycles slices of any height
-need is measured by `python -m experiments.questions.several_pairs`:
+With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration
+such as conjugate gradients) send an order for each operation on them, and receive scalar products
+and displacements on the interface. How many V-cycles slices of any height need is measured by
+`python -m experiments.questions.several_pairs`:
 
 
 {coupled}
@@ -222,7 +247,8 @@ def work(out: str) -> None:
     if comm.rank:
         serve(comm)
         return
-    from experiments.questions import ranks  # orders name its functions by this name, not by __main__
+    # orders name its functions by this name, not by __main__
+    from experiments.questions import ranks
 
     team = ranks.TimedTeam(comm)
     try:

@@ -1,4 +1,6 @@
-"""How often does each method fail on random rigid-body problems with more contact unknowns than freedom?"""
+"""How often does each method fail on random rigid-body problems with more contact unknowns than
+freedom?
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def rigid_bodies(seed: int, bodies: int, contacts: int, mu: float) -> InterfaceP
             H[3 * c : 3 * c + 3, 6 * body : 6 * body + 3] = sign * frame
             H[3 * c : 3 * c + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
     inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
-    return InterfaceProblem((H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), mu)
+    return InterfaceProblem(
+        (H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), mu
+    )
 
 
 def measure(method: str, mu: float) -> dict[str, object]:
@@ -56,8 +60,9 @@ def measure(method: str, mu: float) -> dict[str, object]:
 
 
 TEXT = """Which methods solve problems whose contact forces are not unique? The problems are random rigid bodies: {sizes} (bodies, contacts), with {seeds} seeds
-each. Their matrix Q does not have full rank, and friction is strong or very strong. The certificate is 1e-8. Each method has at most {limit:g}
-s and {iterations} iterations per problem, and one BLAS thread.
+each. Their matrix Q does not have full rank, and friction is strong or very strong. The certificate
+is 1e-8. Each method has at most {limit:g} s and {iterations} iterations per problem, and one BLAS
+thread.
 
 {{rows}}
 """

@@ -1,4 +1,6 @@
-"""What do the paper's scenes look like? Its figures 1, 2, 3a and 3b for ours, into reports/figures/."""
+"""What do the paper's scenes look like? Its figures 1, 2, 3a and 3b for ours, into
+reports/figures/.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""Is an answer ever called solved that is none? Random problems of the kinds that fool a certificate.
+"""Is an answer ever called solved that is none? Random problems of the kinds that fool a
+certificate.
 
-`python -m experiments.questions.search_for_lies [CASES]`. Every answer that a method calls solved is checked by
-experiments.questions.coulomb_check, contact by contact, and by what the problem's making says: that it has no solution, or which
-reactions are the only ones.
+`python -m experiments.questions.search_for_lies [CASES]`. Every answer that a method calls solved
+is checked by experiments.questions.coulomb_check, contact by contact, and by what the problem's
+making says: that it has no solution, or which reactions are the only ones.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from experiments.questions.coulomb_check import violations  # noqa: E402
 
 METHODS = ("auto", "auto", "newton", "proximal", "nsgs")
 TOL, SLACK = 1e-8, 20.0  # the check's own conditions are combinations of the certificate's
-FORCES = 1e-3  # of the largest, by which the only reactions may be missed (condition of Q up to 1e4)
-SOLVABLE = ("plain", "null_space", "distant", "uneven")  # families whose problems all have solutions
+# of the largest, by which the only reactions may be missed (condition of Q up to 1e4)
+FORCES = 1e-3
+# families whose problems all have solutions
+SOLVABLE = ("plain", "null_space", "distant", "uneven")
 SCALES = (1e12, 1e-12), (1e-12, 1e12), (1e12, 1e12)  # of forces and lengths
 UNITS_OF = 6  # coprime to the number of methods, so that each of them is tried
 CASES = 10_000
@@ -69,7 +72,9 @@ def plain(rng, k, d):  # type: ignore[no-untyped-def]
 def null_space(rng, k, d):  # type: ignore[no-untyped-def]
     rank = int(rng.integers(1, k * d))
     A = rng.normal(size=(k * d, rank))
-    return dict(Q=A @ A.T / (k * d), q=(A @ rng.normal(size=rank)).reshape(k, d), mu=rng.uniform(0, 1, k))
+    return dict(
+        Q=A @ A.T / (k * d), q=(A @ rng.normal(size=rank)).reshape(k, d), mu=rng.uniform(0, 1, k)
+    )
 
 
 def distant(rng, k, d):  # type: ignore[no-untyped-def]
@@ -83,7 +88,9 @@ def distant(rng, k, d):  # type: ignore[no-untyped-def]
 
 
 def frictionless(Q, q, far):  # type: ignore[no-untyped-def]
-    """The normal reactions (k,) of the contacts that are not far, by trying all sets of closed ones."""
+    """The normal reactions (k,) of the contacts that are not far, by trying all sets of closed
+    ones.
+    """
     near = np.flatnonzero(~far)
     d = q.shape[1]
     for bits in range(2 ** len(near)):
@@ -128,28 +135,49 @@ def plate(rng, k, d):  # type: ignore[no-untyped-def]
     V[:, np.arange(d), np.arange(d)] = 1.0
     case["q"] *= 0.1
     s = np.concatenate([[-rng.uniform(0.5, 5)], rng.normal(size=d - 1)])
-    # All contacts move with the plate as one, so that their cones add up to the widest of them: it holds the plate or none does.
+    # All contacts move with the plate as one, so that their cones add up to the widest of them: it
+    # holds the plate or none does.
     held = np.linalg.norm(s[1:]) <= case["mu"].max() * -s[0]
     return case | {"V": V.reshape(k * d, d), "s": s, "feasible": bool(held)}
 
 
-FAMILIES = (infeasible, held, plain, null_space, distant, strong_friction, unsymmetric, uneven, plate)
+FAMILIES = (
+    infeasible,
+    held,
+    plain,
+    null_space,
+    distant,
+    strong_friction,
+    unsymmetric,
+    uneven,
+    plate,
+)
 
 
 def make(seed: int) -> tuple[str, dict]:
-    """The case of that seed: its family's name and its data, in units drawn at random from 1e-12 to 1e12."""
+    """The case of that seed: its family's name and its data, in units drawn at random from 1e-12 to
+    1e12.
+    """
     rng = np.random.default_rng(seed)
     family = FAMILIES[seed % len(FAMILIES)]
     k, d = int(rng.integers(1, 6)), int(rng.integers(2, 4))
-    case = {"V": np.zeros((k * d, 0)), "s": np.zeros(0), "feasible": None, "only": None} | family(rng, k, d)
+    case = {"V": np.zeros((k * d, 0)), "s": np.zeros(0), "feasible": None, "only": None} | family(
+        rng, k, d
+    )
     force, length = 10.0 ** rng.choice([0, 0, -12, 12, rng.uniform(-12, 12)], size=2)
-    case["Q"], case["q"], case["s"] = case["Q"] * (length / force), case["q"] * length, case["s"] * force
+    case["Q"], case["q"], case["s"] = (
+        case["Q"] * (length / force),
+        case["q"] * length,
+        case["s"] * force,
+    )
     case["only"] = None if case["only"] is None else case["only"] * force
     return family.__name__, case
 
 
 def answered(case: dict, seed: int, force: float = 1.0, length: float = 1.0):  # type: ignore[no-untyped-def]
-    """The answer of the case's method, and its problem, in other units; None where the load pulls the bodies apart."""
+    """The answer of the case's method, and its problem, in other units; None where the load pulls
+    the bodies apart.
+    """
     Q, q, s = case["Q"] * (length / force), case["q"] * length, case["s"] * force
     problem = InterfaceProblem(Q, q, case["mu"], case["V"], s)
     try:
@@ -163,7 +191,9 @@ def method_of(seed: int) -> str:
 
 
 def changed(case: dict, seed: int, answer: Solution) -> str:
-    """What is different in other units, of every UNITS_OF-th case of a family: the status, or an answer that was certified."""
+    """What is different in other units, of every UNITS_OF-th case of a family: the status, or an
+    answer that was certified.
+    """
     if seed // len(FAMILIES) % UNITS_OF or answer.status.label == "time_limit":
         return ""
     for force, length in SCALES:
@@ -171,10 +201,18 @@ def changed(case: dict, seed: int, answer: Solution) -> str:
         if other is None or other.status.label == "time_limit":
             continue
         if other.status != answer.status:
-            return f"{answer.status} becomes {other.status} with forces times {force:g} and lengths times {length:g}"
-        miss = np.abs(other.reactions / force - answer.reactions).max() / max(np.abs(answer.reactions).max(), 1e-300)
+            return (
+                f"{answer.status} becomes {other.status} with forces times {force:g} and lengths"
+                f" times {length:g}"
+            )
+        miss = np.abs(other.reactions / force - answer.reactions).max() / max(
+            np.abs(answer.reactions).max(), 1e-300
+        )
         if answer.solved and case["only"] is not None and miss > FORCES:
-            return f"the answer changes by {miss:.1e} with forces times {force:g} and lengths times {length:g}"
+            return (
+                f"the answer changes by {miss:.1e} with forces times {force:g} and lengths times"
+                f" {length:g}"
+            )
     return ""
 
 
@@ -193,7 +231,13 @@ def judge(seed: int) -> tuple[str, str, str]:
     if case["feasible"] is False:
         return name, "solved", "there is no solution"
     found = violations(
-        dense(problem.Q), problem.q, problem.mu, problem.V, problem.s, answer.reactions, answer.multipliers
+        dense(problem.Q),
+        problem.q,
+        problem.mu,
+        problem.V,
+        problem.s,
+        answer.reactions,
+        answer.multipliers,
     )
     worst = max(found, key=lambda key: found[key])
     if found[worst] > SLACK * TOL:
@@ -206,8 +250,9 @@ def judge(seed: int) -> tuple[str, str, str]:
 
 
 TEXT = """Does contactopt ever call an answer solved that is wrong? This report looks for such answers. It solves {cases} random problems (seeds 0 to
-{last}). The families of problems take turns, and so do the methods: {methods}. Forces and lengths are in units
-from 1e-12 to 1e12. The certificate asked for is {tol:g}, with at most 100 iterations or 1 s.
+{last}). The families of problems take turns, and so do the methods: {methods}. Forces and lengths
+are in units from 1e-12 to 1e12. The certificate asked for is {tol:g}, with at most 100 iterations
+or 1 s.
 
 A *lie* is one of the following:
 
@@ -217,9 +262,10 @@ A *lie* is one of the following:
 - an answer called solved that differs from the only contact forces there are by more than {forces:g} of the largest force;
 - a problem with a solution that is called infeasible.
 
-In one family a plate is held by contacts that move with it as one. There a solution exists if and only if |s_t| <= max mu |s_n|. Every {units}th
-case of a family is solved again with forces and lengths times {scales}. If the status changes, or if the answer
-changes where only one is right, this counts as a lie too.
+In one family a plate is held by contacts that move with it as one. There a solution exists if and
+only if |s_t| <= max mu |s_n|. Every {units}th case of a family is solved again with forces and
+lengths times {scales}. If the status changes, or if the answer changes where only one is right,
+this counts as a lie too.
 
 Lies: {lies}.
 
@@ -237,10 +283,14 @@ def report(results: list[tuple[str, str, str]]) -> None:
     for family in FAMILIES:
         mine = [(status, wrong) for name, status, wrong in results if name == family.__name__]
         counts = Counter(status for status, _ in mine)
-        row = {"family": family.__name__, "cases": len(mine)} | {status: counts[status] for status in statuses}
+        row = {"family": family.__name__, "cases": len(mine)} | {
+            status: counts[status] for status in statuses
+        }
         rows.append(row | {"lies": sum(bool(wrong) for _, wrong in mine)})
     lies = [(seed, *result) for seed, result in enumerate(results) if result[2]]
-    listed = "; ".join(f"seed {seed} ({name}): {wrong}" for seed, name, _, wrong in lies[:20]) or "none"
+    listed = (
+        "; ".join(f"seed {seed} ({name}): {wrong}" for seed, name, _, wrong in lies[:20]) or "none"
+    )
     text = TEXT.replace("{table}", "TABLE").format(
         cases=cases,
         last=cases - 1,
@@ -252,9 +302,21 @@ def report(results: list[tuple[str, str, str]]) -> None:
         units=UNITS_OF,
         scales=", ".join(f"({f:g}, {length:g})" for f, length in SCALES),
     )
-    write("search_for_lies", "A search for lies", text.replace("TABLE", "{table}"), {"table": rows}, {})
+    write(
+        "search_for_lies",
+        "A search for lies",
+        text.replace("TABLE", "{table}"),
+        {"table": rows},
+        {},
+    )
 
 
 if __name__ == "__main__":
     with ProcessPoolExecutor(PROCESSES) as pool:
-        report(list(pool.map(judge, range(int(sys.argv[1]) if len(sys.argv) > 1 else CASES), chunksize=50)))
+        report(
+            list(
+                pool.map(
+                    judge, range(int(sys.argv[1]) if len(sys.argv) > 1 else CASES), chunksize=50
+                )
+            )
+        )

@@ -33,7 +33,12 @@ SCENES: dict[str, tuple[Callable[[], Any], tuple[str, ...], tuple[str, ...], dic
         ("approach", "energy", "pressure:3", "pressure", "shear_force"),
         {},
     ),
-    "punch-3d": (lambda: scenes.flat_punch(3, elements=4), ("mu", "E:punch", "nu:punch"), ("approach", "energy"), {}),
+    "punch-3d": (
+        lambda: scenes.flat_punch(3, elements=4),
+        ("mu", "E:punch", "nu:punch"),
+        ("approach", "energy"),
+        {},
+    ),
     "sphere": (
         lambda: scenes.make_scene("sphere", elements=8),
         ("E", "nu", "force:sphere:z"),
@@ -57,7 +62,9 @@ SCENES: dict[str, tuple[Callable[[], Any], tuple[str, ...], tuple[str, ...], dic
 
 
 def random_problem(seed: int, dim: int) -> InterfaceProblem:
-    """Positive definite Q, every third one unsymmetric, every second pressed by a plate; 8 to 20 contacts."""
+    """Positive definite Q, every third one unsymmetric, every second pressed by a plate; 8 to 20
+    contacts.
+    """
     rng = np.random.default_rng(seed)
     k = int(rng.integers(8, 21))
     n, p = k * dim, seed % 2
@@ -71,14 +78,27 @@ def random_problem(seed: int, dim: int) -> InterfaceProblem:
 def directions(problem: InterfaceProblem, seed: int) -> dict[str, dict[str, np.ndarray]]:
     """One direction for each kind of data."""
     rng = np.random.default_rng(seed)
-    shapes = {"q": problem.q.shape, "mu": (problem.contacts,), "s": problem.s.shape, "V": problem.V.shape}
-    found = {name: {name: 0.2 * rng.normal(size=shape)} for name, shape in shapes.items() if np.prod(shape)}
+    shapes = {
+        "q": problem.q.shape,
+        "mu": (problem.contacts,),
+        "s": problem.s.shape,
+        "V": problem.V.shape,
+    }
+    found = {
+        name: {name: 0.2 * rng.normal(size=shape)}
+        for name, shape in shapes.items()
+        if np.prod(shape)
+    }
     return found | {"Q": {"Q": 0.1 * rng.normal(size=problem.Q.shape)}}
 
 
 def moved(problem: InterfaceProblem, change: dict[str, np.ndarray], t: float) -> InterfaceProblem:
-    data = {name: getattr(problem, name) + t * value for name, value in change.items() if name != "mu"}
-    return replace(problem, law=problem.law.shifted(t * change.get("mu", np.zeros(problem.contacts))), **data)
+    data = {
+        name: getattr(problem, name) + t * value for name, value in change.items() if name != "mu"
+    }
+    return replace(
+        problem, law=problem.law.shifted(t * change.get("mu", np.zeros(problem.contacts))), **data
+    )
 
 
 def paired(dual: Any, change: dict[str, np.ndarray]) -> float:
@@ -106,7 +126,13 @@ def against_differences(dim: int) -> list[dict[str, Any]]:
         dual = ours.adjoint(reactions=weight)
         for name, change in directions(problem, seed).items():
             ends = [
-                solve(moved(problem, change, t), "newton", tol=1e-14, start=solution, max_iterations=20)
+                solve(
+                    moved(problem, change, t),
+                    "newton",
+                    tol=1e-14,
+                    start=solution,
+                    max_iterations=20,
+                )
                 for t in (STEP, -STEP)
             ]
             found = ours.forward(**change)
@@ -129,7 +155,9 @@ def against_differences(dim: int) -> list[dict[str, Any]]:
 
 
 def at_kinks(seed: int, dim: int) -> tuple[InterfaceProblem, Solution]:
-    """Contact 0 grazes, 1 is between stick and slip, 2 is at the apex, 3 sticks, 4 slips, 5 is open."""
+    """Contact 0 grazes, 1 is between stick and slip, 2 is at the apex, 3 sticks, 4 slips, 5 is
+    open.
+    """
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(6 * dim, 6 * dim))
     Q = A @ A.T / (6 * dim) + 0.5 * np.eye(6 * dim)
@@ -140,7 +168,9 @@ def at_kinks(seed: int, dim: int) -> tuple[InterfaceProblem, Solution]:
     r[[1, 3, 4], 0] = 1.0, 1.5, 1.2
     r[1, 1:], r[3, 1:], r[4, 1:] = mu[1] * e[1], 0.4 * mu[3] * e[3], -1.2 * mu[4] * e[4]
     problem = InterfaceProblem(Q, u - (Q @ r.ravel()).reshape(r.shape), Coulomb(mu))
-    return problem, Solution(r, np.zeros(0), Status.SOLVED, natural_map_residual(problem, r, np.zeros(0)), 0, "exact")
+    return problem, Solution(
+        r, np.zeros(0), Status.SOLVED, natural_map_residual(problem, r, np.zeros(0)), 0, "exact"
+    )
 
 
 def one_sided() -> list[dict[str, Any]]:
@@ -157,7 +187,9 @@ def one_sided() -> list[dict[str, Any]]:
             wanted = (end.reactions - solution.reactions) / h
             error = np.abs(ours.forward(**change).reactions - wanted).max() / np.abs(wanted).max()
             worst = max(worst, float(error))
-        rows.append({"dim": dim, "problems": PROBLEMS // 2, "kinks named": named, "difference": worst})
+        rows.append(
+            {"dim": dim, "problems": PROBLEMS // 2, "kinks named": named, "difference": worst}
+        )
     return rows
 
 
@@ -171,7 +203,9 @@ def value(quantity: str, result: Solved) -> float:
 
 
 def through_scenes() -> list[dict[str, Any]]:
-    """The best of central differences with two steps, so that neither rounding nor curvature of the difference decides."""
+    """The best of central differences with two steps, so that neither rounding nor curvature of the
+    difference decides.
+    """
     rows = []
     for name, (make, names, quantities, settings) in SCENES.items():
         scene = make()
@@ -183,7 +217,9 @@ def through_scenes() -> list[dict[str, Any]]:
                 at, errors = which.read(scene), []
                 for relative in (1e-4, 1e-5):
                     h = relative * (abs(at) or 1.0)
-                    ends = [solved(which.put(scene, at + t), settings, base.solution) for t in (h, -h)]
+                    ends = [
+                        solved(which.put(scene, at + t), settings, base.solution) for t in (h, -h)
+                    ]
                     wanted = (value(quantity, ends[0]) - value(quantity, ends[1])) / (2 * h)
                     scale = max(abs(wanted), 1e-3 * abs(found.value / (at or 1.0)))
                     errors.append(abs(found.by[which.name] - wanted) / scale)
@@ -211,7 +247,9 @@ def cpu(act: Callable[[], Any], repeats: int = 5) -> float:
 
 
 def single_step(problem: InterfaceProblem, solution: Solution) -> float:
-    """CPU seconds of one dense Newton step at the solution, with its own factorisation; nan where Q is no array."""
+    """CPU seconds of one dense Newton step at the solution, with its own factorisation; nan where Q
+    is no array.
+    """
     if not isinstance(problem.Q, np.ndarray):
         return float("nan")
     scaled, scales = dimensionless(problem)
@@ -222,12 +260,18 @@ def single_step(problem: InterfaceProblem, solution: Solution) -> float:
 
 
 def costs() -> list[dict[str, Any]]:
-    """CPU seconds of all derivatives of one quantity, and of one step of the solve that they come from."""
+    """CPU seconds of all derivatives of one quantity, and of one step of the solve that they come
+    from.
+    """
     rows = []
     cases = (
         ("punch-2d, dense", lambda: scenes.flat_punch(2, elements=512), {"Q": "explicit"}),
         ("punch-3d, dense", lambda: scenes.flat_punch(3, elements=16), {"Q": "explicit"}),
-        ("punch-3d, multigrid", lambda: scenes.flat_punch(3, elements=10), {"Q": "implicit", "solver": "multigrid"}),
+        (
+            "punch-3d, multigrid",
+            lambda: scenes.flat_punch(3, elements=10),
+            {"Q": "implicit", "solver": "multigrid"},
+        ),
     )
     for name, make, settings in cases:
         reduction = reduce_bodies(make(), **settings)
@@ -238,7 +282,9 @@ def costs() -> list[dict[str, Any]]:
         weight = np.zeros(problem.q.shape)
         weight[:, 0] = np.linspace(0.0, 1.0, problem.contacts)
 
-        def linear(p: InterfaceProblem = problem, s: Solution = solution, w: np.ndarray = weight) -> None:
+        def linear(
+            p: InterfaceProblem = problem, s: Solution = solution, w: np.ndarray = weight
+        ) -> None:
             contactopt.sensitivity(p, s).adjoint(reactions=w).mu  # noqa: B018
 
         own = cpu(linear, 3)
@@ -257,7 +303,9 @@ def costs() -> list[dict[str, Any]]:
 
 
 def twenty() -> list[dict[str, Any]]:
-    """Twenty parameters: the gap at places of the punch in twenty smooth shapes, and materials, by gradient or by differences."""
+    """Twenty parameters: the gap at places of the punch in twenty smooth shapes, and materials, by
+    gradient or by differences.
+    """
     scene = scenes.flat_punch(2, elements=128)
     base = solved(scene, {})
     problem = base.reduction.problem
@@ -277,11 +325,16 @@ def twenty() -> list[dict[str, Any]]:
             q = problem.q.copy()
             q[:, 0] += h * shape
             there = replace(problem, q=q)
-            end = Solved(replace(base.reduction, problem=there), solve(there, tol=1e-12, start=base.solution))
+            end = Solved(
+                replace(base.reduction, problem=there), solve(there, tol=1e-12, start=base.solution)
+            )
             out.append((value("energy", end) - first) / h)
         for which in parameters(materials, scene):
             at = which.read(scene)
-            out.append((value("energy", solved(which.put(scene, at * (1 + h)), {}, base.solution)) - first) / (h * at))
+            out.append(
+                (value("energy", solved(which.put(scene, at * (1 + h)), {}, base.solution)) - first)
+                / (h * at)
+            )
         return np.array(out)
 
     fast, slow = cpu(ours), cpu(one_sided_difference, 3)
@@ -310,36 +363,43 @@ def table(part: str, rows: list[dict[str, Any]]) -> None:
 
 
 TEXT = f"""Are the derivatives of certified solutions right, and what do they cost? `contactopt.sensitivity` and `contactopt.gradient` are compared with
-differences of solved problems. A relative error is the largest error over all forces, over the largest derivative of a force.
+differences of solved problems. A relative error is the largest error over all forces, over the
+largest derivative of a force.
 
 {{random}}
 
-There are {PROBLEMS} random problems in each dimension, compared with central differences. Their Q is positive definite, and every third Q is not symmetric. Every second
-problem has a plate. Two kinds of problems are left out: those that were not solved to 1e-12, and those with a contact nearer to a kink
-than 1e-4 of the largest force. There the two ends of a difference may lie on different pieces of the solution.
+There are {PROBLEMS} random problems in each dimension, compared with central differences. Their Q
+is positive definite, and every third Q is not symmetric. Every second problem has a plate. Two
+kinds of problems are left out: those that were not solved to 1e-12, and those with a contact nearer
+to a kink than 1e-4 of the largest force. There the two ends of a difference may lie on different
+pieces of the solution.
 
-**At kinks.** Here three contacts are weakly active by construction: they are just between open and closed, or between stick and slip. One-sided differences have the step 1e-7:
+**At kinks.** Here three contacts are weakly active by construction: they are just between open and
+closed, or between stick and slip. One-sided differences have the step 1e-7:
 
 {{kinks}}
 
-**Scenes.** These are derivatives with respect to the parameters of a scene. There are two central differences, with the relative steps 1e-4
-and 1e-5, and the nearer one counts. Derivatives that are far below the size of the quantity are compared with a thousandth of it. `shear_force`,
-`energy` and the others are in units of N and mm:
+**Scenes.** These are derivatives with respect to the parameters of a scene. There are two central
+differences, with the relative steps 1e-4 and 1e-5, and the nearer one counts. Derivatives that are
+far below the size of the quantity are compared with a thousandth of it. `shear_force`, `energy` and
+the others are in units of N and mm:
 
 {{scenes}}
 
-**Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. The gradient of one function by all data (q, mu,
-s, Q, V) takes one factorisation with one solve, or one coupled linear solve to the relative accuracy 1e-11. It also takes the certificate
-of the solution. The whole solve is cheaper per step than a step that stands alone: with a dense Q its steps share one
-factorisation, and with multigrid its linear systems are solved to one or two digits only. The aim was the time of one dense step
-that factorises. This aim is missed. About half of the time of the gradient is spent around the factorisation: on the dimensionless
-copy of Q, on the check of the certificate, and on the check whether the bonded system is symmetric.
+**Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. The
+gradient of one function by all data (q, mu, s, Q, V) takes one factorisation with one solve, or one
+coupled linear solve to the relative accuracy 1e-11. It also takes the certificate of the solution.
+The whole solve is cheaper per step than a step that stands alone: with a dense Q its steps share
+one factorisation, and with multigrid its linear systems are solved to one or two digits only. The
+aim was the time of one dense step that factorises. This aim is missed. About half of the time of
+the gradient is spent around the factorisation: on the dimensionless copy of Q, on the check of the
+certificate, and on the check whether the bonded system is symmetric.
 
 {{costs}}
 
-**One adjoint solve against many differences.** The parameters are sixteen shapes of the gap and four constants of materials. The differences
-are one-sided and have warm starts. A difference by the gap solves the interface problem again. A difference by a constant also reduces the
-bodies again:
+**One adjoint solve against many differences.** The parameters are sixteen shapes of the gap and
+four constants of materials. The differences are one-sided and have warm starts. A difference by the
+gap solves the interface problem again. A difference by a constant also reduces the bodies again:
 
 {{twenty}}
 """

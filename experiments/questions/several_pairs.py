@@ -1,4 +1,5 @@
-"""Do the preconditioners fit several pairs of surfaces, unequal bodies, and one body that is cut into slices?
+"""Do the preconditioners fit several pairs of surfaces, unequal bodies, and one body that is cut
+into slices?
 
 `python -m experiments.questions.several_pairs` makes the tables and the report.
 """
@@ -15,7 +16,13 @@ from skfem import MeshHex, MeshQuad
 
 from contactopt import Contact, Material, Part, Scene, Support, reduce, scenes, solve
 from contactopt.linear.operators import held
-from contactopt.methods.preconditioners import Preconditioner, deflated, degrees, preconditioner, smooth_motions
+from contactopt.methods.preconditioners import (
+    Preconditioner,
+    deflated,
+    degrees,
+    preconditioner,
+    smooth_motions,
+)
 from contactopt.problem import InterfaceProblem, dimensionless
 from contactopt.scenes.slices import sliced
 from experiments.report import write
@@ -33,23 +40,36 @@ SLICED: tuple[tuple[int, int, int, dict[str, Any]], ...] = (
 
 
 def tower(dim: int, blocks: int, ratio: float, poissons: tuple[float, float]) -> Scene:
-    """Cubes on each other; the lowest and the highest are held at their far ends, those between by contact alone."""
+    """Cubes on each other; the lowest and the highest are held at their far ends, those between by
+    contact alone.
+    """
     kind = MeshQuad if dim == 2 else MeshHex
     across = np.linspace(0.0, 1.0, ELEMENTS[dim] + 1)
     parts = []
     for i in range(blocks):
         mesh = kind.init_tensor(*[across] * (dim - 1), across + i)
-        ends = {name: lambda x, at=i + up: np.abs(x[-1] - at) < 1e-9 for up, name in enumerate(("below", "above"))}
+        ends = {
+            name: lambda x, at=i + up: np.abs(x[-1] - at) < 1e-9
+            for up, name in enumerate(("below", "above"))
+        }
         material = Material(ratio if i % 2 else 1.0, poissons[i % 2])
         supports = (Support("below"),) if i == 0 else (Support("above"),) if i == blocks - 1 else ()
         contact = "above" if i == 0 else "below"
-        parts.append(Part(f"block-{i + 1}", mesh.with_boundaries(ends), material, supports, contact=contact))
-    pairs = tuple(Contact(f"block-{i + 1}:below", f"block-{i}:above", 0.5) for i in range(1, blocks))
-    return Scene("tower", bodies=tuple(parts), contacts=pairs, kind="plane-strain" if dim == 2 else "solid")
+        parts.append(
+            Part(f"block-{i + 1}", mesh.with_boundaries(ends), material, supports, contact=contact)
+        )
+    pairs = tuple(
+        Contact(f"block-{i + 1}:below", f"block-{i}:above", 0.5) for i in range(1, blocks)
+    )
+    return Scene(
+        "tower", bodies=tuple(parts), contacts=pairs, kind="plane-strain" if dim == 2 else "solid"
+    )
 
 
 def judged(problem: InterfaceProblem, P: Preconditioner) -> tuple[float, int]:
-    """Condition of P Q on the forces that free motions bear, and iterations of projected conjugate gradients to 1e-8."""
+    """Condition of P Q on the forces that free motions bear, and iterations of projected conjugate
+    gradients to 1e-8.
+    """
     Q, moves = problem.Q, ~held(problem.Q)
     V = problem.V * moves[:, None]
     N = la.null_space(V[moves].T) if V.shape[1] else np.eye(int(moves.sum()))
@@ -95,7 +115,9 @@ def of_slices(dim: int, elements: int, count: int, options: dict[str, Any]) -> d
     solution = solve(problem, "newton", tol=TOL, max_iterations=MOST)
     spent = time.process_time() - begin
     whole = solve(reduce(scene, Q="explicit"), tol=1e-10).reactions
-    error = np.abs(solution.reactions[problem.pairs[0].contacts] - whole).max() / np.abs(whole).max()
+    error = (
+        np.abs(solution.reactions[problem.pairs[0].contacts] - whole).max() / np.abs(whole).max()
+    )
     coupled = problem.Q.coupled
     return {
         "dimension": dim,
@@ -113,22 +135,25 @@ def of_slices(dim: int, elements: int, count: int, options: dict[str, Any]) -> d
 
 
 TEXT = """Condition numbers and iterations of conjugate gradients to 1e-8 from a random right-hand side, with smooth motions deflated, on
-the forces that the free motions of bodies held by contact alone can bear. Every pair has its own block and its own scale.
+the forces that the free motions of bodies held by contact alone can bear. Every pair has its own
+block and its own scale.
 
 ## Towers of cubes
 
-Cubes of unequal stiffness on each other; the ratio of stiffness alternates from cube to cube, and so does Poisson's ratio. The worst
-condition number is {condition:.1f}, the most iterations are {iterations}. Above 10 or above 30 iterations are {above} of {rows} rows:
-{which}, the first of them that of the stiffer body.
+Cubes of unequal stiffness on each other; the ratio of stiffness alternates from cube to cube, and
+so does Poisson's ratio. The worst condition number is {condition:.1f}, the most iterations are
+{iterations}. Above 10 or above 30 iterations are {above} of {rows} rows: {which}, the first of them
+that of the stiffer body.
 
 {{blocks}}
 
 ## One body cut into slices
 
-The foundation under a punch with friction, cut into slices of equal numbers of elements and graded heights; all but the lowest are held by
-tied pairs alone. Newton's method from products with Q (superlu), or from V-cycles on all bodies at once (multigrid), to a
-residual of 1e-8. The degree of the smooth motions grows with the width of a slice over its height. V-cycles do not include those of the
-products that deflation needs.
+The foundation under a punch with friction, cut into slices of equal numbers of elements and graded
+heights; all but the lowest are held by tied pairs alone. Newton's method from products with Q
+(superlu), or from V-cycles on all bodies at once (multigrid), to a residual of 1e-8. The degree of
+the smooth motions grows with the width of a slice over its height. V-cycles do not include those of
+the products that deflation needs.
 
 {{slices}}
 """
@@ -158,7 +183,13 @@ def main() -> None:
         rows=len(blocks),
     )
     tables = {"blocks": blocks, "slices": slices}
-    write("several_pairs", "Several pairs of surfaces, unequal bodies, slices of one body", text, tables, {})
+    write(
+        "several_pairs",
+        "Several pairs of surfaces, unequal bodies, slices of one body",
+        text,
+        tables,
+        {},
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""Which elimination order, sparse product, precision and constants of multigrid are best for the bodies?"""
+"""Which elimination order, sparse product, precision and constants of multigrid are best for the
+bodies?
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,10 @@ def system(scene: Scene, part: str, elements: int) -> System:
     body = build_body(scene, getattr(scene, part), elements, scene.zone)
     unknowns, free = body.unknowns, body.free
     node, component = np.empty(len(body.load), int), np.empty(len(body.load), int)
-    node[unknowns], component[unknowns] = np.arange(unknowns.shape[1]), np.arange(len(unknowns))[:, None]
+    node[unknowns], component[unknowns] = (
+        np.arange(unknowns.shape[1]),
+        np.arange(len(unknowns))[:, None],
+    )
     last = np.flatnonzero(np.isin(free, body.contact_dofs))
     return System(body.A[free][:, free], node[free], component[free], body.locations, last)
 
@@ -91,14 +96,19 @@ def orders() -> list[dict[str, Any]]:
 def kinds(asked: System) -> list[dict[str, Any]]:
     """One product with the stiffness by either library, in either form and precision."""
     rows = []
-    for form, A in (("CSR", asked.A), ("BSR", multigrid.nodal_blocks(*asked[:3], len(asked.points))[0])):
+    for form, A in (
+        ("CSR", asked.A),
+        ("BSR", multigrid.nodal_blocks(*asked[:3], len(asked.points))[0]),
+    ):
         for precision in (np.float64, np.float32):
             row: dict[str, Any] = {"form": form, "precision": precision.__name__}
             x = np.ones(A.shape[1], dtype=precision)
             for library, found in (("oneMKL", products.library), ("SciPy", lambda: None)):
                 with setting(products, "library", found):
                     product = SparseProduct(A.astype(precision))
-                    row[f"{library} [ms]"] = 1e3 * fastest(lambda p=product, x=x: [p @ x for _ in range(10)]) / 10
+                    row[f"{library} [ms]"] = (
+                        1e3 * fastest(lambda p=product, x=x: [p @ x for _ in range(10)]) / 10
+                    )
             rows.append(row)
     return rows
 
@@ -141,9 +151,11 @@ def constants(asked: System) -> list[dict[str, Any]]:
 
 
 TEXT = f"""Processor seconds of one thread, the least of {REPEATS} runs. Products, precisions and constants: the foundation of punch-3d with
-{SOLID} elements across the contact half-width, a random load on the contact, to an accuracy of {RTOL:g}.
+{SOLID} elements across the contact half-width, a random load on the contact, to an accuracy of
+{RTOL:g}.
 
-Elimination orders with SuperLU. Implicit Q: nothing is kept to the end. Explicit Q: the contact unknowns are eliminated last.
+Elimination orders with SuperLU. Implicit Q: nothing is kept to the end. Explicit Q: the contact
+unknowns are eliminated last.
 
 {{orders}}
 
@@ -168,4 +180,10 @@ if __name__ == "__main__":
         "precision": precisions(foundation),
         "constants": constants(foundation),
     }
-    write("solver_constants", "Orders, products and constants of the solvers of bodies", TEXT, tables, {})
+    write(
+        "solver_constants",
+        "Orders, products and constants of the solvers of bodies",
+        TEXT,
+        tables,
+        {},
+    )

@@ -1,6 +1,8 @@
-"""What is each number of contactopt.methods.constants worth? Half and twice of it, one at a time, over problems of several kinds.
+"""What is each number of contactopt.methods.constants worth? Half and twice of it, one at a time,
+over problems of several kinds.
 
-Names of constants after the command choose some of them. Their rows are then printed, and no report is written.
+Names of constants after the command choose some of them. Their rows are then printed, and no report
+is written.
 """
 
 from __future__ import annotations
@@ -25,23 +27,27 @@ from experiments.questions.robustness import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 HOME = "contactopt.methods"
-USERS = {  # names of constants -> module that uses them, method that is run, kinds of problems that feel them
-    (
-        "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER"
-    ): (
+# names of constants -> module that uses them, method that is run, kinds of problems that feel them
+USERS = {
+    "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
         "auto",
         "auto",
         ("elastic", "rigid", "packing"),
     ),
     "FALL RISE GENTLE_FALL GENTLE_RISE EASY": ("proximal", "proximal", ("elastic", "rigid")),
-    "SUBPROBLEM_STEPS SHORTEST MEMORY ENOUGH": ("kernels.sparse_newton", "proximal", ("elastic", "rigid")),
+    "SUBPROBLEM_STEPS SHORTEST MEMORY ENOUGH": (
+        "kernels.sparse_newton",
+        "proximal",
+        ("elastic", "rigid"),
+    ),
     "LOOSE": ("kernels.alart_curnier", "newton", ("elastic",)),
     "SMALL FULL": ("kernels.sparse_blocks", "auto", ("packing",)),
     "SHARPER SHARPEST": ("apg", "apg", ("coarse",)),
-    (
-        "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING MOST_SMOOTHING PREDICTED "
-        "BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK"
-    ): ("kernels.interior", "auto", ("rigid", "packing")),
+    "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK": (
+        "kernels.interior",
+        "auto",
+        ("rigid", "packing"),
+    ),
     "KRYLOV_LOOSEST KRYLOV_TIGHTEST": ("kernels.alart_curnier", "newton", ("products",)),
     "PRODUCT_SHARE MODEL_STEP MODEL_PRODUCTS": ("kernels.krylov", "newton", ("products",)),
     "SLIPPING": ("kernels.linearised", "newton", ("products",)),
@@ -51,13 +57,21 @@ USERS = {  # names of constants -> module that uses them, method that is run, ki
         "newton",
         ("bodies",),
     ),
-    "COARSEST LEAST_SYMBOL LEAST_DETERMINANT FIRST_SHIFT SHIFT_RATIO": ("kernels.levels", "nested", ("half-spaces",)),
+    "COARSEST LEAST_SYMBOL LEAST_DETERMINANT FIRST_SHIFT SHIFT_RATIO": (
+        "kernels.levels",
+        "nested",
+        ("half-spaces",),
+    ),
     "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS": (
         "nested",
         "nested",
         ("half-spaces",),
     ),
-    "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": ("kernels.mprgp", "lagrangian", ("coarse",)),
+    "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": (
+        "kernels.mprgp",
+        "lagrangian",
+        ("coarse",),
+    ),
     "ROUGH_NORMAL": ("lagrangian", "lagrangian", ("coarse",)),
     "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("admm", "admm", ("coarse",)),
 }
@@ -69,13 +83,23 @@ NEAR_ONE = 0.8  # shares from here to one are changed by their distance from one
 
 def problems() -> dict[str, list[InterfaceProblem]]:
     """The problems of each kind."""
-    punches = [reduce(scenes.flat_punch(2, mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)]
+    punches = [
+        reduce(scenes.flat_punch(2, mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)
+    ]
     spheres = [reduce(scenes.sphere(mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)]
     rigid = [rigid_bodies(seed, 10, 40, mu) for seed in range(3) for mu in (0.3, 1.0, 3.0)]
-    grains = [packing(dim, 40, seed, mu, points) for seed in range(2) for dim, mu, points in ((2, 0.3, 1), (3, 0.8, 2))]
+    grains = [
+        packing(dim, 40, seed, mu, points)
+        for seed in range(2)
+        for dim, mu, points in ((2, 0.3, 1), (3, 0.8, 2))
+    ]
     scenes_of_products = (scenes.flat_punch(2, mu=0.5), scenes.sphere(mu=0.5))
-    products = [reduce(scene, elements=n, Q="implicit") for scene in scenes_of_products for n in (32, 128)]
-    bodies = [reduce(scenes.flat_punch(3, mu=mu), elements=6, solver="multigrid") for mu in (0.1, 0.5)]
+    products = [
+        reduce(scene, elements=n, Q="implicit") for scene in scenes_of_products for n in (32, 128)
+    ]
+    bodies = [
+        reduce(scenes.flat_punch(3, mu=mu), elements=6, solver="multigrid") for mu in (0.1, 0.5)
+    ]
     made = (scenes.hertz_half_space(), scenes.cattaneo_half_space(), scenes.rough())
     return {
         "elastic": punches + spheres,
@@ -103,7 +127,9 @@ def setting(name: str, value: Any) -> Iterator[None]:
 def cost(method: str, asked: list[InterfaceProblem]) -> tuple[int, float]:
     """How many of the problems are certified, and the processor seconds of all."""
     start = time.process_time()
-    solved = sum(solve(problem, BUILT.get(method, method), max_iterations=LIMIT).solved for problem in asked)
+    solved = sum(
+        solve(problem, BUILT.get(method, method), max_iterations=LIMIT).solved for problem in asked
+    )
     return solved, time.process_time() - start
 
 
@@ -124,7 +150,12 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
             if (method, kinds) not in known:
                 known[method, kinds] = cost(method, asked)
             solved, seconds = known[method, kinds]
-            row = {"constant": name, "value": value, "method": method, "certified": f"{solved} of {len(asked)}"}
+            row = {
+                "constant": name,
+                "value": value,
+                "method": method,
+                "certified": f"{solved} of {len(asked)}",
+            }
             row["seconds"] = seconds
             for label, factor in (("half", 0.5), ("twice", 2.0)):
                 with setting(name, changed(value, factor)):
@@ -136,10 +167,12 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
 
 
 TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one at a time: how many problems are certified
-(residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value itself. Of shares near one the
-distance from one is halved and doubled. The problems: {elastic} of elastic
-bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies, {packing} packings of rigid bodies with a sparse Q, {products} of elastic bodies known by products
-with Q, {bodies} of bodies that are solved by iteration, {halves} of half-spaces; one run each, one thread; the same run twice differs by up to {noise:.0%}.
+(residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value
+itself. Of shares near one the distance from one is halved and doubled. The problems: {elastic} of
+elastic bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of
+random rigid bodies, {packing} packings of rigid bodies with a sparse Q, {products} of elastic
+bodies known by products with Q, {bodies} of bodies that are solved by iteration, {halves} of
+half-spaces; one run each, one thread; the same run twice differs by up to {noise:.0%}.
 
 {{rows}}
 """
@@ -153,4 +186,10 @@ if __name__ == "__main__":
     twice = [cost("auto", sets["elastic"] + sets["rigid"])[1] for _ in range(3)]
     halves = counts.pop("half-spaces")
     text = TEXT.format(limit=LIMIT, noise=max(twice) / min(twice) - 1, halves=halves, **counts)
-    write("solving_constants", "What the numbers of the methods are worth", text, {"rows": measure([])}, {})
+    write(
+        "solving_constants",
+        "What the numbers of the methods are worth",
+        text,
+        {"rows": measure([])},
+        {},
+    )

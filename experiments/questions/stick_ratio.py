@@ -20,7 +20,12 @@ ELEMENTS = (64, 128, 256)
 
 def measure(width: float, elements: int) -> dict[str, object]:
     scene = scenes.flat_punch(
-        2, rigid="punch", mu=0.3, foundation_width=width, foundation_height=width / 2, elements=elements
+        2,
+        rigid="punch",
+        mu=0.3,
+        foundation_width=width,
+        foundation_height=width / 2,
+        elements=elements,
     )
     start = time.perf_counter()
     problem = reduce(scene)
@@ -45,7 +50,12 @@ def draw(rows: list[dict]) -> Figure:
         chosen = [row for row in rows if row["elements per a"] == elements]
         x = [row["foundation width / a"] for row in chosen]
         ax.semilogx(
-            x, [row["c / a"] for row in chosen], style, color=colour, mfc="white", label=f"{elements} elements per a"
+            x,
+            [row["c / a"] for row in chosen],
+            style,
+            color=colour,
+            mfc="white",
+            label=f"{elements} elements per a",
         )
     ax.axhline(EXACT, color=GREY, lw=1, label="half-plane (exact)")
     ax.set(xlabel="foundation width / punch half-width [-]", ylabel="stick ratio c / a [-]")
@@ -54,12 +64,13 @@ def draw(rows: list[dict]) -> Figure:
 
 
 TEXT = """How large is the stick zone under a rigid flat punch? The punch presses on an elastic foundation that is clamped below, in plane strain,
-with nu = mu = .3. The *stick ratio* is the half-width of the stick zone over that of the contact. On a half-plane it is exactly
-{exact:.6f} (Spence's problem, fully coupled).
+with nu = mu = .3. The *stick ratio* is the half-width of the stick zone over that of the contact.
+On a half-plane it is exactly {exact:.6f} (Spence's problem, fully coupled).
 
-A finite foundation is squeezed and held sideways. This lowers the tangential load, so that the stick zone becomes too wide. Its error vanishes only
-when the foundation is about a thousand half-widths wide. On a mesh that is graded away from the contact, so large a foundation
-costs little.
+A finite foundation is squeezed and held sideways. This lowers the tangential load, so that the
+stick zone becomes too wide. Its error vanishes only when the foundation is about a thousand
+half-widths wide. On a mesh that is graded away from the contact, so large a foundation costs
+little.
 
 {{rows}}
 """

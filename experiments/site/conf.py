@@ -1,9 +1,10 @@
 """Sphinx configuration. Build: python -m sphinx -W --keep-going -b html experiments/site out/site
 
-MyST-NB reads the tutorials as they are, percent scripts through jupytext, executes them and renders their Markdown like
-that of every other page. So one file is script, test, notebook and page; sphinx-gallery would need its text in
-reStructuredText, and would not make a notebook that Jupyter and VS Code open from the same file. MathJax comes with
-sphinx-mathjax-offline: pages load nothing from elsewhere, neither when they are built nor when they are read.
+MyST-NB reads the tutorials as they are, percent scripts through jupytext, executes them and renders
+their Markdown like that of every other page. So one file is script, test, notebook and page;
+sphinx-gallery would need its text in reStructuredText, and would not make a notebook that Jupyter
+and VS Code open from the same file. MathJax comes with sphinx-mathjax-offline: pages load nothing
+from elsewhere, neither when they are built nor when they are read.
 """
 
 import sys
@@ -37,7 +38,8 @@ myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode, nb_execution_timeout = "force", 180
-nb_execution_excludepatterns = ["**/solutions_*"]  # a second run of the chapters; the tests execute the solutions
+# a second run of the chapters; the tests execute the solutions
+nb_execution_excludepatterns = ["**/solutions_*"]
 nb_execution_raise_on_error, nb_execution_in_temp, nb_merge_streams = True, True, True
 
 autodoc_member_order, autodoc_typehints = "bysource", "signature"
@@ -47,7 +49,10 @@ maximum_signature_line_length = 100
 
 def setup(app):
     """Register the reader of docstrings, and write the pages that are made from tables."""
-    app.connect("autodoc-process-docstring", lambda app, what, name, thing, options, lines: docstrings.as_rst(lines))
+    app.connect(
+        "autodoc-process-docstring",
+        lambda app, what, name, thing, options, lines: docstrings.as_rst(lines),
+    )
     app.connect(
         "autodoc-process-signature",
         lambda app, what, name, thing, options, signature, returns: (

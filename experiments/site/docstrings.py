@@ -6,14 +6,18 @@ import re
 
 
 def as_rst(lines: list[str]) -> list[str]:
-    """Docstrings are plain text: aligned and indented lines become literal, the rest is kept from meaning anything.
+    """Docstrings are plain text: aligned and indented lines become literal, the rest is kept from
+    meaning anything.
 
-    NumPy's sections, whose titles are underlined with dashes, become rubrics over lists of definitions.
+    NumPy's sections, whose titles are underlined with dashes, become rubrics over lists of
+    definitions.
 
     Changes `lines` in place, as autodoc wants it, and returns it.
     """
     out: list[str] = []
-    kind = "prose"  # of the line before: prose, item (of a numbered list), literal or section (of a NumPy docstring)
+    # of the line before: prose, item (of a numbered list), literal or section (of a NumPy
+    # docstring)
+    kind = "prose"
     for line, following in zip(lines, [*lines[1:], ""]):
         if re.fullmatch(r"-{3,}", following) and line.strip():
             out += ["", f".. rubric:: {line.strip()}", ""]
@@ -21,7 +25,9 @@ def as_rst(lines: list[str]) -> list[str]:
             continue
         if kind == "section":
             if not re.fullmatch(r"-{3,}", line):
-                term = line[:1] != " " and (following[:1] == " " or re.match(r"[\w, ]+ : ", line) is not None)
+                term = line[:1] != " " and (
+                    following[:1] == " " or re.match(r"[\w, ]+ : ", line) is not None
+                )
                 out += [""] if term else []
                 out.append(f"    {_plain(line.strip())}" if line[:1] == " " else _plain(line))
             continue
@@ -48,6 +54,7 @@ def _plain(text: str) -> str:
     if len(parts) % 2 == 0:  # a stray backtick: none is code
         parts = [text.replace("`", "'")]
     escaped = [
-        re.sub(r"([*|\\]|(?<=\w)_(?!\w))", r"\\\1", p) if i % 2 == 0 else f"``{p}``" for i, p in enumerate(parts)
+        re.sub(r"([*|\\]|(?<=\w)_(?!\w))", r"\\\1", p) if i % 2 == 0 else f"``{p}``"
+        for i, p in enumerate(parts)
     ]
     return "".join(escaped)

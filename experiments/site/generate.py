@@ -1,4 +1,7 @@
-"""Pages made from what the project already holds: tables, docstrings, tutorials, reports. Written to `generated/`."""
+"""Pages made from what the project already holds: tables, docstrings, tutorials, reports.
+
+Written to `generated/`.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,9 @@ PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
 
 def write_pages(site: Path) -> None:
-    """Write site/generated from scratch; a file that has not changed keeps its time, so that it is not read again."""
+    """Write site/generated from scratch; a file that has not changed keeps its time, so that it is
+    not read again.
+    """
     folder, pages = site / "generated", dict(all_pages(site))
     for path in folder.rglob("*") if folder.exists() else ():
         if path.is_file() and path.relative_to(folder) not in pages:
@@ -69,7 +74,10 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     ordered = [name for name in TUTORIALS if name in found] + sorted(set(found) - set(TUTORIALS))
     for name in ordered:
         yield from notebook("tutorials", name, found[name].read_text())
-    yield Path("tutorials.md"), index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered])
+    yield (
+        Path("tutorials.md"),
+        index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered]),
+    )
     yield from course(site)
     yield from reference.plug_in_pages(site)
     yield Path("command_line.md"), command_line()
@@ -78,9 +86,15 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     listed = (ROOT / "reports" / "README.md").read_text()
     yield Path("measured.md"), re.sub(r"\((\w+)/report\.md\)", r"(reports/\1.md)", listed)
     about = [name for name in ACCURACY if name in reports]
-    for page, names in (("accuracy", about), ("performance", [name for name in reports if name not in about])):
+    for page, names in (
+        ("accuracy", about),
+        ("performance", [name for name in reports if name not in about]),
+    ):
         text = (site / f"{page}.md").read_text() + "".join(opening(reports[name]) for name in names)
-        yield Path(f"{page}.md"), text + contents([f"reports/{name}" for name in names], hidden=True)
+        yield (
+            Path(f"{page}.md"),
+            text + contents([f"reports/{name}" for name in names], hidden=True),
+        )
     for name, path in reports.items():
         yield Path("reports", f"{name}.md"), report(path)
         for picture in PICTURE.findall(path.read_text()):
@@ -89,21 +103,27 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
 
 
 TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page of this site. It takes ten to fifteen minutes
-to read. The code checks every claim by an assertion. The exercises have hidden solutions: click on *Solution* to open one.
-[The course](course.md) says how to open a notebook.
+to read. The code checks every claim by an assertion. The exercises have hidden solutions: click on
+*Solution* to open one. [The course](course.md) says how to open a notebook.
 """
 
 
 # A page that is not executed does not know its language otherwise.
-PYTHON = "# ---\n# jupyter:\n#   language_info:\n#     name: python\n#     pygments_lexer: python\n# ---\n\n"
+PYTHON = (
+    "# ---\n# jupyter:\n#   language_info:\n#     name: python\n#     pygments_lexer: python\n#"
+    " ---\n\n"
+)
 
 
 def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tuple[Path, str]]:
-    """A percent script as a page that offers the notebook, and the notebook; `head` describes a page that is not executed."""
+    """A percent script as a page that offers the notebook, and the notebook; `head` describes a
+    page that is not executed.
+    """
     title, rest = text.split("\n", 2)[1], text.split("\n", 2)[2]
     offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
     yield Path(folder, f"{name}.py"), f"{head}# %% [markdown]\n{title}\n{offer}\n{rest}"
-    local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)  # notebooks of one folder refer to each other
+    # notebooks of one folder refer to each other
+    local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)
     book = jupytext.reads(local, "py:percent")
     for cell in book.cells:  # what the page folds, JupyterLab folds too
         if "hide-input" in cell.metadata.get("tags", []):
@@ -113,12 +133,19 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
 
 def course(site: Path) -> Iterator[tuple[Path, str]]:
     """Each chapter twice: with exercises to answer, and with their solutions."""
-    chapters = {path.stem: path.read_text() for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))}
+    chapters = {
+        path.stem: path.read_text()
+        for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))
+    }
     for name, text in chapters.items():
         yield from notebook("course", name, without_cells(text, "solution"))
-        solved = re.sub(r"^# # (Chapter \d)", r"# # Solutions: \1", without_cells(text, "exercise"), flags=re.M)
+        solved = re.sub(
+            r"^# # (Chapter \d)", r"# # Solutions: \1", without_cells(text, "exercise"), flags=re.M
+        )
         yield from notebook("course", f"solutions_{name}", solved, PYTHON)
-    pages = [f"course/{name}" for name in chapters] + [f"course/solutions_{name}" for name in chapters]
+    pages = [f"course/{name}" for name in chapters] + [
+        f"course/solutions_{name}" for name in chapters
+    ]
     yield Path("course.md"), (site / "course.md").read_text() + contents(pages, hidden=False)
 
 
@@ -131,7 +158,9 @@ def without_cells(text: str, tag: str) -> str:
 def command_line() -> str:
     """The help of every command."""
     parser = contactopt.cli.make_parser()
-    commands = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction)).choices
+    commands = next(
+        action for action in parser._actions if isinstance(action, argparse._SubParsersAction)
+    ).choices
     pages = [f"# Command line\n\n{inspect.getdoc(contactopt.cli)}\n"]
     for name, command in commands.items():
         command.formatter_class = partial(command.formatter_class, width=100)
@@ -167,4 +196,7 @@ def opening(path: Path) -> str:
     first = next((p for p in paragraphs if p[0] not in "|#!"), "")
     picture = PICTURE.search(text)
     shown = f"{picture[0]}\n\n" if picture else ""
-    return f"\n## {title.removeprefix('# ')}\n\n{first}\n\n{shown}[All of this report](reports/{name_of(path)}.md)\n"
+    return (
+        f"\n## {title.removeprefix('# ')}\n\n{first}\n\n{shown}[All of this"
+        f" report](reports/{name_of(path)}.md)\n"
+    )

@@ -1,4 +1,6 @@
-"""The pages to look things up: one for each room of the package, and one for each table of plug-ins."""
+"""The pages to look things up: one for each room of the package, and one for each table of
+plug-ins.
+"""
 
 from __future__ import annotations
 
@@ -24,28 +26,61 @@ from contactopt.scenes import PATHS, SCENES
 
 Pages = Iterator[tuple[Path, str | Path]]
 
-# What each room of the package is for. The rooms themselves are read from the layers in pyproject.toml.
+# What each room of the package is for. The rooms themselves are read from the layers in
+# pyproject.toml.
 ROOMS = {
     "cli": "The command line reads the options and prints what `run` returns.",
     "runner": "One call leads from a scene to its solution, its figures and its files.",
-    "benchmark": "Campaigns run methods on problems, each run in a process of its own, and write tables and reports.",
+    "benchmark": (
+        "Campaigns run methods on problems, each run in a process of its own, and write tables and"
+        " reports."
+    ),
     "figures": "Results are drawn here.",
-    "simplification": "What may be left out of a scene is found here, and proved by the whole scene.",
-    "accuracy": "Meshes are refined until the estimated error of the quantity asked for is small enough.",
-    "derivatives": "Solutions are differentiated here; parameters are fitted to data, profiles and loads are designed.",
+    "simplification": (
+        "What may be left out of a scene is found here, and proved by the whole scene."
+    ),
+    "accuracy": (
+        "Meshes are refined until the estimated error of the quantity asked for is small enough."
+    ),
+    "derivatives": (
+        "Solutions are differentiated here; parameters are fitted to data, profiles and loads are"
+        " designed."
+    ),
     "solving": "One place solves a scene. The contact zone and load paths are loops around it.",
-    "readings": "Quantities are read off a solved scene: edges, peaks, resultants, stresses at places.",
-    "coupling": "Surfaces are matched here or joined by mortar. The bodies become one interface problem, and its solution becomes displacements.",
-    "bodies": "One elastic body is assembled here: its elements, its stiffness matrix, and the solvers of its linear systems.",
-    "scenes": "A scene says what is modelled: bodies, materials, supports and loads. The named scenes are here too.",
+    "readings": (
+        "Quantities are read off a solved scene: edges, peaks, resultants, stresses at places."
+    ),
+    "coupling": (
+        "Surfaces are matched here or joined by mortar. The bodies become one interface problem,"
+        " and its solution becomes displacements."
+    ),
+    "bodies": (
+        "One elastic body is assembled here: its elements, its stiffness matrix, and the solvers of"
+        " its linear systems."
+    ),
+    "scenes": (
+        "A scene says what is modelled: bodies, materials, supports and loads. The named scenes are"
+        " here too."
+    ),
     "meshes": "Meshes are read from files, repaired, made and refined here.",
-    "methods": "The methods stand here, with the driver that calls them and the parts that they share. Nothing here knows finite elements.",
+    "methods": (
+        "The methods stand here, with the driver that calls them and the parts that they share."
+        " Nothing here knows finite elements."
+    ),
     "models": "The convex programs of the subject are written in cvxpy, as on a blackboard.",
-    "teaching": "The notebooks of the course share these parts: exercises that grade themselves, and sliders.",
+    "teaching": (
+        "The notebooks of the course share these parts: exercises that grade themselves, and"
+        " sliders."
+    ),
     "fclib": "Problems are exchanged with the FCLib collection.",
     "analytic": "Exact solutions are computed here, to compare the computed ones with.",
-    "problem": "The interface problem, its solution and its certificate are defined here. This room is about optimisation only.",
-    "linear": "Linear algebra that knows no mechanics: operators, convolutions, stacked vectors, threads.",
+    "problem": (
+        "The interface problem, its solution and its certificate are defined here. This room is"
+        " about optimisation only."
+    ),
+    "linear": (
+        "Linear algebra that knows no mechanics: operators, convolutions, stacked vectors, threads."
+    ),
     "material": "An elastic material has two constants, which are defined here.",
     "files": "Files are written whole or not at all, and messages about TOML name the line.",
     "checks": "The numbers that a user gives are checked here.",
@@ -68,7 +103,12 @@ def contents(pages: list[str], hidden: bool) -> str:
 def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     """A table in Markdown."""
     lines = [head, tuple("---" for _ in head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines) + "\n"
+    return (
+        "\n".join(
+            "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines
+        )
+        + "\n"
+    )
 
 
 # --- the rooms ---
@@ -76,17 +116,28 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 
 def rooms(root: Path) -> list[str]:
     """The rooms of the package from the bottom up, in the order of the layers in pyproject.toml."""
-    contracts = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    contracts = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["importlinter"][
+        "contracts"
+    ]
     layers = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
-    return [room.strip().removeprefix("contactopt.") for layer in reversed(layers) for room in layer.split("|")]
+    return [
+        room.strip().removeprefix("contactopt.")
+        for layer in reversed(layers)
+        for room in layer.split("|")
+    ]
 
 
 def room_pages(root: Path) -> Pages:
-    """The reference: the names that `contactopt` offers, the rooms, and all public names of each room."""
+    """The reference: the names that `contactopt` offers, the rooms, and all public names of each
+    room.
+    """
     names = rooms(root)
     for name in names:
         yield Path("api", f"{name}.md"), room_page(name)
-    listed = table(("room", "what it is for"), [(f"[{name}](api/{name}.md)", ROOMS.get(name, "")) for name in names])
+    listed = table(
+        ("room", "what it is for"),
+        [(f"[{name}](api/{name}.md)", ROOMS.get(name, "")) for name in names],
+    )
     text = f"{exported_names()}\n## The rooms\n\n{ROOMS_TEXT}\n{listed}"
     yield Path("api.md"), index("Reference", text, [f"api/{name}" for name in names], hidden=True)
 
@@ -100,16 +151,24 @@ def room_page(room: str) -> str:
     """All public names of the modules of a room, from their docstrings."""
     parts = []
     for name in modules(f"contactopt.{room}"):
-        # A package exports names of its modules, which are described where they stand and not a second time.
-        parts.append(f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n   :ignore-module-all:\n```\n")
+        # A package exports names of its modules, which are described where they stand and not a
+        # second time.
+        parts.append(
+            f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n   :ignore-module-all:\n```\n"
+        )
     return f"# {room}\n\n{ROOMS.get(room, '')}\n\n" + "\n".join(parts)
 
 
 def modules(name: str) -> list[str]:
-    """The module of that name and, if it is a package, those below it, none whose name begins with an underscore."""
+    """The module of that name and, if it is a package, those below it, none whose name begins with
+    an underscore.
+    """
     module = importlib.import_module(name)
     below = pkgutil.walk_packages(getattr(module, "__path__", []), f"{name}.")
-    found = [name, *(info.name for info in below if not info.name.rsplit(".", 1)[1].startswith("_"))]
+    found = [
+        name,
+        *(info.name for info in below if not info.name.rsplit(".", 1)[1].startswith("_")),
+    ]
     return [each for each in found if worth_a_section(each)]
 
 
@@ -142,7 +201,9 @@ def plug_in_pages(site: Path) -> Pages:
         "scenes": f"# Named scenes\n\n{SCENES_TEXT}\n{scenes_table()}",
         "methods": methods_index(),
         "laws": described("Friction laws", LAWS_TEXT, optional("contactopt.problem.laws", "LAWS")),
-        "couplings": described("Couplings", COUPLINGS_TEXT, optional("contactopt.coupling.coupling", "COUPLINGS")),
+        "couplings": described(
+            "Couplings", COUPLINGS_TEXT, optional("contactopt.coupling.coupling", "COUPLINGS")
+        ),
         "preconditioners": described("Preconditioners", PRECONDITIONERS_TEXT, PRECONDITIONERS),
         "body_solvers": described("Solvers of the bodies", SOLVERS_TEXT, SOLVERS),
         "backends": f"# Backends\n\n{BACKENDS_TEXT}\n{backends_tables()}",
@@ -168,25 +229,30 @@ METHODS_TEXT = """Every method is called by its name, `contactopt.solve(problem,
 gets the same certificate. The letters and signs are those of [the mathematics](../mathematics.md).
 """
 SCENES_TEXT = """A named scene is run by `contactopt run NAME` or `contactopt.run("NAME")`. Its arguments are those of the
-function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene with a load path is solved state by state.
+function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene with a load path is solved
+state by state.
 """
 PRECONDITIONERS_TEXT = """A preconditioner is an approximate inverse of the compliance $Q$. It makes iterative methods short, where $Q$ is known by its
-products only. It is chosen by its name:
-`contactopt.run("punch-2d", preconditioner="neumann")`, or `--preconditioner neumann` on the command line.
+products only. It is chosen by its name: `contactopt.run("punch-2d", preconditioner="neumann")`, or
+`--preconditioner neumann` on the command line.
 """
 SOLVERS_TEXT = """A body solver solves the linear system of one elastic body. It is chosen by its name:
-`contactopt.run("punch-2d", solver="superlu")`, or `--solver superlu` on the command line. The default, `auto`, chooses by size.
+`contactopt.run("punch-2d", solver="superlu")`, or `--solver superlu` on the command line. The
+default, `auto`, chooses by size.
 """
 LAWS_TEXT = """A law says which forces a contact can carry, and how these forces depend on its motion. A scene names its law:
-`Scene(..., law="bilateral")`, or `Contact(..., law="bilateral")` for one pair of surfaces. The sections below come from the table of laws.
+`Scene(..., law="bilateral")`, or `Contact(..., law="bilateral")` for one pair of surfaces. The
+sections below come from the table of laws.
 """
 COUPLINGS_TEXT = """A coupling says how the displacements of two contact surfaces make the relative displacements of the contacts. The
-default, `auto`, takes `matching` if the nodes of the two surfaces match, and `mortar` if they do not.
+default, `auto`, takes `matching` if the nodes of the two surfaces match, and `mortar` if they do
+not.
 """
 BACKENDS_TEXT = """A backend is a solver of quadratic or cone programs that others wrote. (A quadratic program has a quadratic cost and linear
 constraints. A cone program may also bound the length of a vector.) A backend is chosen by its name:
-`contactopt.solve(problem, normal="osqp")`, or `--normal osqp` on the command line. The packages that do not come with
-contactopt are installed by `pip install 'contactopt[backends]'` or one by one.
+`contactopt.solve(problem, normal="osqp")`, or `--normal osqp` on the command line. The packages
+that do not come with contactopt are installed by `pip install 'contactopt[backends]'` or one by
+one.
 """
 
 
@@ -196,7 +262,9 @@ def optional(module: str, name: str) -> dict[str, tuple[str, str, str]]:
 
 
 def described(title: str, text: str, plug_ins: dict[str, tuple[str, str, str]]) -> str:
-    """A page made from a table name -> (module, name there, what it is), with the docstring of each entry."""
+    """A page made from a table name -> (module, name there, what it is), with the docstring of each
+    entry.
+    """
     if not plug_ins:
         return ""
     rows = [(f"`{name}`", what, f"`{module}`") for name, (module, _, what) in plug_ins.items()]
@@ -208,7 +276,10 @@ def described(title: str, text: str, plug_ins: dict[str, tuple[str, str, str]]) 
 
 
 def scenes_table() -> str:
-    rows = [(f"`{name}`", what, "yes" if name in PATHS else "") for name, (_, _, what, *_) in SCENES.items()]
+    rows = [
+        (f"`{name}`", what, "yes" if name in PATHS else "")
+        for name, (_, _, what, *_) in SCENES.items()
+    ]
     return table(("scene", "what it is", "load path"), rows)
 
 
@@ -216,7 +287,10 @@ def backends_tables() -> str:
     """Backends of quadratic programs and of cone programs, with the package of each."""
     parts = []
     for title, known in (("Quadratic programs", QP), ("Cone programs", CONIC)):
-        rows = [(f"`{backend.name}`", f"`{backend.package}`", settings(backend)) for backend in known.values()]
+        rows = [
+            (f"`{backend.name}`", f"`{backend.package}`", settings(backend))
+            for backend in known.values()
+        ]
         parts.append(f"## {title}\n\n{table(('backend', 'package', 'settings'), rows)}")
     return "\n".join(parts)
 
@@ -239,7 +313,10 @@ def method_page(site: Path, name: str) -> str:
     by_hand = notes.read_text() if notes.exists() else ""
     source = as_block(inspect.getdoc(importlib.import_module(module)) or "")
     docstring = f"## In the words of its module\n\n`{module}`\n\n{source}"
-    return f"# {name}\n\n{what[:1].upper()}{what[1:]}.\n\n{by_hand}\n## Settings\n\n{listed}\n{docstring}"
+    return (
+        f"# {name}\n\n{what[:1].upper()}{what[1:]}.\n\n{by_hand}\n##"
+        f" Settings\n\n{listed}\n{docstring}"
+    )
 
 
 def as_block(docstring: str) -> str:

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # 6. A load cycle and its hysteresis
 #
-# Press a cylinder on a flat body. Push it sideways, but not so hard that it slides off. Then take the push away. Does the
-# cylinder come back to where it was? It does not, because friction has done work. The answer depends on the loads that came
-# before. Cattaneo (1938) and
-# Mindlin (1949) solved this problem exactly. In this tutorial we solve it numerically, step by step. We compare the slip
+# Press a cylinder on a flat body. Push it sideways, but not so hard that it slides off. Then take
+# the push away. Does the cylinder come back to where it was? It does not, because friction has done
+# work. The answer depends on the loads that came before. Cattaneo (1938) and Mindlin (1949) solved
+# this problem exactly. In this tutorial we solve it numerically, step by step. We compare the slip
 # zones, the tractions and the energy that a cycle costs with the exact ones.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has Coulomb's law for one step.
@@ -20,22 +20,23 @@ from contactopt.solving.paths import follow
 # %% [markdown]
 # ## From one step to a path
 #
-# Coulomb's law is about the slip *velocity*: friction opposes the motion of this moment. In a static step, $u_t$ stands for
-# the whole way from the start. Along a path we take many steps, and in each of them $u_t$ is replaced by the slip of that
-# step,
+# Coulomb's law is about the slip *velocity*: friction opposes the motion of this moment. In a
+# static step, $u_t$ stands for the whole way from the start. Along a path we take many steps, and
+# in each of them $u_t$ is replaced by the slip of that step,
 #
 # $$ u_t \;\to\; u_t - u_t^{\text{before}} . $$
 #
-# Nothing else changes, because this replacement only shifts $q_t$. So each step is one static problem, which is solved and
-# certified like any other. The normal part has no memory: the gap of this moment is all that counts.
+# Nothing else changes, because this replacement only shifts $q_t$. So each step is one static
+# problem, which is solved and certified like any other. The normal part has no memory: the gap of
+# this moment is all that counts.
 #
 # ## The scene
 #
-# Two bodies of the same rubber are pressed together with $P = 100$ N. The lower one is flat, and the upper one is round
-# with a radius of 4 m. Perpendicular to the plane of the drawing both have a thickness of $D = 400$ mm. The shear force
-# $T$ on the upper body goes from zero to 40 N, to $-40$ N, and back to 40 N. The bodies would slide off at
-# $\mu P = 50$ N. The normal $n$ points up, and the tangent $t$ points to the right. Every contact has its normal component
-# first.
+# Two bodies of the same rubber are pressed together with $P = 100$ N. The lower one is flat, and
+# the upper one is round with a radius of 4 m. Perpendicular to the plane of the drawing both have a
+# thickness of $D = 400$ mm. The shear force $T$ on the upper body goes from zero to 40 N, to $-40$
+# N, and back to 40 N. The bodies would slide off at $\mu P = 50$ N. The normal $n$ points up, and
+# the tangent $t$ points to the right. Every contact has its normal component first.
 
 # %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5, 3), layout="constrained")
@@ -63,7 +64,9 @@ states = scenes.shear_cycle(2, steps=8, mu=mu, force=P, shear=T_most, depth=D, e
 path = follow(states)
 history, problem = path.history, path.reduction.problem
 T, shift = history["shear_force"], history["shift"]
-print(f"{len(path.states)} states, {problem.contacts} contacts, largest certificate {history['residual'].max():.0e}")
+print(
+    f"{len(path.states)} states, {problem.contacts} contacts, largest certificate {history['residual'].max():.0e}"
+)
 
 assert path.solved
 assert np.allclose(history["normal_force"], P)
@@ -72,9 +75,10 @@ assert np.isclose(T.max(), T_most) and np.isclose(T.min(), -T_most)
 # %% [markdown]
 # ## First loading: the edge slips
 #
-# Both bodies are of the same material, so the shear does not disturb the pressure. It stays that of Hertz,
-# $p = p_0 \sqrt{1 - x^2 / a^2}$. If the whole contact stuck, the shear traction would be infinite at its edge, and friction
-# cannot carry that. So the edge slips, however small $T$ is, and the contact sticks only where
+# Both bodies are of the same material, so the shear does not disturb the pressure. It stays that of
+# Hertz, $p = p_0 \sqrt{1 - x^2 / a^2}$. If the whole contact stuck, the shear traction would be
+# infinite at its edge, and friction cannot carry that. So the edge slips, however small $T$ is, and
+# the contact sticks only where
 #
 # $$ |x| < c, \qquad \frac{c}{a} = \sqrt{1 - \frac{|T|}{\mu P}} . $$
 #
@@ -89,7 +93,10 @@ a, p0 = reference.half_width, reference.peak
 def first_loading(x, T):
     """Cattaneo and Mindlin's shear traction on the lower body for 0 <= T <= mu P."""
     c = a * np.sqrt(1 - T / (mu * P))
-    outer, inner = np.sqrt(np.maximum(1 - (x / a) ** 2, 0)), np.sqrt(np.maximum(1 - (x / c) ** 2, 0))
+    outer, inner = (
+        np.sqrt(np.maximum(1 - (x / a) ** 2, 0)),
+        np.sqrt(np.maximum(1 - (x / c) ** 2, 0)),
+    )
     return mu * p0 * (outer - c / a * inner)
 
 
@@ -105,13 +112,15 @@ assert np.allclose(history["stick_half_width"][loading], exact, rtol=0.03)
 # %% [markdown]
 # ## Unloading: slip turns round
 #
-# Now reduce $T$ from its largest value $T^*$. The edge slips back at once, while the middle keeps the traction that it had.
-# To slip *against* the old direction the traction has to change by $2 \mu p$, from one bound to the other. So unloading is
-# a first loading in the other direction and of twice the size. This is Masing's rule:
+# Now reduce $T$ from its largest value $T^*$. The edge slips back at once, while the middle keeps
+# the traction that it had. To slip *against* the old direction the traction has to change by $2 \mu
+# p$, from one bound to the other. So unloading is a first loading in the other direction and of
+# twice the size. This is Masing's rule:
 #
 # $$ \tau(T) = \tau_{\text{first}}(T^*) - 2\, \tau_{\text{first}}\Bigl(\frac{T^* - T}{2}\Bigr) . $$
 #
-# At $T = 0$ the traction does not vanish. It points one way in the middle and the other way at the edge.
+# At $T = 0$ the traction does not vanish. It points one way in the middle and the other way at the
+# edge.
 
 # %%
 x = problem.coordinates[0]
@@ -129,7 +138,9 @@ for index, color in ((4, "C0"), (turned, "C1"), (home, "C2"), (lowest, "C3")):
     ax.plot(fine, expected / p0, color=color, lw=1)
     ax.plot(x, tau / p0, "o", ms=3, color=color, label=f"T = {round(T[index])} N")
     near = np.interp(x, fine, expected)
-    assert np.abs(tau - near).max() < 0.06 * mu * p0  # largest next to the kinks, where elements see it blurred
+    assert (
+        np.abs(tau - near).max() < 0.06 * mu * p0
+    )  # largest next to the kinks, where elements see it blurred
 ax.plot(fine, mu * np.sqrt(1 - (fine / a) ** 2), "k--", lw=1, label=r"bound $\pm \mu p$")
 ax.plot(fine, -mu * np.sqrt(1 - (fine / a) ** 2), "k--", lw=1)
 ax.set(xlabel="x [mm]", ylabel="shear traction over peak pressure [-]", xlim=(-1.15 * a, 1.9 * a))
@@ -141,8 +152,9 @@ assert abs(resultant.sum()) < 1e-8 and np.abs(resultant).max() > 0.2
 # %% [markdown]
 # ## The loop
 #
-# We draw the force against the shift of the upper body. The loop is thin, because most of the shift is the elastic
-# deformation of the large bodies. If we subtract the straight line through the two tips, the loop becomes visible.
+# We draw the force against the shift of the upper body. The loop is thin, because most of the shift
+# is the elastic deformation of the large bodies. If we subtract the straight line through the two
+# tips, the loop becomes visible.
 
 # %%
 stiffness_line = shift.max() / T_most * T
@@ -159,17 +171,18 @@ assert abs(shift[home]) > 0.002  # but it does not go through zero
 # %% [markdown]
 # ## What a cycle costs
 #
-# The area of the loop is the energy that friction turns into heat. It does not depend on the size of the bodies, because
-# the elastic deformation is a straight line in this diagram, and encloses no area. Let $P' = P / D$ and $T' = T / D$ be the forces per unit of thickness. The shift under
-# first loading is
+# The area of the loop is the energy that friction turns into heat. It does not depend on the size
+# of the bodies, because the elastic deformation is a straight line in this diagram, and encloses no
+# area. Let $P' = P / D$ and $T' = T / D$ be the forces per unit of thickness. The shift under first
+# loading is
 #
 # $$ \delta(T) = \text{const} \cdot T + \frac{\mu}{\pi E^*}
 #    \Bigl[\bigl(P' - \tfrac{T'}{\mu}\bigr) \ln\bigl(P' - \tfrac{T'}{\mu}\bigr) - P' \ln P'\Bigr] . $$
 #
-# (The tangential shift is $\mu$ times the difference of two normal approaches, under $P'$ and under $P' - T'/\mu$, and an
-# approach under $P'$ contains the term $-P' \ln P' / (\pi E^*)$.) Masing's rule makes both branches of the loop from
-# $\delta$, and the area between them is $4\, T^* \delta(T^*) - 8 \int_0^{T^*} \delta\, dT$. The term that is linear in $T$ drops
-# out of this area.
+# (The tangential shift is $\mu$ times the difference of two normal approaches, under $P'$ and under
+# $P' - T'/\mu$, and an approach under $P'$ contains the term $-P' \ln P' / (\pi E^*)$.) Masing's
+# rule makes both branches of the loop from $\delta$, and the area between them is $4\, T^*
+# \delta(T^*) - 8 \int_0^{T^*} \delta\, dT$. The term that is linear in $T$ drops out of this area.
 
 # %%
 modulus = 1 / (2 * (1 - 0.3**2) / 5.0)  # E*, MPa
@@ -187,17 +200,22 @@ expected = 4 * T_most * shift_by_slip(T_most) - 8 * np.trapezoid(shift_by_slip(f
 cycle = slice(turned, len(T))  # from the tip to the tip
 area = abs(np.trapezoid(T[cycle], shift[cycle]))
 friction = history["friction_work"][-1] - history["friction_work"][turned]
-print(f"one cycle costs: exact {expected:.4f} N mm, area of the loop {area:.4f}, friction work {friction:.4f}")
+print(
+    f"one cycle costs: exact {expected:.4f} N mm, area of the loop {area:.4f}, friction work {friction:.4f}"
+)
 
-assert np.isclose(expected, D * cycle_loss_line(P / D, modulus, mu, T_most / D), rtol=1e-5)  # the same in closed form
+assert np.isclose(
+    expected, D * cycle_loss_line(P / D, modulus, mu, T_most / D), rtol=1e-5
+)  # the same in closed form
 assert np.isclose(area, expected, rtol=0.03)
 assert np.isclose(friction, expected, rtol=0.05)
 assert np.all(np.diff(history["friction_work"]) >= -1e-12)  # friction never gives back
 
 # %% [markdown]
-# The two computed numbers have different meanings. The area comes from the force and the shift of the plate, and the
-# friction work comes from the slip at the contacts. They differ, because the steps are finite, and the difference falls
-# with the size of the steps. The balance of energy along the whole path holds to rounding:
+# The two computed numbers have different meanings. The area comes from the force and the shift of
+# the plate, and the friction work comes from the slip at the contacts. They differ, because the
+# steps are finite, and the difference falls with the size of the steps. The balance of energy along
+# the whole path holds to rounding:
 
 # %%
 fig, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
@@ -213,12 +231,13 @@ assert history["energy_error"].max() < 1e-9
 # %% [markdown]
 # ## Exercises
 #
-# **1.** Solve the state $T = 0$ at the end of the path in a *single* static step. Where is the memory?
+# **1.** Solve the state $T = 0$ at the end of the path in a *single* static step. Where is the
+# memory?
 #
 # <details><summary>Solution</summary>
 #
-# The memory is lost. A static step knows only the loads of this moment, and without a shear force it finds no shear
-# traction.
+# The memory is lost. A static step knows only the loads of this moment, and without a shear force
+# it finds no shear traction.
 #
 # ```python
 # from contactopt import reduce, solve
@@ -233,8 +252,8 @@ assert history["energy_error"].max() < 1e-9
 #
 # <details><summary>Solution</summary>
 #
-# It grows like $T^{*3}$: half the force makes an eighth of the heat. (The width of the slipping rim and the slip in it
-# both grow with $T^*$, and so does the force.)
+# It grows like $T^{*3}$: half the force makes an eighth of the heat. (The width of the slipping rim
+# and the slip in it both grow with $T^*$, and so does the force.)
 #
 # ```python
 # def loop(T_star):
@@ -247,21 +266,22 @@ assert history["energy_error"].max() < 1e-9
 #
 # </details>
 #
-# **3.** Take two steps instead of eight from zero to the largest force. What becomes worse: the tips of the loop, the stick
-# zones, or the energy?
+# **3.** Take two steps instead of eight from zero to the largest force. What becomes worse: the
+# tips of the loop, the stick zones, or the energy?
 #
 # <details><summary>Solution</summary>
 #
-# On each branch the slip never turns back, so the tips and the stick zones are right with any number of steps. The area of
-# a loop with few corners is too small. The friction work is too large, because each step takes the force at its end.
+# On each branch the slip never turns back, so the tips and the stick zones are right with any
+# number of steps. The area of a loop with few corners is too small. The friction work is too large,
+# because each step takes the force at its end.
 #
 # ```python
-# coarse = follow(scenes.shear_cycle(2, steps=2, mu=mu, force=P, shear=T_most, depth=D, elements=32)).history
-# assert np.isclose(coarse["shift"].max(), shift.max(), rtol=1e-3)
-# assert np.isclose(coarse["stick_half_width"].min(), history["stick_half_width"].min(), rtol=1e-3)
-# tip = 2  # the state with T = 40 N
-# assert abs(np.trapezoid(coarse["shear_force"][tip:], coarse["shift"][tip:])) < area
-# assert coarse["friction_work"][-1] - coarse["friction_work"][tip] > friction
+# coarse = follow(scenes.shear_cycle(2, steps=2, mu=mu, force=P, shear=T_most, depth=D,
+# elements=32)).history assert np.isclose(coarse["shift"].max(), shift.max(), rtol=1e-3) assert
+# np.isclose(coarse["stick_half_width"].min(), history["stick_half_width"].min(), rtol=1e-3) tip = 2
+# # the state with T = 40 N assert abs(np.trapezoid(coarse["shear_force"][tip:],
+# coarse["shift"][tip:])) < area assert coarse["friction_work"][-1] - coarse["friction_work"][tip] >
+# friction
 # ```
 #
 # </details>

@@ -1,11 +1,13 @@
 # %% [markdown]
 # # 7. Add your own solver and beat ours
 #
-# You have an idea for an algorithm. How good is it? In this tutorial we write a method in 20 lines, and compare it with the
-# methods of the package in a benchmark. The package need not be changed for this. We do so with two ideas. The first one turns
-# out to be slow. The second one is about as fast as the methods of the package, but on some problems its answers are wrong.
+# You have an idea for an algorithm. How good is it? In this tutorial we write a method in 20 lines,
+# and compare it with the methods of the package in a benchmark. The package need not be changed for
+# this. We do so with two ideas. The first one turns out to be slow. The second one is about as fast
+# as the methods of the package, but on some problems its answers are wrong.
 #
-# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters. You should know Newton's method.
+# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters. You should know
+# Newton's method.
 
 # %%
 from pathlib import Path
@@ -21,22 +23,25 @@ folder = TemporaryDirectory()
 # %% [markdown]
 # ## What a method gets and gives
 #
-# A method is a function. It gets an `InterfaceProblem`: $Q$ (`problem.Q`), $q$, $\mu$, and the plates' $V$ and $s$,
+# A method is a function. It gets an `InterfaceProblem`: $Q$ (`problem.Q`), $q$, $\mu$, and the
+# plates' $V$ and $s$,
 #
 # $$ u = Q r + V \lambda + q, \qquad V' r + s = 0, $$
 #
-# The components are ordered by contacts, and the normal component of each contact comes first. $r$ is the force on the upper
-# body. The motions of the plates are the columns of $V$, and $V' r + s = 0$ is their balance. The method returns $r$, or
-# $(r, \lambda)$. Its settings are arguments of the function. If it has the arguments `tol` and `time_limit`, it gets the
-# tolerance and the time limit of the benchmark. The benchmark does not rely on what the method says about its success: it
+# The components are ordered by contacts, and the normal component of each contact comes first. $r$
+# is the force on the upper body. The motions of the plates are the columns of $V$, and $V' r + s =
+# 0$ is their balance. The method returns $r$, or $(r, \lambda)$. Its settings are arguments of the
+# function. If it has the arguments `tol` and `time_limit`, it gets the tolerance and the time limit
+# of the benchmark. The benchmark does not rely on what the method says about its success: it
 # computes the certificate of each answer.
 #
-# Methods run in processes of their own, so that the benchmark can end them if they take too long. Therefore they stand in a
-# file of their own. Here is the first one.
+# Methods run in processes of their own, so that the benchmark can end them if they take too long.
+# Therefore they stand in a file of their own. Here is the first one.
 #
-# **First idea: walk downhill.** Let $K$ be the set of all forces with $|r_t| \le \mu r_n$, and let $P_K$ take a vector to the
-# nearest force in $K$. The map $r \mapsto P_K(r - \rho (u + \mu |u_t| n))$ does not move a solution. So we apply this map again
-# and again. The function `project_balanced` computes $P_K$ and keeps the balance of the plates.
+# **First idea: walk downhill.** Let $K$ be the set of all forces with $|r_t| \le \mu r_n$, and let
+# $P_K$ take a vector to the nearest force in $K$. The map $r \mapsto P_K(r - \rho (u + \mu |u_t|
+# n))$ does not move a solution. So we apply this map again and again. The function
+# `project_balanced` computes $P_K$ and keeps the balance of the plates.
 
 # %%
 FIRST = """
@@ -63,10 +68,11 @@ def walk_downhill(problem, tol, steps=2000):
 """
 
 # %% [markdown]
-# **Second idea: guess and sort.** In 2D each contact is open ($r = 0$), sticks ($u = 0$) or slips ($u_n = 0$,
-# $r_t = \pm \mu r_n$). If we knew which of these each contact does, we would only have to solve linear equations. So we guess
-# that all contacts stick, solve, sort the contacts anew by $y = r - \rho u$, and repeat this until the sorting no longer
-# changes. This is a primal-dual active set method, and it can be understood as Newton's method.
+# **Second idea: guess and sort.** In 2D each contact is open ($r = 0$), sticks ($u = 0$) or slips
+# ($u_n = 0$, $r_t = \pm \mu r_n$). If we knew which of these each contact does, we would only have
+# to solve linear equations. So we guess that all contacts stick, solve, sort the contacts anew by
+# $y = r - \rho u$, and repeat this until the sorting no longer changes. This is a primal-dual
+# active set method, and it can be understood as Newton's method.
 
 # %%
 SECOND = """
@@ -101,7 +107,9 @@ names = {}
 exec(FIRST + SECOND, names)
 problem = reduce(scenes.flat_punch(2, mu=0.2, elements=16))
 r, multipliers = names["guess_and_sort"](problem)
-print(f"certificate {natural_map_residual(problem, r, multipliers):.0e}, ours {solve(problem).residual:.0e}")
+print(
+    f"certificate {natural_map_residual(problem, r, multipliers):.0e}, ours {solve(problem).residual:.0e}"
+)
 
 assert natural_map_residual(problem, r, multipliers) < 1e-10
 assert np.allclose(r, solve(problem).reactions, atol=1e-6 * r.max())
@@ -109,9 +117,10 @@ assert np.allclose(r, solve(problem).reactions, atol=1e-6 * r.max())
 # %% [markdown]
 # ## The experiment
 #
-# One file says what is run. Every combination of the listed values is one run. The first problems are elastic: the flat
-# punch on three meshes. The others are harder: $Q$ has rank 10 only for 12 contacts, so the forces are not unique. They come
-# from a generator that we write and register in the same way.
+# One file says what is run. Every combination of the listed values is one run. The first problems
+# are elastic: the flat punch on three meshes. The others are harder: $Q$ has rank 10 only for 12
+# contacts, so the forces are not unique. They come from a generator that we write and register in
+# the same way.
 
 # %%
 PROBLEM = """
@@ -146,10 +155,14 @@ method = ["walk_downhill", "guess_and_sort", "auto", "alternating"]
 Path(folder.name, "mine.py").write_text(FIRST + SECOND + PROBLEM)
 Path(folder.name, "duel.toml").write_text(EXPERIMENT)
 
-results = benchmark.run_campaign(Path(folder.name, "duel.toml"), Path(folder.name, "results"), jobs=2, quiet=True)
+results = benchmark.run_campaign(
+    Path(folder.name, "duel.toml"), Path(folder.name, "results"), jobs=2, quiet=True
+)
 table = benchmark.load(results)
 folder.cleanup()
-print(f"{len(table)} runs; columns such as {', '.join(['problem', 'method', 'status', 'residual', 'solve_seconds'])}")
+print(
+    f"{len(table)} runs; columns such as {', '.join(['problem', 'method', 'status', 'residual', 'solve_seconds'])}"
+)
 
 assert len(table) == 4 * 2 * (3 + 8)
 
@@ -174,9 +187,10 @@ assert share.loc["punch-2d"].drop("walk_downhill").min() == 1.0  # all that coun
 assert best.loc["guess_and_sort"].sum() < best.loc["walk_downhill"].sum()
 
 # %% [markdown]
-# The walk downhill is orders of magnitude slower, because the number of its steps is about the condition number of $Q$.
-# Guessing and sorting takes about as long as the methods of the package. On a quiet machine it is often faster, because it
-# has no safeguards and records nothing. Is it the better method, then?
+# The walk downhill is orders of magnitude slower, because the number of its steps is about the
+# condition number of $Q$. Guessing and sorting takes about as long as the methods of the package.
+# On a quiet machine it is often faster, because it has no safeguards and records nothing. Is it the
+# better method, then?
 #
 # ## The hard problems
 
@@ -188,14 +202,15 @@ assert share.loc["loose", "auto"] > share.loc["loose", "guess_and_sort"]
 assert (loose["status"] == "false_claim").any()
 
 # %% [markdown]
-# Two columns are important. In the column `solved` the certificate is below the tolerance. In the column `false_claim` the
-# method returned forces as its answer, but these do not obey the laws. Our twenty lines give up after 40 sortings that go
-# round in a circle, and return the last forces. `auto` begins with the same idea. But it notices when it makes no progress,
-# and goes on with methods that can deal with a singular $Q$.
+# Two columns are important. In the column `solved` the certificate is below the tolerance. In the
+# column `false_claim` the method returned forces as its answer, but these do not obey the laws. Our
+# twenty lines give up after 40 sortings that go round in a circle, and return the last forces.
+# `auto` begins with the same idea. But it notices when it makes no progress, and goes on with
+# methods that can deal with a singular $Q$.
 #
-# A fair picture shows both speed and success. A *performance profile* shows, for every method, the share of the problems that
-# it solves within a factor of the best time. Its left end shows which method is the fastest, and its right end shows which
-# methods solve the problems at all.
+# A fair picture shows both speed and success. A *performance profile* shows, for every method, the
+# share of the problems that it solves within a factor of the best time. Its left end shows which
+# method is the fastest, and its right end shows which methods solve the problems at all.
 
 # %%
 instance = ["problem", "repeat"]
@@ -206,25 +221,32 @@ ratio = times.div(times.min(axis=1), axis=0)
 fig, ax = plt.subplots(figsize=(6.4, 4), layout="constrained")
 factors = np.logspace(0, 4, 200)
 for method, style in zip(ratio.columns, ("-", "--", "-.", ":")):
-    ax.semilogx(factors, [(ratio[method] <= factor).mean() for factor in factors], style, label=method)
-ax.set(xlabel="time over that of the fastest method [-]", ylabel="share of problems solved [-]", ylim=(0, 1.05))
+    ax.semilogx(
+        factors, [(ratio[method] <= factor).mean() for factor in factors], style, label=method
+    )
+ax.set(
+    xlabel="time over that of the fastest method [-]",
+    ylabel="share of problems solved [-]",
+    ylim=(0, 1.05),
+)
 ax.legend(frameon=False)
 
 assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean()
 
 # %% [markdown]
-# `contactopt bench EXPERIMENT.toml` does the same from the command line, and `benchmark.figures` draws such pictures. A
-# method that is worth keeping becomes part of the package as one file and one line in a table; *Contributing* shows how.
+# `contactopt bench EXPERIMENT.toml` does the same from the command line, and `benchmark.figures`
+# draws such pictures. A method that is worth keeping becomes part of the package as one file and
+# one line in a table; *Contributing* shows how.
 #
 # ## Exercises
 #
-# **1.** Make the second idea honest: let it raise an exception when the sorting goes round in a circle. What becomes of
-# the column `false_claim`?
+# **1.** Make the second idea honest: let it raise an exception when the sorting goes round in a
+# circle. What becomes of the column `false_claim`?
 #
 # <details><summary>Solution</summary>
 #
-# Python's `for ... else` runs the `else` if the loop was not left by `break`. Such runs are then counted as `error`. They
-# are still not solved, but the method no longer claims that they are.
+# Python's `for ... else` runs the `else` if the loop was not left by `break`. Such runs are then
+# counted as `error`. They are still not solved, but the method no longer claims that they are.
 #
 # ```python
 # circle = "    else:\n        raise RuntimeError('no sorting stays')\n"
@@ -242,8 +264,9 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 #
 # </details>
 #
-# **2.** Mend it. Where the sorting fails, add a little compliance, $Q + \alpha I$, and solve; then take the answer as the
-# centre of the next problem, $q - \alpha r$. This is the proximal-point idea. Does it solve the hard problems?
+# **2.** Mend it. Where the sorting fails, add a little compliance, $Q + \alpha I$, and solve; then
+# take the answer as the centre of the next problem, $q - \alpha r$. This is the proximal-point
+# idea. Does it solve the hard problems?
 #
 # <details><summary>Solution</summary>
 #
@@ -274,8 +297,9 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 #
 # <details><summary>Solution</summary>
 #
-# In 3D a slipping contact may slip in any direction of the plane. The direction is an unknown, so the equations of a
-# given sorting are not linear. Newton's method linearises them: see `contactopt.problem.laws.coulomb`.
+# In 3D a slipping contact may slip in any direction of the plane. The direction is an unknown, so
+# the equations of a given sorting are not linear. Newton's method linearises them: see
+# `contactopt.problem.laws.coulomb`.
 #
 # ```python
 # from contactopt.problem.laws.coulomb import Coulomb

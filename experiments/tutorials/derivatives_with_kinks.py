@@ -1,13 +1,15 @@
 # %% [markdown]
 # # 9. The derivative of a solution, and its kinks
 #
-# How does the contact force change if friction grows a little, or if the load does? Whoever fits a friction coefficient to
-# measurements, or shapes a punch so that its pressure is even, needs the answer to this question. The solution of a
-# contact problem is a function of its data, and this function has a derivative almost everywhere. In this tutorial we draw
-# this function for one contact node. We compute its derivative by hand and by `contactopt.sensitivity`. We look at the points
-# where it has no derivative, and see why it is a bad idea to smooth these points away.
+# How does the contact force change if friction grows a little, or if the load does? Whoever fits a
+# friction coefficient to measurements, or shapes a punch so that its pressure is even, needs the
+# answer to this question. The solution of a contact problem is a function of its data, and this
+# function has a derivative almost everywhere. In this tutorial we draw this function for one
+# contact node. We compute its derivative by hand and by `contactopt.sensitivity`. We look at the
+# points where it has no derivative, and see why it is a bad idea to smooth these points away.
 #
-# Reading time: 15 minutes. [Tutorial 1](one_contact_node.py) explains the letters, and solves the problem of the one node.
+# Reading time: 15 minutes. [Tutorial 1](one_contact_node.py) explains the letters, and solves the
+# problem of the one node.
 
 # %%
 from dataclasses import replace
@@ -23,9 +25,10 @@ from contactopt import HalfSpace, InterfaceProblem, Material, Rigid, Scene, sens
 # %% [markdown]
 # ## One node as a function of friction and load
 #
-# The node of tutorial 1 would sink 1 mm into the floor and move 0.9 mm to the right if there were no contact. The floor
-# answers with a normal force $r_n$ and a friction force $r_t$. We solve the problem for many friction coefficients $\mu$,
-# and then for many horizontal loads $q_t$, and each time we also ask for the slope.
+# The node of tutorial 1 would sink 1 mm into the floor and move 0.9 mm to the right if there were
+# no contact. The floor answers with a normal force $r_n$ and a friction force $r_t$. We solve the
+# problem for many friction coefficients $\mu$, and then for many horizontal loads $q_t$, and each
+# time we also ask for the slope.
 
 # %%
 Q = np.array([[1.0, 0.4], [0.4, 1.2]])  # mm / N
@@ -56,16 +59,19 @@ for mu in (0.3, 0.6, 1.1):
     slope = sensitivity(problem, solution).forward(mu=1.0).reactions[0]
     step = np.array([-0.1, 0.1])
     for component in range(2):
-        axes[0].plot(mu + step, solution.reactions[0, component] + step * slope[component], "k", lw=2.5)
+        axes[0].plot(
+            mu + step, solution.reactions[0, component] + step * slope[component], "k", lw=2.5
+        )
 axes[0].plot([], [], "k", lw=2.5, label="slope from sensitivity")
 axes[0].legend(frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.62))
 _ = axes[1].legend(frameon=False)
 
 # %% [markdown]
-# The curves consist of smooth pieces. In the left figure the node slips as long as $\mu$ is small. At $\mu = 5/6$ it begins to
-# stick. From there on the friction coefficient has no influence any more. In the right figure there are three pieces: slip
-# to the left, stick, and slip to the right. Inside a piece the solution is a smooth function. At the ends of a piece it has a
-# **kink**: two slopes, one for each side.
+# The curves consist of smooth pieces. In the left figure the node slips as long as $\mu$ is small.
+# At $\mu = 5/6$ it begins to stick. From there on the friction coefficient has no influence any
+# more. In the right figure there are three pieces: slip to the left, stick, and slip to the right.
+# Inside a piece the solution is a smooth function. At the ends of a piece it has a **kink**: two
+# slopes, one for each side.
 #
 # ## The derivative by hand
 #
@@ -74,16 +80,17 @@ _ = axes[1].legend(frameon=False)
 # $$ Q_{nn} r_n - \mu\, Q_{nt} r_n + q_n = 0 \quad\Rightarrow\quad r_n = \frac{-q_n}{Q_{nn} - \mu\, Q_{nt}},
 # \qquad \frac{dr_n}{d\mu} = \frac{Q_{nt}\, r_n}{Q_{nn} - \mu\, Q_{nt}} . $$
 #
-# For many contacts nobody wants to do this by hand. But the recipe is the same: **keep the state of every contact (open,
-# stick or slip), and differentiate the equations that hold in this state.** Newton's method has these equations at hand. Its
-# last step solved a linear system with the matrix
+# For many contacts nobody wants to do this by hand. But the recipe is the same: **keep the state of
+# every contact (open, stick or slip), and differentiate the equations that hold in this state.**
+# Newton's method has these equations at hand. Its last step solved a linear system with the matrix
 #
 # $$ M = \begin{pmatrix} I - D + D\rho Q & D \rho V \\ V^\top & 0 \end{pmatrix} . $$
 #
-# Here $D$ says which contact is open ($D = 0$), sticks ($D = I$) or slips. The columns of $V$ are the motions of plates, which
-# the one node does not have, and $\rho$ is a positive number. The *forward* derivative says how all results change with one
-# parameter. It takes one more solve with $M$. The *adjoint* says how one result changes with all parameters. It takes one
-# solve with $M^\top$.
+# Here $D$ says which contact is open ($D = 0$), sticks ($D = I$) or slips. The columns of $V$ are
+# the motions of plates, which the one node does not have, and $\rho$ is a positive number. The
+# *forward* derivative says how all results change with one parameter. It takes one more solve with
+# $M$. The *adjoint* says how one result changes with all parameters. It takes one solve with
+# $M^\top$.
 
 # %%
 mu = 0.5
@@ -100,15 +107,18 @@ print(f"dr_n/dq = {adjoint.q[0]}, dr_n/dQ =\n{adjoint.Q}")
 assert np.isclose(forward[0], by_hand) and np.isclose(adjoint.mu[0], by_hand)
 assert np.isclose(forward[1], -r_n - mu * by_hand)  # the product rule for r_t = -mu r_n
 nudged = InterfaceProblem(np.add(Q, [[1e-6, 0.0], [0.0, 0.0]]), [q], mu)
-assert np.isclose((solve(nudged, tol=1e-13).reactions[0, 0] - r_n) / 1e-6, adjoint.Q[0, 0], rtol=1e-4)
+assert np.isclose(
+    (solve(nudged, tol=1e-13).reactions[0, 0] - r_n) / 1e-6, adjoint.Q[0, 0], rtol=1e-4
+)
 
 # %% [markdown]
 # ## At a kink
 #
-# At $\mu = 5/6$ the friction force is at its bound although the node does not move. Such a contact is called *weakly
-# active*. Here the solution has no derivative, but it has one on each side. `sensitivity` names the contact, and `forward`
-# gives the slope of the side to which the direction points. To find it, it solves a small complementarity problem: does the
-# contact stick or slip if we move this way?
+# At $\mu = 5/6$ the friction force is at its bound although the node does not move. Such a contact
+# is called *weakly active*. Here the solution has no derivative, but it has one on each side.
+# `sensitivity` names the contact, and `forward` gives the slope of the side to which the direction
+# points. To find it, it solves a small complementarity problem: does the contact stick or slip if
+# we move this way?
 
 # %%
 problem, solution = solved(5 / 6)
@@ -125,18 +135,22 @@ assert not np.allclose(more, -less)  # a derivative would be linear in the direc
 # %% [markdown]
 # ## Bilevel programs, in words
 #
-# Suppose a sensor says that the node slips by 0.1 mm. Which $\mu$ is it? This is an optimisation problem (make the
-# difference between slip and sensor small). Its constraint is again an optimisation problem, or at least a complementarity
-# problem: the slip must be that of a solution. The outer problem is called the *leader*, which chooses $\mu$. The contact is
-# the *follower*, which answers with a solution. There are three ways to write this.
+# Suppose a sensor says that the node slips by 0.1 mm. Which $\mu$ is it? This is an optimisation
+# problem (make the difference between slip and sensor small). Its constraint is again an
+# optimisation problem, or at least a complementarity problem: the slip must be that of a solution.
+# The outer problem is called the *leader*, which chooses $\mu$. The contact is the *follower*,
+# which answers with a solution. There are three ways to write this.
 #
-# - If the follower minimises something, as contact without friction does, the whole is a **bilevel program**.
-# - The conditions of the follower, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$ and so on, can be written as constraints of the
-#   leader. Then the whole is a **mathematical program with equilibrium constraints**, an MPEC. It is awkward for solvers of
-#   nonlinear programs. At a point with $u_n = r_n = 0$ the gradients of these constraints are not independent, and
-#   multipliers need not exist.
-# - We take a third way. A contact solver answers for the follower, with a certificate, and we use the derivative of its
-#   answer. This is called *implicit programming*. The leader then minimises a function with kinks.
+# - If the follower minimises something, as contact without friction does, the whole is a **bilevel
+#   program**.
+# - The conditions of the follower, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$ and so on, can be
+#   written as constraints of the leader. Then the whole is a **mathematical program with
+#   equilibrium constraints**, an MPEC. It is awkward for solvers of nonlinear programs. At a point
+#   with $u_n = r_n = 0$ the gradients of these constraints are not independent, and multipliers
+#   need not exist.
+# - We take a third way. A contact solver answers for the follower, with a certificate, and we use
+#   the derivative of its answer. This is called *implicit programming*. The leader then minimises a
+#   function with kinks.
 #
 # Newton's method finds the $\mu$ of the sensor in a few steps, from the derivative of the solution:
 
@@ -152,10 +166,11 @@ print(f"mu = {mu:.9f}, slip = {slip:.9f} mm, certificate {solution.residual:.1e}
 assert np.isclose(slip, sensor, rtol=1e-9)
 
 # %% [markdown]
-# From a first guess $\mu > 5/6$ this does not work. The node sticks, the derivative of the slip is zero, and no step is
-# better than another. This is no fault of the method. *Data from a contact that sticks say nothing about the friction
-# coefficient*, except that it is large enough. `contactopt.fit` notices this by the singular values of its Jacobian (the
-# matrix of all derivatives), and says so.
+# From a first guess $\mu > 5/6$ this does not work. The node sticks, the derivative of the slip is
+# zero, and no step is better than another. This is no fault of the method. *Data from a contact
+# that sticks say nothing about the friction coefficient*, except that it is large enough.
+# `contactopt.fit` notices this by the singular values of its Jacobian (the matrix of all
+# derivatives), and says so.
 
 # %%
 problem, solution = solved(1.0)
@@ -164,15 +179,18 @@ assert sensitivity(problem, solution).forward(mu=1.0).displacements[0, 1] == 0.0
 # %% [markdown]
 # ## Why not smooth the kinks away?
 #
-# Many codes replace the kinks by round corners: $\max(y, 0)$ becomes $(y + \sqrt{y^2 + \varepsilon^2}) / 2$, and stick becomes
-# creep, with a friction force $-\mu\, r_n\, u_t / \sqrt{u_t^2 + \varepsilon^2}$. Then everything has a derivative. But it is the
-# derivative of another problem. We solve the round problem for a node that *sticks*, $\mu = 1$, and ask how much its slip
-# depends on friction. The right answer is: not at all.
+# Many codes replace the kinks by round corners: $\max(y, 0)$ becomes $(y + \sqrt{y^2 +
+# \varepsilon^2}) / 2$, and stick becomes creep, with a friction force $-\mu\, r_n\, u_t /
+# \sqrt{u_t^2 + \varepsilon^2}$. Then everything has a derivative. But it is the derivative of
+# another problem. We solve the round problem for a node that *sticks*, $\mu = 1$, and ask how much
+# its slip depends on friction. The right answer is: not at all.
 
 
 # %%
 def rounded(mu, eps):
-    """Newton's method on u_n = 0 and r_t = -mu r_n u_t / sqrt(u_t^2 + eps^2); eps goes down step by step."""
+    """Newton's method on u_n = 0 and r_t = -mu r_n u_t / sqrt(u_t^2 + eps^2); eps goes down step by
+    step.
+    """
     r = np.array([1.5, -1.25])
     for size in np.geomspace(1.0, eps, 25):
         for _ in range(40):
@@ -180,7 +198,9 @@ def rounded(mu, eps):
             root = np.sqrt(u[1] ** 2 + size**2)
             F = np.array([u[0], r[1] + mu * r[0] * u[1] / root])
             slope = mu * r[0] * size**2 / root**3
-            r = r - np.linalg.solve([Q[0], [mu * u[1] / root + slope * Q[1, 0], 1.0 + slope * Q[1, 1]]], F)
+            r = r - np.linalg.solve(
+                [Q[0], [mu * u[1] / root + slope * Q[1, 0], 1.0 + slope * Q[1, 1]]], F
+            )
     return r
 
 
@@ -188,7 +208,8 @@ widths = np.array([1e-1, 3e-2, 1e-2, 3e-3, 1e-3])
 slips = np.array([(Q @ rounded(1.0, eps) + q)[1] for eps in widths])
 slopes = np.array([(Q @ (rounded(1.01, eps) - rounded(0.99, eps)))[1] / 0.02 for eps in widths])
 certificates = [
-    contactopt.natural_map_residual(InterfaceProblem(Q, [q], 1.0), rounded(1.0, eps)[None]) for eps in widths
+    contactopt.natural_map_residual(InterfaceProblem(Q, [q], 1.0), rounded(1.0, eps)[None])
+    for eps in widths
 ]
 
 fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
@@ -202,31 +223,44 @@ assert np.all(slips > 0) and np.all(slopes < 0)
 assert min(certificates) > 1e-4  # no corner makes it a solution
 
 # %% [markdown]
-# Every answer of the rounded problem creeps, and its derivative says that more friction would help. A smaller $\varepsilon$
-# makes these errors smaller. But it makes Newton's method harder, because the round corner becomes a sharp one. The
-# certificate tells the two laws apart: a solution of Coulomb's law passes it, and a solution of a smooth law does not. If we
-# keep the kinks, we also know *which* contacts are at a kink, and what happens on each side of it.
+# Every answer of the rounded problem creeps, and its derivative says that more friction would help.
+# A smaller $\varepsilon$ makes these errors smaller. But it makes Newton's method harder, because
+# the round corner becomes a sharp one. The certificate tells the two laws apart: a solution of
+# Coulomb's law passes it, and a solution of a smooth law does not. If we keep the kinks, we also
+# know *which* contacts are at a kink, and what happens on each side of it.
 #
 # ## The convex case: derivatives of cone programs
 #
-# Contact without friction, and with associated friction, is a convex program. `diffcp` differentiates solutions of convex
-# cone programs, and `cvxpy` and `cvxpylayers` build on it. The programs must be convex, so Coulomb's law is not among
-# them. Where both apply they must agree. This cell is skipped if `diffcp` is not installed.
+# Contact without friction, and with associated friction, is a convex program. `diffcp`
+# differentiates solutions of convex cone programs, and `cvxpy` and `cvxpylayers` build on it. The
+# programs must be convex, so Coulomb's law is not among them. Where both apply they must agree.
+# This cell is skipped if `diffcp` is not installed.
 
 # %%
 rng = np.random.default_rng(2)
 A = rng.normal(size=(8, 8))
-many = InterfaceProblem(A @ A.T / 8 + 0.3 * np.eye(8), 0.5 * rng.normal(size=(4, 2)) - [0.8, 0.0], 0.0)
+many = InterfaceProblem(
+    A @ A.T / 8 + 0.3 * np.eye(8), 0.5 * rng.normal(size=(4, 2)) - [0.8, 0.0], 0.0
+)
 answer = solve(many, tol=1e-12)
 direction = rng.normal(size=4)
-ours = sensitivity(many, answer).forward(q=np.stack([direction, 0 * direction], axis=1)).reactions[:, 0]
-print(f"contacts that touch: {int((answer.reactions[:, 0] > 0).sum())} of 4; ours: {np.round(ours, 6)}")
+ours = (
+    sensitivity(many, answer)
+    .forward(q=np.stack([direction, 0 * direction], axis=1))
+    .reactions[:, 0]
+)
+print(
+    f"contacts that touch: {int((answer.reactions[:, 0] > 0).sum())} of 4; ours: {np.round(ours, 6)}"
+)
 
 if find_spec("diffcp"):
     force, load = cp.Variable(4), cp.Parameter(4)
     load.value = many.q[:, 0]
     normal = cp.Problem(
-        cp.Minimize(cp.sum_squares(np.linalg.cholesky(many.Q[::2, ::2]).T @ force) / 2 + load @ force), [force >= 0]
+        cp.Minimize(
+            cp.sum_squares(np.linalg.cholesky(many.Q[::2, ::2]).T @ force) / 2 + load @ force
+        ),
+        [force >= 0],
     )
     normal.solve(requires_grad=True, eps=1e-10)
     load.delta = direction
@@ -236,16 +270,19 @@ if find_spec("diffcp"):
 
 t = 1e-6
 there = replace(many, q=many.q + t * np.stack([direction, 0 * direction], axis=1))
-assert np.allclose((solve(there, tol=1e-13).reactions[:, 0] - answer.reactions[:, 0]) / t, ours, atol=1e-5)
+assert np.allclose(
+    (solve(there, tol=1e-13).reactions[:, 0] - answer.reactions[:, 0]) / t, ours, atol=1e-5
+)
 
 # %% [markdown]
 # ## Design: a punch with an even pressure
 #
-# A flat punch presses hardest at its corners. Which profile makes the pressure even? `contactopt.design` minimises the
-# largest pressure. In each step it solves a *linear* program, which uses the derivatives of all pressures with respect to all
-# shapes. The step may not leave a region in which these derivatives can be trusted. It is kept only if the largest pressure
-# of the *certified* solution has really become smaller. The largest of several pressures is a function with kinks as well.
-# In a linear program it becomes a set of constraints, and its kinks do no harm.
+# A flat punch presses hardest at its corners. Which profile makes the pressure even?
+# `contactopt.design` minimises the largest pressure. In each step it solves a *linear* program,
+# which uses the derivatives of all pressures with respect to all shapes. The step may not leave a
+# region in which these derivatives can be trusted. It is kept only if the largest pressure of the
+# *certified* solution has really become smaller. The largest of several pressures is a function
+# with kinks as well. In a linear program it becomes a set of constraints, and its kinks do no harm.
 
 # %%
 half, cells = 10.0, 40
@@ -275,13 +312,13 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** At $q_n = 0$ and $q_t = 0.5$ mm the node just touches the floor. Between which two states does `sensitivity` see it?
-# What are the two one-sided derivatives with respect to $q_n$?
+# **1.** At $q_n = 0$ and $q_t = 0.5$ mm the node just touches the floor. Between which two states
+# does `sensitivity` see it? What are the two one-sided derivatives with respect to $q_n$?
 #
 # <details><summary>Solution</summary>
 #
-# The node is between open and closed. If it is lifted, it has no force. If it is pressed, it slips to the right, and the
-# formula that we found by hand holds.
+# The node is between open and closed. If it is lifted, it has no force. If it is pressed, it slips
+# to the right, and the formula that we found by hand holds.
 #
 # ```python
 # touching = InterfaceProblem(Q, [[0.0, 0.5]], 0.5)
@@ -294,13 +331,14 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 #
 # </details>
 #
-# **2.** At the apex of the cone, $q = (0, 0)$, the node neither presses nor slips. Show that the one-sided derivative with
-# respect to $q$ is not linear: the derivative along the sum of two directions is not the sum of the derivatives.
+# **2.** At the apex of the cone, $q = (0, 0)$, the node neither presses nor slips. Show that the
+# one-sided derivative with respect to $q$ is not linear: the derivative along the sum of two
+# directions is not the sum of the derivatives.
 #
 # <details><summary>Solution</summary>
 #
-# Close to the apex the problem looks the same in all scales, so the one-sided derivative along $d$ is the solution of the
-# problem with $q = d$ itself: a contact problem, not a linear map.
+# Close to the apex the problem looks the same in all scales, so the one-sided derivative along $d$
+# is the solution of the problem with $q = d$ itself: a contact problem, not a linear map.
 #
 # ```python
 # nothing = InterfaceProblem(Q, [[0.0, 0.0]], 0.5)
@@ -314,13 +352,13 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 #
 # </details>
 #
-# **3.** Add a constraint to the design: the profile must have the height zero at the rim. Can the largest pressure become
-# smaller by this?
+# **3.** Add a constraint to the design: the profile must have the height zero at the rim. Can the
+# largest pressure become smaller by this?
 #
 # <details><summary>Solution</summary>
 #
-# It cannot, because fewer profiles are allowed. The coefficients of the even powers add up to the height at the rim, so the
-# constraint is that their sum is zero.
+# It cannot, because fewer profiles are allowed. The coefficients of the even powers add up to the
+# height at the rim, so the constraint is that their sum is zero.
 #
 # ```python
 # tied = contactopt.design(punch, shapes, constraints=lambda c: [cp.sum(c) == 0])

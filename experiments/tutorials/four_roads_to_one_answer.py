@@ -1,10 +1,11 @@
 # %% [markdown]
 # # 4. Four roads to one answer
 #
-# A solution of Coulomb's problem is not the minimum of an energy. So every method replaces this problem, again and again,
-# by another one that can be solved. In this tutorial we give the same problem to four methods: the alternating iteration,
-# Tresca's iteration, Newton's method and the convex relaxation. The first three arrive at the same answer on different
-# roads. The fourth needs one step only, but arrives at the answer to another problem.
+# A solution of Coulomb's problem is not the minimum of an energy. So every method replaces this
+# problem, again and again, by another one that can be solved. In this tutorial we give the same
+# problem to four methods: the alternating iteration, Tresca's iteration, Newton's method and the
+# convex relaxation. The first three arrive at the same answer on different roads. The fourth needs
+# one step only, but arrives at the answer to another problem.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has the programs for one node.
 
@@ -17,10 +18,11 @@ from contactopt import diagnose, natural_map_residual, reduce, scenes, solve
 # %% [markdown]
 # ## The problem
 #
-# A block, 40 mm wide and 40 mm high, is pressed on a foundation of the same rubber with 100 N. It is symmetric, so we
-# model its right half. The normal $n$ points up, out of the foundation. The tangent $t$ points to the right, which is
-# outwards. $r$ is the force on the block. Under the load both surfaces stretch, but not equally, and friction resists the
-# difference. With $\mu = 0.2$ about half of the nodes slip.
+# A block, 40 mm wide and 40 mm high, is pressed on a foundation of the same rubber with 100 N. It
+# is symmetric, so we model its right half. The normal $n$ points up, out of the foundation. The
+# tangent $t$ points to the right, which is outwards. $r$ is the force on the block. Under the load
+# both surfaces stretch, but not equally, and friction resists the difference. With $\mu = 0.2$
+# about half of the nodes slip.
 
 # %%
 problem = reduce(scenes.flat_punch(2, mu=0.2, elements=32))
@@ -28,7 +30,9 @@ answers, tol = {}, 1e-10
 for method in ("alternating", "tresca", "newton", "relaxation"):
     answers[method] = solve(problem, method, tol=tol)
     answer = answers[method]
-    print(f"{method:12} {answer.status!s:8} {answer.iterations:2} iterations, certificate {answer.residual:.0e}")
+    print(
+        f"{method:12} {answer.status!s:8} {answer.iterations:2} iterations, certificate {answer.residual:.0e}"
+    )
 
 r = answers["newton"].reactions
 slips = np.abs(r[:, 1]) > (1 - 1e-9) * 0.2 * r[:, 0]
@@ -40,7 +44,8 @@ for method in ("alternating", "tresca"):
     assert np.allclose(answers[method].reactions, r, atol=1e-7 * r.max())
 
 # %% [markdown]
-# Three of the methods have found the same answer. Their forces differ by less than $10^{-7}$ of the largest one.
+# Three of the methods have found the same answer. Their forces differ by less than $10^{-7}$ of the
+# largest one.
 #
 # ## The roads
 #
@@ -63,13 +68,14 @@ ax.set(xlabel="iteration [-]", ylabel="certificate: natural-map residual [-]")
 _ = ax.legend(frameon=False)
 
 # %% [markdown]
-# The two fixed-point iterations go down a straight line, because every iteration multiplies the error by the same number.
-# Newton's method looks slow at first, because it has to find out which nodes slip. As soon as it knows, the equations are
-# linear, and the next step is exact.
+# The two fixed-point iterations go down a straight line, because every iteration multiplies the
+# error by the same number. Newton's method looks slow at first, because it has to find out which
+# nodes slip. As soon as it knows, the equations are linear, and the next step is exact.
 #
-# Can we know the slope of the straight lines beforehand? Near the solution the iteration is a linear map. Change the normal
-# forces a little; the friction forces of the slipping nodes change, and in turn the normal forces change. This map is
-# called the *slip map*, and its largest eigenvalue is the factor. `diagnose` computes it.
+# Can we know the slope of the straight lines beforehand? Near the solution the iteration is a
+# linear map. Change the normal forces a little; the friction forces of the slipping nodes change,
+# and in turn the normal forces change. This map is called the *slip map*, and its largest
+# eigenvalue is the factor. `diagnose` computes it.
 
 # %%
 local = diagnose(problem, answers["newton"]).local
@@ -84,22 +90,31 @@ assert answers["newton"].history[-1]["residual"] < 1e-8 * answers["newton"].hist
 assert local.slip == slips.sum()
 
 # %% [markdown]
-# The factors are small, because friction couples only weakly to the normal forces here. The factor grows with $\mu$. If it
-# is one or more at a solution, the iteration does not converge to that solution.
-# [Tutorial 5](no_one_or_three_solutions.py) shows this case.
+# The factors are small, because friction couples only weakly to the normal forces here. The factor
+# grows with $\mu$. If it is one or more at a solution, the iteration does not converge to that
+# solution. [Tutorial 5](no_one_or_three_solutions.py) shows this case.
 #
-# Now we follow one slipping node on its way. `solve` with `max_iterations=j` returns the state of a method after $j$
-# iterations. As in tutorial 1, the friction force is drawn to the right and the normal force upwards.
+# Now we follow one slipping node on its way. `solve` with `max_iterations=j` returns the state of a
+# method after $j$ iterations. As in tutorial 1, the friction force is drawn to the right and the
+# normal force upwards.
 
 # %%
 node = np.flatnonzero(slips)[-8]
 fig, ax = plt.subplots(figsize=(6, 4.4), layout="constrained")
 for method, style in (("alternating", "o-"), ("tresca", "s-"), ("newton", "D-")):
-    road = [solve(problem, method, tol=1e-13, max_iterations=j).reactions[node] for j in range(1, 8)]
+    road = [
+        solve(problem, method, tol=1e-13, max_iterations=j).reactions[node] for j in range(1, 8)
+    ]
     normal, tangential = np.transpose(road)
     ax.plot(tangential, normal, style, mfc="none", label=method)
 normal = np.array([0.97, 1.03]) * r[node, 0]
-ax.plot(np.sign(r[node, 1]) * 0.2 * normal, normal, "k--", lw=1, label=r"edge of the cone, $|r_t| = \mu\, r_n$")
+ax.plot(
+    np.sign(r[node, 1]) * 0.2 * normal,
+    normal,
+    "k--",
+    lw=1,
+    label=r"edge of the cone, $|r_t| = \mu\, r_n$",
+)
 ax.plot(r[node, 1], r[node, 0], "k*", ms=12, label="solution")
 ax.set(xlabel="friction force $r_t$ [N]", ylabel="normal force $r_n$ [N]")
 _ = ax.legend(frameon=False)
@@ -107,11 +122,12 @@ _ = ax.legend(frameon=False)
 # %% [markdown]
 # ## The fourth road
 #
-# The *convex relaxation* minimises the energy over all cones at once, $\min \tfrac12 r'Qr + q'r$ with
-# $|r_t| \le \mu r_n$. It is one convex program without any iteration around it. Its certificate, printed above, is about
-# $2 \cdot 10^{-2}$, while those of the other methods are below $10^{-10}$. This is not a rounding error. The relaxation has
-# solved its own problem exactly, but that problem is another one: *associated friction*. In this law a contact that slips
-# also opens, by $u_n = \mu |u_t|$.
+# The *convex relaxation* minimises the energy over all cones at once, $\min \tfrac12 r'Qr + q'r$
+# with $|r_t| \le \mu r_n$. It is one convex program without any iteration around it. Its
+# certificate, printed above, is about $2 \cdot 10^{-2}$, while those of the other methods are below
+# $10^{-10}$. This is not a rounding error. The relaxation has solved its own problem exactly, but
+# that problem is another one: *associated friction*. In this law a contact that slips also opens,
+# by $u_n = \mu |u_t|$.
 
 # %%
 relaxed = answers["relaxation"]
@@ -136,9 +152,10 @@ assert np.allclose(u_relaxed[:, 0], 0.2 * np.abs(u_relaxed[:, 1]), atol=1e-6)  #
 assert np.isclose(relaxed.reactions[:, 0].sum(), 100.0)
 
 # %% [markdown]
-# In this law the slipping edge of the block floats above the foundation and is pressed on it at the same time. For rock or
-# sand, which dilate when they slide, that may be right. For metals and rubber it is not. The relaxation has Coulomb's
-# answer only where no loaded contact slips. `diagnose` tells whether this is so, and calls the relaxation *tight* then.
+# In this law the slipping edge of the block floats above the foundation and is pressed on it at the
+# same time. For rock or sand, which dilate when they slide, that may be right. For metals and
+# rubber it is not. The relaxation has Coulomb's answer only where no loaded contact slips.
+# `diagnose` tells whether this is so, and calls the relaxation *tight* then.
 
 # %%
 print(diagnose(problem))
@@ -147,10 +164,10 @@ assert diagnose(problem).relaxation == "not tight"
 assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 
 # %% [markdown]
-# Which road should you take? Newton's method needs few steps. Each step takes one factorisation of a dense matrix. It may run
-# in a circle if $Q$ is singular. The fixed-point iterations need nothing but a good QP solver. The default,
-# `solve(problem)`, begins with Newton's method. If that fails, it tries an interior-point method, then cone programs, and at
-# last the method `proximal`.
+# Which road should you take? Newton's method needs few steps. Each step takes one factorisation of
+# a dense matrix. It may run in a circle if $Q$ is singular. The fixed-point iterations need nothing
+# but a good QP solver. The default, `solve(problem)`, begins with Newton's method. If that fails,
+# it tries an interior-point method, then cone programs, and at last the method `proximal`.
 #
 # ## Exercises
 #
@@ -158,8 +175,9 @@ assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 #
 # <details><summary>Solution</summary>
 #
-# Without friction the bounds are known to be zero, so the first QP gives the answer. With much friction every node
-# sticks. Then the bounds do not matter, and Tresca's iteration confirms its first answer by its second.
+# Without friction the bounds are known to be zero, so the first QP gives the answer. With much
+# friction every node sticks. Then the bounds do not matter, and Tresca's iteration confirms its
+# first answer by its second.
 #
 # ```python
 # smooth = reduce(scenes.flat_punch(2, mu=0.0, elements=16))
@@ -172,7 +190,8 @@ assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 #
 # </details>
 #
-# **2.** Repair the relaxation with the cure of tutorial 1: `acary_cadoux`. How many cone programs does it take?
+# **2.** Repair the relaxation with the cure of tutorial 1: `acary_cadoux`. How many cone programs
+# does it take?
 #
 # <details><summary>Solution</summary>
 #
@@ -184,12 +203,13 @@ assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 #
 # </details>
 #
-# **3.** Refine the mesh from 8 to 64 elements. How do the iteration counts of Newton and Tresca grow?
+# **3.** Refine the mesh from 8 to 64 elements. How do the iteration counts of Newton and Tresca
+# grow?
 #
 # <details><summary>Solution</summary>
 #
-# The count of Tresca's iteration does not grow, because its factor is a property of the bodies and not of the mesh. That of
-# Newton's method grows a little, because there are more nodes to sort.
+# The count of Tresca's iteration does not grow, because its factor is a property of the bodies and
+# not of the mesh. That of Newton's method grows a little, because there are more nodes to sort.
 #
 # ```python
 # counts = {}

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # 8. Reading a stranger's problem: FCLib
 #
-# FCLib is a collection of friction problems from real simulations: boxes in a stack, grains in a silo, a wall of
-# bricks. It is also a file format (HDF5), by which people with different codes can work on the same problem. In this
-# tutorial a stranger writes such a file without any help from this package. We read the file, look at the problem, solve it,
-# and write a file back.
+# FCLib is a collection of friction problems from real simulations: boxes in a stack, grains in a
+# silo, a wall of bricks. It is also a file format (HDF5), by which people with different codes can
+# work on the same problem. In this tutorial a stranger writes such a file without any help from
+# this package. We read the file, look at the problem, solve it, and write a file back.
 #
 # Reading time: 10 minutes. You need `h5py` (`pip install 'contactopt[fclib]'`).
 
@@ -33,24 +33,28 @@ folder = TemporaryDirectory()
 # %% [markdown]
 # ## The stranger
 #
-# A rigid cube has edges of 1 m and a mass of 1 kg. It slides over a floor at 0.5 m/s to the right and 0.2 m/s away from us,
-# and touches the floor with its four lower corners. The stranger takes a time step of 0.05 s.
+# A rigid cube has edges of 1 m and a mass of 1 kg. It slides over a floor at 0.5 m/s to the right
+# and 0.2 m/s away from us, and touches the floor with its four lower corners. The stranger takes a
+# time step of 0.05 s.
 #
-# The stranger's unknowns are *velocities* $v$ (three of the centre and three of rotation) and *impulses* $r$. The letters
-# here are those of FCLib, whose global form reads
+# The stranger's unknowns are *velocities* $v$ (three of the centre and three of rotation) and
+# *impulses* $r$. The letters here are those of FCLib, whose global form reads
 #
 # $$ M v = H r + f, \qquad u = H' v + w . $$
 #
-# $M$ is the mass matrix. $f$ is the momentum that the cube has, together with what gravity adds to it in the step. $H'$ takes
-# the motion of the cube to the velocities $u$ of its corners. The signs are those of this package: $n$ points out of the
-# floor, $r_n \ge 0$ pushes the cube up, and the block of each corner has its normal component first.
+# $M$ is the mass matrix. $f$ is the momentum that the cube has, together with what gravity adds to
+# it in the step. $H'$ takes the motion of the cube to the velocities $u$ of its corners. The signs
+# are those of this package: $n$ points out of the floor, $r_n \ge 0$ pushes the cube up, and the
+# block of each corner has its normal component first.
 
 # %%
 M = np.diag([1.0, 1.0, 1.0, 1 / 6, 1 / 6, 1 / 6])  # kg and kg m^2
 velocity, step = np.array([0.5, 0.2, 0.0, 0.0, 0.0, 0.0]), 0.05
 f = M @ velocity - step * 9.81 * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
-corners = np.array([[x, y, -0.5] for x in (-0.5, 0.5) for y in (-0.5, 0.5)])  # m, seen from the centre
+corners = np.array(
+    [[x, y, -0.5] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
+)  # m, seen from the centre
 directions = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # n, t1, t2
 H = np.column_stack([np.concatenate([d, np.cross(p, d)]) for p in corners for d in directions])
 
@@ -58,9 +62,18 @@ H = np.column_stack([np.concatenate([d, np.cross(p, d)]) for p in corners for d 
 def write_matrix(group, matrix):
     """Sparse matrices are stored by columns (nz = -1) or rows (-2), or as triplets (nz >= 0)."""
     rows, columns = np.nonzero(matrix)
-    for key, value in (("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", len(rows)), ("nzmax", len(rows))):
+    for key, value in (
+        ("m", matrix.shape[0]),
+        ("n", matrix.shape[1]),
+        ("nz", len(rows)),
+        ("nzmax", len(rows)),
+    ):
         group[key] = np.array([value], dtype=np.int32)
-    group["i"], group["p"], group["x"] = rows.astype(np.int32), columns.astype(np.int32), matrix[rows, columns]
+    group["i"], group["p"], group["x"] = (
+        rows.astype(np.int32),
+        columns.astype(np.int32),
+        matrix[rows, columns],
+    )
 
 
 path = Path(folder.name, "cube.hdf5")
@@ -74,9 +87,9 @@ with h5py.File(path, "w") as file:
 # %% [markdown]
 # ## Reading the file
 #
-# One line reads the file. The result has the same type as the problems that come from finite elements, because the
-# mathematics are the same. The motion is eliminated, so that $u = W r + q$ with $W = H' M^{-1} H$ and
-# $q = H' M^{-1} f + w$. What FCLib calls $W$ is called $Q$ here.
+# One line reads the file. The result has the same type as the problems that come from finite
+# elements, because the mathematics are the same. The motion is eliminated, so that $u = W r + q$
+# with $W = H' M^{-1} H$ and $q = H' M^{-1} f + w$. What FCLib calls $W$ is called $Q$ here.
 
 # %%
 problem = fclib.read(path)
@@ -98,9 +111,10 @@ print(diagnose(problem))
 assert np.linalg.matrix_rank(problem.Q) == 6
 
 # %% [markdown]
-# The matrix has 12 rows, but its rank is only 6. A rigid cube can move in six ways, but its four corners have twelve
-# components. It is like a table on four legs, where nobody can say how much each leg carries. So the impulses are *not
-# unique*, whatever the friction is. Solvers that need a positive definite matrix may fail here.
+# The matrix has 12 rows, but its rank is only 6. A rigid cube can move in six ways, but its four
+# corners have twelve components. It is like a table on four legs, where nobody can say how much
+# each leg carries. So the impulses are *not unique*, whatever the friction is. Solvers that need a
+# positive definite matrix may fail here.
 #
 # ## Solve
 
@@ -132,15 +146,16 @@ spread = np.ptp([answer.reactions[:, 0] for answer in answers.values()], axis=0)
 assert spread.max() > 0.005
 
 # %% [markdown]
-# The four methods find different impulses, but the *same motion*: friction takes $\mu g$ times the time step off the speed,
-# against the direction of the motion. The front corners carry more, because friction at the floor tips the cube forwards.
-# All four answers are certified, because the certificate asks whether the laws hold, and not whether one answer looks like
-# another.
+# The four methods find different impulses, but the *same motion*: friction takes $\mu g$ times the
+# time step off the speed, against the direction of the motion. The front corners carry more,
+# because friction at the floor tips the cube forwards. All four answers are certified, because the
+# certificate asks whether the laws hold, and not whether one answer looks like another.
 #
 # ## Two ways to measure
 #
-# The FCLib community quotes the natural-map residual with step $\rho = 1$. That number changes if you measure mass in
-# grams, because it adds velocities to impulses. Our certificate balances the two first and does not change.
+# The FCLib community quotes the natural-map residual with step $\rho = 1$. That number changes if
+# you measure mass in grams, because it adds velocities to impulses. Our certificate balances the
+# two first and does not change.
 
 # %%
 r = answers["nsgs"].reactions
@@ -157,13 +172,19 @@ assert published < 0.1 * first[1]
 # %% [markdown]
 # ## Write one back
 #
-# Elastic problems fit into the local form of FCLib, $u = W r + V \lambda + q$. If a plate presses a block down, the contact
-# forces must balance the load of the plate. FCLib calls this the equality part of its mixed form. All numbers are kept to the
-# last bit. Coordinates and nodal areas are not part of the format, so they are lost.
+# Elastic problems fit into the local form of FCLib, $u = W r + V \lambda + q$. If a plate presses a
+# block down, the contact forces must balance the load of the plate. FCLib calls this the equality
+# part of its mixed form. All numbers are kept to the last bit. Coordinates and nodal areas are not
+# part of the format, so they are lost.
 
 # %%
 block = reduce(scenes.flat_punch(3, elements=2, mu=0.2))
-fclib.write(block, Path(folder.name, "block.hdf5"), title="block", description="a block pressed on a foundation, 100 N")
+fclib.write(
+    block,
+    Path(folder.name, "block.hdf5"),
+    title="block",
+    description="a block pressed on a foundation, 100 N",
+)
 back = fclib.read(Path(folder.name, "block.hdf5"))
 
 with h5py.File(Path(folder.name, "block.hdf5")) as file:
@@ -189,42 +210,40 @@ folder.cleanup()
 # %% [markdown]
 # ## Exercises
 #
-# **1.** Make the floor rough, $\mu = 2$. The cube should tip over. Which corners carry the weight, and what moves?
+# **1.** Make the floor rough, $\mu = 2$. The cube should tip over. Which corners carry the weight,
+# and what moves?
 #
 # <details><summary>Solution</summary>
 #
-# The friction impulse that would stop the motion to the right is 0.5 N s, and it acts half a metre below the centre. The
-# normal impulse is 0.4905 N s, and it acts at most half a metre in front of the centre, which is not quite enough. Both rear
-# corners lift off slowly.
+# The friction impulse that would stop the motion to the right is 0.5 N s, and it acts half a metre
+# below the centre. The normal impulse is 0.4905 N s, and it acts at most half a metre in front of
+# the centre, which is not quite enough. Both rear corners lift off slowly.
 #
 # ```python
-# rough = InterfaceProblem(problem.Q, problem.q, 2.0)
-# answer = solve(rough)
-# u = rough.displacements(answer.reactions, answer.multipliers)
-# assert answer.solved
-# assert np.all(u[:2, 0] > 1e-3) and np.allclose(answer.reactions[:2], 0.0, atol=1e-9)  # the rear is off the floor
-# assert np.allclose(u[2:], 0.0, atol=1e-9)  # the front sticks
-# spin = np.linalg.solve(M, H @ answer.reactions.ravel() + f)[3:]
-# assert spin[1] > 1e-3 and np.allclose(spin[[0, 2]], 0.0, atol=1e-9)
+# rough = InterfaceProblem(problem.Q, problem.q, 2.0) answer = solve(rough) u =
+# rough.displacements(answer.reactions, answer.multipliers) assert answer.solved assert np.all(u[:2,
+# 0] > 1e-3) and np.allclose(answer.reactions[:2], 0.0, atol=1e-9)  # the rear is off the floor
+# assert np.allclose(u[2:], 0.0, atol=1e-9)  # the front sticks spin = np.linalg.solve(M, H @
+# answer.reactions.ravel() + f)[3:] assert spin[1] > 1e-3 and np.allclose(spin[[0, 2]], 0.0,
+# atol=1e-9)
 # ```
 #
 # </details>
 #
-# **2.** Which part of the impulses is not unique? Find a change of the four normal impulses that moves nothing.
+# **2.** Which part of the impulses is not unique? Find a change of the four normal impulses that
+# moves nothing.
 #
 # <details><summary>Solution</summary>
 #
-# Press one diagonal of the table down and lift the other one. The change $(1, -1, -1, 1)$ of the normal components has no
-# resultant and no moment. It is in the kernel of $Q$.
+# Press one diagonal of the table down and lift the other one. The change $(1, -1, -1, 1)$ of the
+# normal components has no resultant and no moment. It is in the kernel of $Q$.
 #
 # ```python
-# twist = np.zeros((4, 3))
-# twist[:, 0] = [1.0, -1.0, -1.0, 1.0]
-# assert np.allclose(problem.Q @ twist.ravel(), 0.0)
-# difference = answers["nsgs"].reactions - answers["auto"].reactions
-# assert np.linalg.norm(difference[:, 0]) > 0.005
-# assert np.allclose(problem.Q @ difference.ravel(), 0.0, atol=1e-8)  # two answers differ by such a change
-# assert abs(difference[:, 0] @ twist[:, 0]) > 0.99 * np.linalg.norm(difference[:, 0]) * np.linalg.norm(twist)
+# twist = np.zeros((4, 3)) twist[:, 0] = [1.0, -1.0, -1.0, 1.0] assert np.allclose(problem.Q @
+# twist.ravel(), 0.0) difference = answers["nsgs"].reactions - answers["auto"].reactions assert
+# np.linalg.norm(difference[:, 0]) > 0.005 assert np.allclose(problem.Q @ difference.ravel(), 0.0,
+# atol=1e-8)  # two answers differ by such a change assert abs(difference[:, 0] @ twist[:, 0]) >
+# 0.99 * np.linalg.norm(difference[:, 0]) * np.linalg.norm(twist)
 # ```
 #
 # </details>

@@ -1,13 +1,15 @@
 # %% [markdown]
 # # 3. The circulant preconditioner and why it works
 #
-# [Tutorial 2](from_bodies_to_compliance.py) found what the compliance $Q$ does to a wave of force: it makes a wave of
-# displacement out of it, and divides it by the wave number $|\xi|$. If we multiply a displacement by $|\xi|$, we nearly undo
-# $Q$. The Fourier transform does this at almost no cost. That is the whole idea. In this tutorial we write such a
-# preconditioner in a few lines. We compare it with those of a paper, A. Lotfi's *Domain-Decomposition based H^1/2 Seminorm
+# [Tutorial 2](from_bodies_to_compliance.py) found what the compliance $Q$ does to a wave of force:
+# it makes a wave of displacement out of it, and divides it by the wave number $|\xi|$. If we
+# multiply a displacement by $|\xi|$, we nearly undo $Q$. The Fourier transform does this at almost
+# no cost. That is the whole idea. In this tutorial we write such a preconditioner in a few lines.
+# We compare it with those of a paper, A. Lotfi's *Domain-Decomposition based H^1/2 Seminorm
 # Preconditioners for Frictional Contact Problems*, and count iterations.
 #
-# Reading time: 10 minutes. You need the conjugate gradient method (CG) and the discrete Fourier transform (FFT).
+# Reading time: 10 minutes. You need the conjugate gradient method (CG) and the discrete Fourier
+# transform (FFT).
 
 # %%
 import matplotlib.pyplot as plt
@@ -21,9 +23,10 @@ from contactopt.methods.preconditioners import preconditioner
 # %% [markdown]
 # ## The problem of size
 #
-# We take the two blocks of tutorial 2: a punch, 4 mm wide and 4 mm high, stands on a foundation, 16 mm wide and 8 mm high.
-# We ask CG for the forces $r$ that close a given gap $b$, that is, for the solution of $Q r = b$. All nodes are in contact
-# here, and there is no inequality. Every contact solver has such a linear system inside.
+# We take the two blocks of tutorial 2: a punch, 4 mm wide and 4 mm high, stands on a foundation, 16
+# mm wide and 8 mm high. We ask CG for the forces $r$ that close a given gap $b$, that is, for the
+# solution of $Q r = b$. All nodes are in contact here, and there is no inequality. Every contact
+# solver has such a linear system inside.
 
 
 # %%
@@ -42,7 +45,14 @@ def two_blocks(nodes):
 def iterations(Q, P=None):
     residuals = []
     b = np.random.default_rng(0).normal(size=len(Q))
-    cg(Q, b, rtol=1e-8, maxiter=5000, M=P, callback=lambda x: residuals.append(np.linalg.norm(b - Q @ x)))
+    cg(
+        Q,
+        b,
+        rtol=1e-8,
+        maxiter=5000,
+        M=P,
+        callback=lambda x: residuals.append(np.linalg.norm(b - Q @ x)),
+    )
     return len(residuals)
 
 
@@ -53,19 +63,21 @@ print("CG iterations without preconditioner:", plain)
 assert plain[129] > 2 * plain[17]
 
 # %% [markdown]
-# The condition number $\kappa$ doubles when the number of nodes doubles. CG needs about $\sqrt\kappa$ iterations, so every
-# refinement takes about 1.4 times as many iterations, and each of them has a larger product. A preconditioner
-# $P \approx Q^{-1}$ lets CG work on $P Q$ instead.
+# The condition number $\kappa$ doubles when the number of nodes doubles. CG needs about
+# $\sqrt\kappa$ iterations, so every refinement takes about 1.4 times as many iterations, and each
+# of them has a larger product. A preconditioner $P \approx Q^{-1}$ lets CG work on $P Q$ instead.
 #
-# What is $P$ applied to? In every iteration CG applies it to the residual $b - Q r$. This vector is a gap that has not been
-# closed yet, so it is a *displacement*, and $P$ answers with the *force* that would about close it.
+# What is $P$ applied to? In every iteration CG applies it to the residual $b - Q r$. This vector is
+# a gap that has not been closed yet, so it is a *displacement*, and $P$ answers with the *force*
+# that would about close it.
 #
 # ## Five lines
 #
-# A *circulant* matrix is one whose rows are shifted copies of each other, where the last entry goes round to the front.
-# The FFT diagonalises all circulant matrices at once. Their eigenvalues, as a function of the wave number, are called the
-# *symbol*. We choose the symbol $|\xi|$. The contact line is not a closed curve. So we extend the displacement by zeros to a
-# closed curve of $2m$ nodes, multiply there, and keep only the values on the contact line.
+# A *circulant* matrix is one whose rows are shifted copies of each other, where the last entry goes
+# round to the front. The FFT diagonalises all circulant matrices at once. Their eigenvalues, as a
+# function of the wave number, are called the *symbol*. We choose the symbol $|\xi|$. The contact
+# line is not a closed curve. So we extend the displacement by zeros to a closed curve of $2m$
+# nodes, multiply there, and keep only the values on the contact line.
 
 
 # %%
@@ -76,20 +88,28 @@ def multiply_by_wave_number(nodes):
 
     def product(displacement):
         components = displacement.reshape(nodes, 2)  # normal and tangential, each by itself
-        return np.fft.ifft(xi[:, None] * np.fft.fft(components, n=2 * m, axis=0), axis=0).real[:nodes].ravel()
+        return (
+            np.fft.ifft(xi[:, None] * np.fft.fft(components, n=2 * m, axis=0), axis=0)
+            .real[:nodes]
+            .ravel()
+        )
 
     return LinearOperator((2 * nodes, 2 * nodes), matvec=product)
 
 
-ours = {nodes: iterations(problem.Q, multiply_by_wave_number(nodes)) for nodes, problem in problems.items()}
+ours = {
+    nodes: iterations(problem.Q, multiply_by_wave_number(nodes))
+    for nodes, problem in problems.items()
+}
 print("with |xi|:", ours)
 
 assert all(ours[nodes] < plain[nodes] for nodes in problems)
 assert ours[129] <= ours[17] + 4
 
 # %% [markdown]
-# The number of iterations hardly changes with the mesh any more. One application costs two FFTs, which are
-# $O(N \log N)$ operations, while a product with a dense $Q$ costs $N^2$. So the preconditioner is nearly free.
+# The number of iterations hardly changes with the mesh any more. One application costs two FFTs,
+# which are $O(N \log N)$ operations, while a product with a dense $Q$ costs $N^2$. So the
+# preconditioner is nearly free.
 #
 # ## Three that come with the package
 #
@@ -99,9 +119,10 @@ assert ours[129] <= ours[17] + 4
 # | `p22` | the paper's equation 26: the inverse of a sparse circulant form of $Q$ itself |
 # | `neumann` | the square root of the Laplacian of the contact line, by the cosine transform |
 #
-# The trick of the paper is a circulant matrix that is sparse. It has about $\log_2 N$ entries per row for $N$ nodes, so that
-# it needs no FFT. Its symbol is not exactly $|\xi|$, but it stays near it. To see this, we give waves of displacement to each
-# preconditioner, and measure by how much it multiplies them.
+# The trick of the paper is a circulant matrix that is sparse. It has about $\log_2 N$ entries per
+# row for $N$ nodes, so that it needs no FFT. Its symbol is not exactly $|\xi|$, but it stays near
+# it. To see this, we give waves of displacement to each preconditioner, and measure by how much it
+# multiplies them.
 
 # %%
 nodes = 129
@@ -125,16 +146,18 @@ ax.set(xlabel="number of the wave [-]", ylabel="what the preconditioner multipli
 _ = ax.legend(frameon=False)
 
 # %% [markdown]
-# All of them follow the dashed line within a constant factor, and no more is needed. If $c_1 |\xi| \le$ symbol
-# $\le c_2 |\xi|$, then the condition number of $P Q$ is at most about $c_2 / c_1$ on every mesh. This is what *spectrally
-# equivalent* means.
+# All of them follow the dashed line within a constant factor, and no more is needed. If $c_1 |\xi|
+# \le$ symbol $\le c_2 |\xi|$, then the condition number of $P Q$ is at most about $c_2 / c_1$ on
+# every mesh. This is what *spectrally equivalent* means.
 #
 # ## Count
 
 # %%
 counts = {"none": plain, "|xi|, five lines": ours}
 for name in ("p21", "p22", "neumann"):
-    counts[name] = {k: iterations(problem.Q, preconditioner(problem, name)) for k, problem in problems.items()}
+    counts[name] = {
+        k: iterations(problem.Q, preconditioner(problem, name)) for k, problem in problems.items()
+    }
 
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 for (name, count), style in zip(counts.items(), ("ko-", "C0s-", "C1^-", "C2v-", "C3D-")):
@@ -152,12 +175,14 @@ assert all(counts["neumann"][k] <= counts[name][k] for k in problems for name in
 # %% [markdown]
 # ## Why are they not all the same?
 #
-# They differ at the ends of the line. Our five lines and `p21` extend the displacement by zero. That does no harm to a
-# displacement that vanishes where the contact ends; such functions form the space $H^{1/2}_{00}$. But the displacement does
-# not vanish there: a uniform pressure, for instance, moves the nodes at the edge nearly as far as those in the middle. So
-# the extension by zero makes a jump at each end, and the $H^{1/2}$ norm of a jump is infinite. On a mesh it is finite, but
-# it grows slowly with the number of nodes. The other two avoid the jump. `neumann` continues the displacement by its mirror
-# image. `p22` is the inverse of a matrix that acts on forces, and outside the contact the force *is* zero.
+# They differ at the ends of the line. Our five lines and `p21` extend the displacement by zero.
+# That does no harm to a displacement that vanishes where the contact ends; such functions form the
+# space $H^{1/2}_{00}$. But the displacement does not vanish there: a uniform pressure, for
+# instance, moves the nodes at the edge nearly as far as those in the middle. So the extension by
+# zero makes a jump at each end, and the $H^{1/2}$ norm of a jump is infinite. On a mesh it is
+# finite, but it grows slowly with the number of nodes. The other two avoid the jump. `neumann`
+# continues the displacement by its mirror image. `p22` is the inverse of a matrix that acts on
+# forces, and outside the contact the force *is* zero.
 
 # %%
 pressed = np.zeros((nodes, 2))
@@ -185,7 +210,10 @@ ax.set(xlabel="eigenvalues of P Q over their median [-]", ylabel="preconditioner
 condition = {name: values[-1] / values[0] for name, values in spectra.items()}
 without_largest = {name: values[-2] / values[0] for name, values in spectra.items()}
 print("condition number:", {name: f"{value:.1f}" for name, value in condition.items()})
-print("without the largest eigenvalue:", {name: f"{value:.1f}" for name, value in without_largest.items()})
+print(
+    "without the largest eigenvalue:",
+    {name: f"{value:.1f}" for name, value in without_largest.items()},
+)
 
 values, vectors = np.linalg.eig(PQ)
 motion = (problem.Q @ vectors[:, np.argmax(values.real)].real).reshape(nodes, 2)
@@ -193,33 +221,45 @@ motion = (problem.Q @ vectors[:, np.argmax(values.real)].real).reshape(nodes, 2)
 
 def spread(nodes, name):
     """Largest but one over smallest eigenvalue of P Q."""
-    P = multiply_by_wave_number(nodes) if name == "five lines" else preconditioner(problems[nodes], name)
+    P = (
+        multiply_by_wave_number(nodes)
+        if name == "five lines"
+        else preconditioner(problems[nodes], name)
+    )
     eigenvalues = np.sort(np.linalg.eigvals(P @ problems[nodes].Q).real)
     return eigenvalues[-2] / eigenvalues[0]
 
 
-growth = {name: spread(129, name) / spread(17, name) for name in ("five lines", "p21", "p22", "neumann")}
-print("growth of that from 17 to 129 nodes:", {name: f"{value:.2f}" for name, value in growth.items()})
+growth = {
+    name: spread(129, name) / spread(17, name) for name in ("five lines", "p21", "p22", "neumann")
+}
+print(
+    "growth of that from 17 to 129 nodes:", {name: f"{value:.2f}" for name, value in growth.items()}
+)
 
 assert all(without_largest[name] < 0.5 * condition[name] for name in spectra)
 assert min(growth["five lines"], growth["p21"]) > 1.5  # the displacement extended by zero
 assert max(growth["p22"], growth["neumann"]) < 1.2  # no jump
-assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:, 1])  # sideways, the same everywhere
+assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
+    motion[:, 1]
+)  # sideways, the same everywhere
 
 # %% [markdown]
-# For all three, one eigenvalue stands apart on the right. It belongs to the *sway* of the punch, a motion of the whole
-# body. The symbol describes waves on the surface, and does not contain this motion. CG needs only one or two more iterations
-# to deal with a single eigenvalue. So the condition number looks worse than CG really is. It still pays to solve for such a
-# motion exactly (`contactopt.methods.preconditioners.deflated`), as the last exercise shows.
+# For all three, one eigenvalue stands apart on the right. It belongs to the *sway* of the punch, a
+# motion of the whole body. The symbol describes waves on the surface, and does not contain this
+# motion. CG needs only one or two more iterations to deal with a single eigenvalue. So the
+# condition number looks worse than CG really is. It still pays to solve for such a motion exactly
+# (`contactopt.methods.preconditioners.deflated`), as the last exercise shows.
 #
 # ## Exercises
 #
-# **1.** Many would first try to divide by the diagonal, $P = \mathrm{diag}(Q)^{-1}$. Try it. Why does it not help?
+# **1.** Many would first try to divide by the diagonal, $P = \mathrm{diag}(Q)^{-1}$. Try it. Why
+# does it not help?
 #
 # <details><summary>Solution</summary>
 #
-# The diagonal is nearly constant, because all nodes but those at the edge are alike. Dividing by a constant makes no
-# difference to CG.
+# The diagonal is nearly constant, because all nodes but those at the edge are alike. Dividing by a
+# constant makes no difference to CG.
 #
 # ```python
 # jacobi = LinearOperator((2 * nodes,) * 2, matvec=lambda b: b / np.diag(problem.Q))
@@ -228,11 +268,13 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 #
 # </details>
 #
-# **2.** Show that $|\xi|$ is the right symbol, rather than $|\xi|^{1/2}$ or $|\xi|^2$: try several powers.
+# **2.** Show that $|\xi|$ is the right symbol, rather than $|\xi|^{1/2}$ or $|\xi|^2$: try several
+# powers.
 #
 # <details><summary>Solution</summary>
 #
-# Under a power below one, short waves remain too small in $P Q$; under a power above one, they become too large.
+# Under a power below one, short waves remain too small in $P Q$; under a power above one, they
+# become too large.
 #
 # ```python
 # def power(exponent):
@@ -245,13 +287,14 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 #
 #     return LinearOperator((2 * nodes, 2 * nodes), matvec=product)
 #
-# tried = {exponent: iterations(problem.Q, power(exponent)) for exponent in (0.0, 0.5, 1.0, 1.5, 2.0)}
-# assert min(tried, key=tried.get) == 1.0
+# tried = {exponent: iterations(problem.Q, power(exponent)) for exponent in (0.0, 0.5, 1.0, 1.5,
+# 2.0)} assert min(tried, key=tried.get) == 1.0
 # ```
 #
 # </details>
 #
-# **3.** How much does the sway cost? Solve for it exactly, together with the other smooth motions, and count again.
+# **3.** How much does the sway cost? Solve for it exactly, together with the other smooth motions,
+# and count again.
 #
 # <details><summary>Solution</summary>
 #

@@ -1,6 +1,8 @@
-"""The linear system A x = b of one elastic body: sparse factors or multigrid, behind one protocol (BodySolver).
+"""The linear system A x = b of one elastic body: sparse factors or multigrid, behind one protocol
+(BodySolver).
 
-A solver is a class in a module of its own and a line of SOLVERS. It is made from a contactopt.bodies.solvers.system.System.
+A solver is a class in a module of its own and a line of SOLVERS. It is made from a
+contactopt.bodies.solvers.system.System.
 """
 
 from __future__ import annotations
@@ -15,8 +17,16 @@ from contactopt.errors import InputError
 
 # name -> (module, class, what it is)
 SOLVERS = {
-    "superlu": ("contactopt.bodies.solvers.superlu", "SuperLUSolver", "sparse factors of SciPy's SuperLU"),
-    "pardiso": ("contactopt.bodies.solvers.pardiso", "PardisoSolver", "sparse factors of oneMKL PARDISO (pypardiso)"),
+    "superlu": (
+        "contactopt.bodies.solvers.superlu",
+        "SuperLUSolver",
+        "sparse factors of SciPy's SuperLU",
+    ),
+    "pardiso": (
+        "contactopt.bodies.solvers.pardiso",
+        "PardisoSolver",
+        "sparse factors of oneMKL PARDISO (pypardiso)",
+    ),
     "multigrid": (
         "contactopt.bodies.solvers.multigrid",
         "MultigridSolver",
@@ -35,20 +45,16 @@ def make_solver(name: str, system: System) -> BodySolver:
 
     Parameters
     ----------
-    name
-        A key of SOLVERS, or 'auto' for the cheapest one (see `choose`).
-    system
-        The linear system of the body.
+    name : A key of SOLVERS, or 'auto' for the cheapest one (see `choose`).
+    system : The linear system of the body.
 
     Returns
     -------
-    BodySolver
-        The solver, with its factors or its multigrid levels made.
+    The solver, with its factors or its multigrid levels made.
 
     Raises
     ------
-    InputError
-        For a name that is not in the table, or a package that is not installed.
+    InputError : For a name that is not in the table, or a package that is not installed.
     """
     n, dim = system.A.shape[0], len(system.points)
     kind = solver_type(name, n, dim)
@@ -64,22 +70,17 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
 
     Parameters
     ----------
-    name
-        A key of SOLVERS, or 'auto'.
-    n
-        Number of unknowns of the body.
-    dim
-        Number of its dimensions, 2 or 3.
+    name : A key of SOLVERS, or 'auto'.
+    n : Number of unknowns of the body.
+    dim : Number of its dimensions, 2 or 3.
 
     Returns
     -------
-    type
-        The class.
+    The class.
 
     Raises
     ------
-    InputError
-        For a name that is not in SOLVERS.
+    InputError : For a name that is not in SOLVERS.
     """
     if isinstance(name, str) and name == "auto":
         name = choose(n, dim, find_spec("pypardiso") is not None)
@@ -95,15 +96,12 @@ def factors_of(name: str, dim: int) -> str:
 
     Parameters
     ----------
-    name
-        A key of SOLVERS, or 'auto', which takes PARDISO in space where it is installed.
-    dim
-        Number of dimensions, 2 or 3.
+    name : A key of SOLVERS, or 'auto', which takes PARDISO in space where it is installed.
+    dim : Number of dimensions, 2 or 3.
 
     Returns
     -------
-    str
-        A key of FACTORS_UP_TO.
+    A key of FACTORS_UP_TO.
     """
     if name in FACTORS_UP_TO:
         return name
@@ -113,22 +111,19 @@ def factors_of(name: str, dim: int) -> str:
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
     """Choose the cheapest solver of a body.
 
-    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2) and n^2 operations.
-    The work and the memory of multigrid grow with n. The limits stand in contactopt.bodies.solvers.constants.
+    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2)
+    and n^2 operations. The work and the memory of multigrid grow with n. The limits stand in
+    contactopt.bodies.solvers.constants.
 
     Parameters
     ----------
-    n
-        Number of unknowns of the body.
-    dim
-        Number of its dimensions, 2 or 3.
-    pardiso
-        Whether PARDISO is installed.
+    n : Number of unknowns of the body.
+    dim : Number of its dimensions, 2 or 3.
+    pardiso : Whether PARDISO is installed.
 
     Returns
     -------
-    str
-        A name in SOLVERS.
+    A name in SOLVERS.
     """
     if dim == 2 or n <= PARDISO_FROM:
         return "superlu"

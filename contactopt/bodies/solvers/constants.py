@@ -1,14 +1,17 @@
-"""Every number of the body solvers that was chosen by measurement, with the command that measures it.
+"""Every number of the body solvers that was chosen by measurement, with the command that measures
+it.
 
 None of them changes what a solver converges to. They change only how long it takes.
 """
 
 from __future__ import annotations
 
-# `python -m experiments.questions.body_solvers` measures time and memory of every solver over the number of unknowns.
+# `python -m experiments.questions.body_solvers` measures time and memory of every solver over the
+# number of unknowns.
 PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
 
-# `python -m experiments.questions.ways` compares whole solves; multigrid takes less than half the time of factors beyond these limits.
+# `python -m experiments.questions.ways` compares whole solves; multigrid takes less than half the
+# time of factors beyond these limits.
 FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body that is factorised
 
 # `python -m experiments.questions.solver_constants` compares the elimination orders.
@@ -20,7 +23,9 @@ NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggreg
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one
 
 # Limits, not fitted.
-LARGE = 2**20  # entries of a matrix from which threads share its products; a product takes about a millisecond then
+# entries of a matrix from which threads share its products; a product takes about a millisecond
+# then
+LARGE = 2**20
 SHARE = 4  # pieces of such a product for each core; whoever is free takes the next one
 GALERKIN = 8  # pieces of rows from which the matrix of the next level is summed up
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for

@@ -1,15 +1,18 @@
-"""Multigrid by smoothed aggregation for the stiffness of an elastic body, whose near-kernel are the rigid motions.
+"""Multigrid by smoothed aggregation for the stiffness of an elastic body, whose near-kernel are the
+rigid motions.
 
-Meshes that are graded away from a contact have flat elements, and nodes far along their long sides hardly know of each
-other. Only nodes close to each other in the measure of the mesh around them are aggregated, so that such elements are
-coarsened along their short sides first. Every level is scaled to a unit diagonal and smoothed by Chebyshev polynomials
-of the fourth kind, that is by products with sparse matrices, which leave Python's lock to other threads.
+Meshes that are graded away from a contact have flat elements, and nodes far along their long sides
+hardly know of each other. Only nodes close to each other in the measure of the mesh around them are
+aggregated, so that such elements are coarsened along their short sides first. Every level is scaled
+to a unit diagonal and smoothed by Chebyshev polynomials of the fourth kind, that is by products
+with sparse matrices, which leave Python's lock to other threads.
 
-The V-cycle works in single precision: it only has to come close to the inverse, and its time is the time to read its
-matrices. The conjugate gradients around it work in double precision with the matrix of the body itself.
+The V-cycle works in single precision: it only has to come close to the inverse, and its time is the
+time to read its matrices. The conjugate gradients around it work in double precision with the
+matrix of the body itself.
 
-Sources: Vanek, Mandel, Brezina (1996), Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
-problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
+Sources: Vanek, Mandel, Brezina (1996), Algebraic multigrid by smoothed aggregation for second and
+fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
 """
 
 from __future__ import annotations
@@ -44,8 +47,9 @@ PIECES = 16  # in which the rows of a matrix are brought into blocks
 class MultigridSolver:
     """Conjugate gradients preconditioned by a V-cycle (VCycle), which needs the package pyamg.
 
-    A solve ends where (r' B r)^1/2, r the residual and B the V-cycle, has fallen by `rtol`. This estimates the error in
-    the energy norm, relative to that of the solution. It raises BackendError if it does not get there.
+    A solve ends where (r' B r)^1/2, r the residual and B the V-cycle, has fallen by `rtol`. This
+    estimates the error in the energy norm, relative to that of the solution. It raises BackendError
+    if it does not get there.
 
     A      products with the (n, n) matrix in double precision
     cycle  the VCycle
@@ -103,29 +107,41 @@ class Level:
     R: SparseProduct
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x = r' - A z: x, r', z."""
+        """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x =
+        r' - A z: x, r', z.
+        """
         z = SINGLE(4 / 3) / self.largest * r
         x = z.copy()
         for k in range(2, DEGREE + 1):
             r = r - self.A @ z
-            z = SINGLE((2 * k - 3) / (2 * k + 1)) * z + SINGLE((8 * k - 4) / (2 * k + 1)) / self.largest * r
+            z = (
+                SINGLE((2 * k - 3) / (2 * k + 1)) * z
+                + SINGLE((8 * k - 4) / (2 * k + 1)) / self.largest * r
+            )
             x += z
         return x, r, z
 
 
 class VCycle:
-    """B, symmetric positive definite up to single precision and spectrally close to the inverse of A.
+    """B, symmetric positive definite up to single precision and spectrally close to the inverse of
+    A.
 
-    place     (n,) of each unknown among those of all nodes present, nodes one after the other; held unknowns have a
-              place too, and a row of their own that nothing else touches
+    place     (n,) of each unknown among those of all nodes present, nodes one after the other; held
+              unknowns have a place too, and a row of their own that nothing else touches
     scale     (n,) diag(A)^-1/2
     levels    finest first;   coarsest  the inverse of the last level's matrix
 
-    Arguments as in contactopt.bodies.solvers.system.System, and the threads that share large products. Raises InputError if the package pyamg is missing.
+    Arguments as in contactopt.bodies.solvers.system.System, and the threads that share large
+    products. Raises InputError if the package pyamg is missing.
     """
 
     def __init__(
-        self, A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, points: np.ndarray, crew: Crew
+        self,
+        A: sp.csr_matrix | Block,
+        node: np.ndarray,
+        component: np.ndarray,
+        points: np.ndarray,
+        crew: Crew,
     ):
         blocks, self.place, present = nodal_blocks(A, node, component, len(points))
         self.scale = _inverse_root(A.diagonal())
@@ -139,10 +155,15 @@ class VCycle:
             P, modes, points = _coarsen(blocks, modes, points)
             blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
-            P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
+            P = _scaled(
+                P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse
+            ).tocsr()
             self.levels.append(
                 Level(
-                    level, SINGLE(_largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
+                    level,
+                    SINGLE(_largest_eigenvalue(level)),
+                    SparseProduct(P, crew),
+                    SparseProduct(P.T.tocsr(), crew),
                 )
             )
             scale = coarse
@@ -162,7 +183,9 @@ class VCycle:
         return self.scale * size * self._correct(full, 0)[self.place]
 
     def _correct(self, r: np.ndarray, depth: int) -> np.ndarray:
-        """Approximate solution on the levels from `depth` on: smooth, correct on the next level, smooth."""
+        """Approximate solution on the levels from `depth` on: smooth, correct on the next level,
+        smooth.
+        """
         if depth == len(self.levels):
             return np.asarray(self.coarsest @ r)
         level = self.levels[depth]
@@ -185,31 +208,28 @@ class Answer(NamedTuple):
     cycles: int
 
 
-def conjugate_gradients(A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
+def conjugate_gradients(
+    A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float
+) -> Answer:
     """Solve A x = load by conjugate gradients with a V-cycle B.
 
     It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`.
 
     Parameters
     ----------
-    A
-        Products with the matrix (n, n).
-    cycle
-        The V-cycle.
-    load
-        (n,) right-hand side [force].
-    rtol
-        Relative accuracy in the energy norm.
+    A : Products with the matrix (n, n).
+    cycle : The V-cycle.
+    load : (n,) right-hand side [force].
+    rtol : Relative accuracy in the energy norm.
 
     Returns
     -------
-    Answer
-        The solution (n,) [length] and the number of iterations.
+    The solution (n,) [length] and the number of iterations.
 
     Raises
     ------
-    BackendError
-        If it does not get there within MOST_ITERATIONS iterations, or r' B r is negative or not a number.
+    BackendError : If it does not get there within MOST_ITERATIONS iterations, or r' B r is negative
+        or not a number.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -220,13 +240,17 @@ def conjugate_gradients(A: SparseProduct | BlockProduct, cycle: VCycle, load: np
         if 0 <= size <= goal:
             return Answer(x, step)
         if not 0 < size < np.inf:
-            raise BackendError("multigrid: the V-cycle is not positive definite here; take a solver with factors.")
+            raise BackendError(
+                "multigrid: the V-cycle is not positive definite here; take a solver with factors."
+            )
         p = z + (size / previous) * p
         Ap = A @ p
         alpha = size / _dot(p, Ap)
         x += alpha * p
         r -= alpha * Ap
-    raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST_ITERATIONS} iterations.")
+    raise BackendError(
+        f"multigrid: the error was not reduced by {rtol:g} within {MOST_ITERATIONS} iterations."
+    )
 
 
 def _dot(x: np.ndarray, y: np.ndarray) -> float:
@@ -234,7 +258,9 @@ def _dot(x: np.ndarray, y: np.ndarray) -> float:
     return float(np.einsum("i,i", x, y))
 
 
-def _coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
+def _coarsen(
+    A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray
+) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """Prolongation from the aggregates of nodes, and the modes and points of the aggregates.
 
     A (n, n) in blocks of nodes;  modes (n, j) it should represent exactly;  points (dim, nodes)
@@ -245,12 +271,15 @@ def _coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[s
         from pyamg.aggregation.tentative import fit_candidates
     except ImportError as error:
         raise InputError(
-            "the body solver 'multigrid' needs the package pyamg: pip install pyamg, or choose another."
+            "the body solver 'multigrid' needs the package pyamg: pip install pyamg, or choose"
+            " another."
         ) from error
     near = near_neighbours(A, points)
     groups = standard_aggregation(near)[0]
     tentative, modes = fit_candidates(groups, modes)
-    P = jacobi_prolongation_smoother(A, tentative, near, modes, filter_entries=True, weighting="local")
+    P = jacobi_prolongation_smoother(
+        A, tentative, near, modes, filter_entries=True, weighting="local"
+    )
     return P, modes, np.asarray((points @ groups) / groups.sum(axis=0))
 
 
@@ -261,15 +290,12 @@ def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
 
     Parameters
     ----------
-    A
-        Matrix in blocks of the k nodes.
-    points
-        (dim, k) places of the nodes [length].
+    A : Matrix in blocks of the k nodes.
+    points : (dim, k) places of the nodes [length].
 
     Returns
     -------
-    csr_matrix
-        (k, k) pattern of ones. Each node is its own neighbour.
+    (k, k) pattern of ones. Each node is its own neighbour.
     """
     count = points.shape[1]
     row, column = np.repeat(np.arange(count), np.diff(A.indptr)), A.indices
@@ -281,19 +307,19 @@ def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """Write the translations and rotations of points as columns, which are the near-kernel of the stiffness.
+    """Write the translations and rotations of points as columns, which are the near-kernel of the
+    stiffness.
 
-    An axisymmetric body keeps the motions of its section: its hoop strain is small across a few elements.
+    An axisymmetric body keeps the motions of its section: its hoop strain is small across a few
+    elements.
 
     Parameters
     ----------
-    points
-        (dim, k) places [length]. Rotations are scaled by their extent.
+    points : (dim, k) places [length]. Rotations are scaled by their extent.
 
     Returns
     -------
-    ndarray
-        (k dim, 3) in 2D, (k dim, 6) in 3D. The unknowns of a point are consecutive rows.
+    (k dim, 3) in 2D, (k dim, 6) in 3D. The unknowns of a point are consecutive rows.
     """
     dim, k = points.shape
     x = points - points.mean(axis=1, keepdims=True)
@@ -312,28 +338,28 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
     n = A.matrix.shape[0]
     start = np.random.default_rng(0).standard_normal(n).astype(A.matrix.dtype)
     operator = LinearOperator((n, n), matvec=lambda x: A @ x.ravel(), dtype=A.matrix.dtype)
-    return 1.02 * float(eigsh(operator, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
+    return 1.02 * float(
+        eigsh(operator, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
+    )
 
 
 def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """Write a matrix in blocks of nodes. Its rows are made some at a time, for the copies take more than the result.
+    """Write a matrix in blocks of nodes.
+
+    Its rows are made some at a time, for the copies take more than the result.
 
     Parameters
     ----------
-    A
-        (n, n) sparse matrix, or a block of one.
-    node, component
-        (n,) node and component of each unknown.
-    dim
-        Number of components of a node.
+    A : (n, n) sparse matrix, or a block of one.
+    node, component : (n,) node and component of each unknown.
+    dim : Number of components of a node.
 
     Returns
     -------
-    tuple
-        The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of
-        each unknown of A in it; and the nodes present (k,).
+    The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the
+    place (n,) of each unknown of A in it; and the nodes present (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim
@@ -344,9 +370,13 @@ def nodal_blocks(
     for rows in np.array_split(np.arange(size).reshape(-1, dim), PIECES):
         first, stop = rows.size and rows[0, 0], rows.size and rows[-1, -1] + 1
         chosen = sp.csr_matrix(spread[first:stop] @ A)
-        wide = sp.csr_matrix((chosen.data, place[chosen.indices], chosen.indptr), (stop - first, size))
+        wide = sp.csr_matrix(
+            (chosen.data, place[chosen.indices], chosen.indptr), (stop - first, size)
+        )
         pieces.append((wide + own_rows[first:stop]).tobsr((dim, dim)))
-    indptr = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(piece.indptr) for piece in pieces]))])
+    indptr = np.concatenate(
+        [[0], np.cumsum(np.concatenate([np.diff(piece.indptr) for piece in pieces]))]
+    )
     indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
     data = np.concatenate([piece.data for piece in pieces])
     return sp.bsr_matrix((data, indices, indptr.astype(np.int32)), (size, size)), place, present
@@ -355,7 +385,12 @@ def nodal_blocks(
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """diagonal^-1/2; 0 for the motions that an aggregate of too few nodes does not have."""
     there = diagonal > 1e-10 * diagonal.max()
-    return np.divide(1.0, np.sqrt(diagonal, where=there, out=np.ones_like(diagonal)), where=there, out=0 * diagonal)
+    return np.divide(
+        1.0,
+        np.sqrt(diagonal, where=there, out=np.ones_like(diagonal)),
+        where=there,
+        out=0 * diagonal,
+    )
 
 
 def _scaled(A: sp.bsr_matrix, rows: np.ndarray, columns: np.ndarray) -> sp.bsr_matrix:

@@ -1,11 +1,13 @@
 """Orders in which the unknowns of a body are eliminated.
 
-The order decides how many entries the sparse factors have. In the plane the minimum degree order of SuperLU leaves the
-fewest. In space nested dissection of the mesh by its coordinates leaves fewer. Both work on the graph of the mesh
-nodes, which is smaller than the matrix by the square of the dimension.
+The order decides how many entries the sparse factors have. In the plane the minimum degree order of
+SuperLU leaves the fewest. In space nested dissection of the mesh by its coordinates leaves fewer.
+Both work on the graph of the mesh nodes, which is smaller than the matrix by the square of the
+dimension.
 
-Sources: George (1973), Nested dissection of a regular finite element mesh, SIAM J. Numer. Anal. 10, 345-363; Liu
-(1985), Modification of the minimum-degree algorithm by multiple elimination, ACM Trans. Math. Softw. 11, 141-153.
+Sources: George (1973), Nested dissection of a regular finite element mesh, SIAM J. Numer. Anal. 10,
+345-363; Liu (1985), Modification of the minimum-degree algorithm by multiple elimination, ACM
+Trans. Math. Softw. 11, 141-153.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ def elimination_order(
 
     Returns
     -------
-    (n,) permutation of the unknowns. The unknowns of a node follow each other. `trailing` is at the end, in its own order.
+    (n,) permutation of the unknowns. The unknowns of a node follow each other. `trailing` is at the
+    end, in its own order.
     """
     present, own = np.unique(node, return_inverse=True)
     graph = _node_graph(A, own, len(present))
@@ -48,7 +51,9 @@ def elimination_order(
         rank[minimum_degree(graph + _clique(kept))] = np.arange(len(present))
     else:
         inside = np.flatnonzero(~kept)
-        rank[inside[nested_dissection(graph[inside][:, inside], points[:, present[inside]])]] = np.arange(len(inside))
+        rank[inside[nested_dissection(graph[inside][:, inside], points[:, present[inside]])]] = (
+            np.arange(len(inside))
+        )
     order = np.lexsort((component, rank[own]))
     final = np.zeros(len(own), dtype=bool)
     final[trailing] = True
@@ -58,8 +63,8 @@ def elimination_order(
 def minimum_degree(graph: sp.csr_matrix) -> np.ndarray:
     """Order that eliminates a node with the fewest neighbours at each step.
 
-    SciPy hands out SuperLU's order only together with factors. The incomplete factors of a matrix that is nearly the
-    identity cost next to nothing.
+    SciPy hands out SuperLU's order only together with factors. The incomplete factors of a matrix
+    that is nearly the identity cost next to nothing.
 
     Parameters
     ----------
@@ -71,18 +76,24 @@ def minimum_degree(graph: sp.csr_matrix) -> np.ndarray:
     """
     nearly = sp.csc_matrix((np.full(graph.nnz, 1e-9), graph.indices, graph.indptr), graph.shape)
     nearly = (nearly + sp.eye(graph.shape[0], format="csc")).tocsc()
-    settings = {"drop_tol": 1.0, "fill_factor": 1.0, "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    settings = {
+        "drop_tol": 1.0,
+        "fill_factor": 1.0,
+        "diag_pivot_thresh": 0.0,
+        "options": {"SymmetricMode": True},
+    }
     return np.argsort(spilu(nearly, permc_spec="MMD_AT_PLUS_A", **settings).perm_c)
 
 
 def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
-    """Order that eliminates both halves of a mesh before the nodes that separate them, and each half likewise.
+    """Order that eliminates both halves of a mesh before the nodes that separate them, and each
+    half likewise.
 
     Parameters
     ----------
     graph : (n, n) sparse matrix with the symmetric pattern of the graph
-    points : (dim, n) coordinates of the nodes; of the median planes across the axes the one with the fewest separating
-        nodes cuts the mesh
+    points : (dim, n) coordinates of the nodes; of the median planes across the axes the one with
+        the fewest separating nodes cuts the mesh
 
     Returns
     -------
@@ -96,7 +107,9 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
         if len(nodes) <= LEAF:
             order[end - len(nodes) : end] = nodes
             continue
-        left, separator = min((_cut(piece, x) for x in points[:, nodes]), key=lambda cut: int(cut[1].sum()))
+        left, separator = min(
+            (_cut(piece, x) for x in points[:, nodes]), key=lambda cut: int(cut[1].sum())
+        )
         right = ~(left | separator)
         count = int(separator.sum())
         if count in (0, len(nodes)) and not (left.any() and right.any()):
@@ -109,7 +122,9 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
 
 
 def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mask of the nodes left of the separator, and of the separator: nodes left of the median of x that touch its right."""
+    """Mask of the nodes left of the separator, and of the separator: nodes left of the median of x
+    that touch its right.
+    """
     below = np.zeros(len(x), dtype=bool)
     below[np.argsort(x, kind="stable")[: len(x) // 2]] = True
     separator = below & (graph @ (~below).astype(np.int8) > 0)
@@ -117,8 +132,12 @@ def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _node_graph(A: sp.csr_matrix, own: np.ndarray, count: int) -> sp.csr_matrix:
-    """Pattern (count, count) of the nodes whose unknowns meet in A; own (n,) is the node of each unknown."""
-    gather = sp.csr_matrix((np.ones(len(own), np.int32), (own, np.arange(len(own)))), (count, len(own)))
+    """Pattern (count, count) of the nodes whose unknowns meet in A; own (n,) is the node of each
+    unknown.
+    """
+    gather = sp.csr_matrix(
+        (np.ones(len(own), np.int32), (own, np.arange(len(own)))), (count, len(own))
+    )
     pattern = sp.csr_matrix((np.ones(A.nnz, np.int32), A.indices, A.indptr), A.shape)
     return (gather @ pattern @ gather.T).tocsr()
 
@@ -126,8 +145,8 @@ def _node_graph(A: sp.csr_matrix, own: np.ndarray, count: int) -> sp.csr_matrix:
 def _clique(kept: np.ndarray) -> sp.csr_matrix:
     """Edges between all pairs of the nodes that are kept to the end.
 
-    The elimination of the others connects them all. With these edges in the graph the degree of a node counts what its
-    elimination adds to their rows.
+    The elimination of the others connects them all. With these edges in the graph the degree of a
+    node counts what its elimination adds to their rows.
     """
     nodes = np.flatnonzero(kept)
     row, column = np.repeat(nodes, len(nodes)), np.tile(nodes, len(nodes))

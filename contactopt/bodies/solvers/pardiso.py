@@ -21,7 +21,9 @@ from contactopt.linear.operators import Product
 
 
 class PardisoSolver:
-    """Cholesky factors of Intel's oneMKL PARDISO in its own nested dissection order (pip install pypardiso)."""
+    """Cholesky factors of Intel's oneMKL PARDISO in its own nested dissection order (pip install
+    pypardiso).
+    """
 
     name = "pardiso"
     iterative = False
@@ -32,13 +34,16 @@ class PardisoSolver:
         try:
             from pypardiso import PyPardisoSolver
         except ImportError as error:
-            raise InputError("the body solver 'pardiso' needs the package pypardiso: pip install pypardiso.") from error
+            raise InputError(
+                "the body solver 'pardiso' needs the package pypardiso: pip install pypardiso."
+            ) from error
         library()  # so that pypardiso need not search for it
         self.trailing = system.trailing
         self.upper = sp.triu(system.A, format="csr")
         self.factors = PyPardisoSolver(mtype=2)  # real, symmetric positive definite
         self.factors.factorize(self.upper)
-        weakref.finalize(self, self.factors.free_memory, everything=True)  # MKL's memory is not Python's
+        # MKL's memory is not Python's
+        weakref.finalize(self, self.factors.free_memory, everything=True)
 
     @property
     def complete(self) -> bool:
@@ -51,7 +56,8 @@ class PardisoSolver:
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray]:
-        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur complement in these places.
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
+        complement in these places.
 
         A second factorisation, which stops before these unknowns, leaves the Schur complement.
         """
@@ -61,7 +67,8 @@ class PardisoSolver:
         if not len(trailing):
             return np.zeros((0, 0)), np.zeros(0, int)
         partial = PyPardisoSolver(mtype=2, phase=12)
-        for index, value in {1: 1, 2: 2, 10: 13, 21: 1, 36: 1}.items():  # own values; METIS; defaults; Schur complement
+        # own values; METIS; defaults; Schur complement
+        for index, value in {1: 1, 2: 2, 10: 13, 21: 1, 36: 1}.items():
             partial.set_iparm(index, value)
         partial.perm = np.zeros(n, dtype=np.int32)
         partial.perm[trailing] = 1

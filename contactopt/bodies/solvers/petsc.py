@@ -1,10 +1,13 @@
-"""Conjugate gradients with the algebraic multigrid of PETSc (petsc4py, extra `petsc`), told the rigid motions of the body.
+"""Conjugate gradients with the algebraic multigrid of PETSc (petsc4py, extra `petsc`), told the
+rigid motions of the body.
 
-The preconditioner is GAMG, smoothed aggregation, unless PETSc's own options say otherwise: all of them are taken with the prefix
-`contactopt_`, for instance PETSC_OPTIONS="-contactopt_pc_type hypre".
+The preconditioner is GAMG, smoothed aggregation, unless PETSc's own options say otherwise: all of
+them are taken with the prefix `contactopt_`, for instance PETSC_OPTIONS="-contactopt_pc_type
+hypre".
 
-Sources: Balay et al., PETSc/TAO Users Manual; Adams, Bayraktar, Keaveny, Papadopoulos (2004), Ultrascalable implicit finite
-element analyses in solid mechanics with over a half a billion degrees of freedom, for multigrid of this kind.
+Sources: Balay et al., PETSc/TAO Users Manual; Adams, Bayraktar, Keaveny, Papadopoulos (2004),
+Ultrascalable implicit finite element analyses in solid mechanics with over a half a billion degrees
+of freedom, for multigrid of this kind.
 """
 
 from __future__ import annotations
@@ -25,10 +28,12 @@ ALONE = threading.RLock()  # PETSc does not allow calls from two threads at the 
 
 
 class PetscSolver:
-    """A body on one process of PETSc. A solve ends where (r' B r)^1/2, B the preconditioner, has fallen by `rtol`.
+    """A body on one process of PETSc.
 
-    A, ksp  PETSc's matrix and its solver. Both have the unknowns of all nodes, nodes one after the other; held unknowns have rows
-            of their own that nothing else touches
+    A solve ends where (r' B r)^1/2, B the preconditioner, has fallen by `rtol`.
+
+    A, ksp  PETSc's matrix and its solver. Both have the unknowns of all nodes, nodes one after the
+            other; held unknowns have rows of their own that nothing else touches
     place   (n,) of each unknown among them
     """
 
@@ -48,7 +53,8 @@ class PetscSolver:
             rows = A.indptr.astype(indices), A.indices.astype(indices), A.data
             self.A = petsc.Mat().createAIJ(A.shape, bsize=dim, csr=rows, comm=here)
             vectors = [
-                petsc.Vec().createWithArray(column.copy(), bsize=dim, comm=here) for column in np.linalg.qr(modes)[0].T
+                petsc.Vec().createWithArray(column.copy(), bsize=dim, comm=here)
+                for column in np.linalg.qr(modes)[0].T
             ]
             self.A.setNearNullSpace(petsc.NullSpace().create(vectors=vectors, comm=here))
             self.A.setOption(petsc.Mat.Option.SPD, True)
@@ -93,7 +99,10 @@ class PetscSolver:
             self.ksp.setTolerances(rtol=rtol, atol=0.0, max_it=MOST_ITERATIONS)
             x = self._acting(self.ksp.solve)(b)
             if self.ksp.getConvergedReason() < 0:
-                raise BackendError(f"petsc: the error was not reduced by {rtol:g} within {MOST_ITERATIONS} iterations.")
+                raise BackendError(
+                    f"petsc: the error was not reduced by {rtol:g} within {MOST_ITERATIONS}"
+                    " iterations."
+                )
             return x
 
     def _acting(self, act: Any) -> Any:
@@ -104,7 +113,10 @@ class PetscSolver:
             full, out = np.zeros(self.size), np.zeros(self.size)
             full[self.place] = x
             with ALONE:
-                vectors = [petsc.Vec().createWithArray(values, comm=petsc.COMM_SELF) for values in (full, out)]
+                vectors = [
+                    petsc.Vec().createWithArray(values, comm=petsc.COMM_SELF)
+                    for values in (full, out)
+                ]
                 act(*vectors)
                 for vector in vectors:
                     vector.destroy()
@@ -119,6 +131,7 @@ def _library() -> Any:
         from petsc4py import PETSc
     except ImportError as error:
         raise InputError(
-            "the body solver 'petsc' needs petsc4py: pip install 'contactopt[petsc]', which compiles PETSc, or your system's package."
+            "the body solver 'petsc' needs petsc4py: pip install 'contactopt[petsc]', which"
+            " compiles PETSc, or your system's package."
         ) from error
     return PETSc

@@ -1,7 +1,9 @@
-"""Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by SciPy elsewhere.
+"""Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by
+SciPy elsewhere.
 
-One oneMKL product of single precision is faster than one of SciPy (`python -m experiments.questions.solver_constants`).
-Neither holds Python's lock, so that the pieces of one product can be made in several threads.
+One oneMKL product of single precision is faster than one of SciPy (`python -m
+experiments.questions.solver_constants`). Neither holds Python's lock, so that the pieces of one
+product can be made in several threads.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import Block
 from contactopt.linear.concurrency import Crew
 
-_PLAIN, _GENERAL, _ROWS = 10, 20, 101  # oneMKL's names: A itself, no structure, blocks stored row by row
+# oneMKL's names: A itself, no structure, blocks stored row by row
+_PLAIN, _GENERAL, _ROWS = 10, 20, 101
 
 
 class _Description(ctypes.Structure):
@@ -31,10 +34,11 @@ class _Description(ctypes.Structure):
 
 
 class SparseProduct:
-    """x -> A @ x for a matrix (n, k) in CSR or in BSR with square blocks, of single or double precision.
+    """x -> A @ x for a matrix (n, k) in CSR or in BSR with square blocks, of single or double
+    precision.
 
-    Where a crew of several threads is given, a large matrix is cut into pieces of rows with about as many entries, which
-    they multiply at the same time. The result is the same to the last digit.
+    Where a crew of several threads is given, a large matrix is cut into pieces of rows with about
+    as many entries, which they multiply at the same time. The result is the same to the last digit.
 
     matrix  A in SciPy's form; it is not copied and must not change
     """
@@ -90,33 +94,40 @@ class _Piece:
         letter, number = _kind(self.matrix)
         multiply = getattr(self._mkl, f"mkl_sparse_{letter}_mv")
         before = self._mkl.MKL_Set_Num_Threads_Local(1)
-        failed = multiply(_PLAIN, number(1.0), self._handle, _Description(_GENERAL, 0, 0), _at(x), number(0.0), _at(y))
+        failed = multiply(
+            _PLAIN,
+            number(1.0),
+            self._handle,
+            _Description(_GENERAL, 0, 0),
+            _at(x),
+            number(0.0),
+            _at(y),
+        )
         self._mkl.MKL_Set_Num_Threads_Local(before)
         return int(failed)
 
 
 def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
-    """Compute P' A P from pieces of rows of A, each in a thread of its own: A P is never there as a whole.
+    """Compute P' A P from pieces of rows of A, each in a thread of its own: A P is never there as a
+    whole.
 
     Parameters
     ----------
-    P
-        (n, m) prolongation in blocks.
-    A
-        (n, n) matrix in blocks.
-    crew
-        The threads.
+    P : (n, m) prolongation in blocks.
+    A : (n, n) matrix in blocks.
+    crew : The threads.
 
     Returns
     -------
-    bsr_matrix
-        (m, m), the same whatever thread is done first.
+    (m, m), the same whatever thread is done first.
     """
     height = P.blocksize[0]
     found: dict[int, sp.bsr_matrix] = {}
 
     def part(number: int, rows: slice, own: sp.bsr_matrix) -> None:
-        found[number] = sp.bsr_matrix(_rows(P, rows.start // height, rows.stop // height).T @ (own @ P))
+        found[number] = sp.bsr_matrix(
+            _rows(P, rows.start // height, rows.stop // height).T @ (own @ P)
+        )
 
     pieces = _pieces(A, GALERKIN if A.nnz >= LARGE else 1)
     crew.each([partial(part, number, *piece) for number, piece in enumerate(pieces)])
@@ -126,7 +137,9 @@ def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
     return sp.bsr_matrix(total)
 
 
-def _pieces(A: sp.csr_matrix | sp.bsr_matrix, count: int) -> Iterator[tuple[slice, sp.csr_matrix | sp.bsr_matrix]]:
+def _pieces(
+    A: sp.csr_matrix | sp.bsr_matrix, count: int
+) -> Iterator[tuple[slice, sp.csr_matrix | sp.bsr_matrix]]:
     """Consecutive rows of A with about as many entries each; their entries are not copied."""
     height = A.blocksize[0] if A.format == "bsr" else 1
     inner = np.searchsorted(A.indptr, np.arange(1, count) * (int(A.indptr[-1]) / count))
@@ -142,7 +155,9 @@ def _rows(A: sp.csr_matrix | sp.bsr_matrix, first: int, stop: int) -> sp.csr_mat
     entries = slice(int(A.indptr[first]), int(A.indptr[stop]))
     size = A.blocksize if A.format == "bsr" else (1, 1)
     part = type(A)(
-        ((stop - first) * size[0], A.shape[1]), **({"blocksize": size} if A.format == "bsr" else {}), dtype=A.dtype
+        ((stop - first) * size[0], A.shape[1]),
+        **({"blocksize": size} if A.format == "bsr" else {}),
+        dtype=A.dtype,
     )
     # Given to the constructor, parts of arrays would be copied.
     part.data, part.indices = A.data[entries], A.indices[entries]
@@ -171,9 +186,13 @@ def _handle(mkl: Any, A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | Non
     letter, _ = _kind(A)
     arrays = _at(A.indptr), _at(A.indptr[1:]), _at(A.indices), _at(A.data)
     if A.format == "csr":
-        failed = getattr(mkl, f"mkl_sparse_{letter}_create_csr")(ctypes.byref(handle), 0, *A.shape, *arrays)
+        failed = getattr(mkl, f"mkl_sparse_{letter}_create_csr")(
+            ctypes.byref(handle), 0, *A.shape, *arrays
+        )
     else:
         size = A.blocksize[0]
         shape = (A.shape[0] // size, A.shape[1] // size, size)
-        failed = getattr(mkl, f"mkl_sparse_{letter}_create_bsr")(ctypes.byref(handle), 0, _ROWS, *shape, *arrays)
+        failed = getattr(mkl, f"mkl_sparse_{letter}_create_bsr")(
+            ctypes.byref(handle), 0, _ROWS, *shape, *arrays
+        )
     return None if failed else handle

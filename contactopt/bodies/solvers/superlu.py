@@ -26,11 +26,13 @@ from contactopt.linear.operators import Product
 
 
 class FactorThread:
-    """One thread that makes factors and frees them: SuperLU returns memory only in the thread that took it.
+    """One thread that makes factors and frees them: SuperLU returns memory only in the thread that
+    took it.
 
-    The thread ends, and its factors are freed, when nobody refers to this object any more. Python may find that out
-    in the middle of any other operation of any thread, one that holds the locks of another pool, say. The thread is
-    therefore told by a thread of a moment's life, which may wait for these locks.
+    The thread ends, and its factors are freed, when nobody refers to this object any more. Python
+    may find that out in the middle of any other operation of any thread, one that holds the locks
+    of another pool, say. The thread is therefore told by a thread of a moment's life, which may
+    wait for these locks.
     """
 
     def __init__(self) -> None:
@@ -39,12 +41,17 @@ class FactorThread:
         weakref.finalize(self, start_new_thread, _free, (self._executor, self._held)).atexit = False
 
     def factorise(self, A: sp.csc_matrix) -> int:
-        """Factorise A without a change of order and return the number under which [] finds the factors."""
+        """Factorise A without a change of order and return the number under which [] finds the
+        factors.
+        """
         self._held.append(self._executor.submit(factorise, A).result())
         return len(self._held) - 1
 
     def __getitem__(self, number: int) -> Any:
-        """SciPy's SuperLU object. Whoever keeps it longer than this thread keeps its memory for good."""
+        """SciPy's SuperLU object.
+
+        Whoever keeps it longer than this thread keeps its memory for good.
+        """
         return self._held[number]
 
 
@@ -55,24 +62,21 @@ def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
 
 
 def factorise(A: sp.csc_matrix) -> Any:
-    """Factorise a symmetric positive definite matrix by SuperLU, eliminated in its own order, without pivoting.
+    """Factorise a symmetric positive definite matrix by SuperLU, eliminated in its own order,
+    without pivoting.
 
     Parameters
     ----------
-    A
-        (n, n) matrix in compressed columns.
+    A : (n, n) matrix in compressed columns.
 
     Returns
     -------
-    SuperLU
-        The factors, an object of SciPy.
+    The factors, an object of SciPy.
 
     Raises
     ------
-    MemoryError
-        If the factors do not fit, with a sentence.
-    RuntimeError
-        If A is singular.
+    MemoryError : If the factors do not fit, with a sentence.
+    RuntimeError : If A is singular.
     """
     try:
         return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -80,13 +84,15 @@ def factorise(A: sp.csc_matrix) -> Any:
         if "singular" in str(error):
             raise
         raise MemoryError(
-            f"the factors of a body of {A.shape[0]:,} unknowns do not fit into memory; take a coarser mesh, or the "
-            "solver 'multigrid'."
+            f"the factors of a body of {A.shape[0]:,} unknowns do not fit into memory; take a"
+            " coarser mesh, or the solver 'multigrid'."
         ) from error
 
 
 class SuperLUSolver:
-    """Factors L U = L D L' of A, with `trailing` eliminated last: their last rows and columns give its Schur complement."""
+    """Factors L U = L D L' of A, with `trailing` eliminated last: their last rows and columns give
+    its Schur complement.
+    """
 
     name = "superlu"
     iterative = False
@@ -117,9 +123,11 @@ class SuperLUSolver:
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur complement in these places.
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
+        complement in these places.
 
-        None where SuperLU changed the order for its pivots, and where rounding left some that are not positive.
+        None where SuperLU changed the order for its pivots, and where rounding left some that are
+        not positive.
         """
         factors, m = self.factors, len(asked(self.trailing))
         n = factors.shape[0]
@@ -130,7 +138,8 @@ class SuperLUSolver:
         L, pivots = factors.L[head:, head:].toarray(order="F"), factors.U.diagonal()[head:]
         if pivots.min(initial=1.0) <= 0:
             return None
-        return L * np.sqrt(pivots), factors.perm_c[head:] - head  # L U = L D L' with D > 0 the pivots
+        # L U = L D L' with D > 0 the pivots
+        return L * np.sqrt(pivots), factors.perm_c[head:] - head
 
     def trailing_inverse(self) -> np.ndarray:
         if self.trailing_triangle is None:
@@ -146,8 +155,9 @@ class SuperLUSolver:
     def restricted(self, at: np.ndarray) -> Product:
         """Products that use only the rows and columns of L and D that a load on `at` reaches.
 
-        These are the unknowns of `at` and their ancestors in the elimination tree. In the plane they are few. In space
-        they hold most of the entries of L, and a copy of them costs more than it saves, so that whole solves are used.
+        These are the unknowns of `at` and their ancestors in the elimination tree. In the plane
+        they are few. In space they hold most of the entries of L, and a copy of them costs more
+        than it saves, so that whole solves are used.
         """
         factors, n = self.factors, len(self._order)
         if not self._plane or not np.array_equal(factors.perm_c, factors.perm_r):
@@ -169,7 +179,9 @@ class SuperLUSolver:
 
 
 def _ancestors(L: sp.csc_matrix, first: np.ndarray) -> np.ndarray:
-    """Unknowns (sorted) that substitution from `first` on reaches: those in the columns of L of those reached before."""
+    """Unknowns (sorted) that substitution from `first` on reaches: those in the columns of L of
+    those reached before.
+    """
     reached = np.zeros(L.shape[0], dtype=bool)
     front = np.unique(first)
     while len(front):

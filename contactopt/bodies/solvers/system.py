@@ -36,10 +36,13 @@ class Block:
 
 
 class System(NamedTuple):
-    """What the solvers of one body are made from. The matrix is not copied and must not change afterwards.
+    """What the solvers of one body are made from.
 
-    A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite [force / length]; a Block is
-               for iterative solvers, which then share the entries with the body
+    The matrix is not copied and must not change afterwards.
+
+    A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite
+               [force / length]; a Block is for iterative solvers, which then share the entries with
+               the body
     node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
     points     (dim, nodes) coordinates of the mesh nodes [length]
     trailing   (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
@@ -67,11 +70,13 @@ class BodySolver(Protocol):
     """Solves A x = b. Several solvers may work at the same time in different threads.
 
     name           its name in contactopt.bodies.solvers.SOLVERS, for messages and records only
-    iterative      whether a lower accuracy costs less; the others ignore `rtol` and solve to rounding
-    releases_lock  whether a solve leaves Python's lock to other threads, so that two solvers at once are faster than
-                   one after the other
+    iterative      whether a lower accuracy costs less; the others ignore `rtol` and solve to
+                   rounding
+    releases_lock  whether a solve leaves Python's lock to other threads, so that two solvers at
+                   once are faster than one after the other
     complete       whether the block of the inverse on System.trailing was provided for
-    iteration      what it repeats, for those who iterate on several bodies at once; None for a solver with factors
+    iteration      what it repeats, for those who iterate on several bodies at once; None for a
+                   solver with factors
     """
 
     name: str
@@ -90,8 +95,8 @@ class BodySolver(Protocol):
         Parameters
         ----------
         load : (n,) or (n, j) forces
-        rtol : error in the energy norm, relative to that of the solution, at which an iterative solver may stop;
-            None stands for contactopt.bodies.solvers.constants.RTOL
+        rtol : error in the energy norm, relative to that of the solution, at which an iterative
+            solver may stop; None stands for contactopt.bodies.solvers.constants.RTOL
 
         Returns
         -------
@@ -99,7 +104,9 @@ class BodySolver(Protocol):
         """
 
     def trailing_inverse(self) -> np.ndarray:
-        """(m, m) symmetric block of the inverse of A on the unknowns `trailing`; InputError if it is not complete."""
+        """(m, m) symmetric block of the inverse of A on the unknowns `trailing`; InputError if it
+        is not complete.
+        """
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """That block times `load`, which is (m,) or (m, j)."""
@@ -109,13 +116,11 @@ class BodySolver(Protocol):
 
         Parameters
         ----------
-        at
-            (m,) the unknowns.
+        at : (m,) the unknowns.
 
         Returns
         -------
-        callable
-            A function (load, rtol) of loads (m,) or (m, j) to the product of that shape.
+        A function (load, rtol) of loads (m,) or (m, j) to the product of that shape.
         """
 
 
@@ -124,21 +129,20 @@ def asked(trailing: np.ndarray | None) -> np.ndarray:
 
     Parameters
     ----------
-    trailing
-        (m,) unknowns, or None.
+    trailing : (m,) unknowns, or None.
 
     Returns
     -------
-    ndarray
-        The unknowns.
+    The unknowns.
 
     Raises
     ------
-    InputError
-        If there are none.
+    InputError : If there are none.
     """
     if trailing is None:
-        raise InputError("no unknowns were named whose block of the inverse is asked for; give `trailing`.")
+        raise InputError(
+            "no unknowns were named whose block of the inverse is asked for; give `trailing`."
+        )
     return trailing
 
 
@@ -147,15 +151,12 @@ def triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    R
-        (m, m) lower triangular factor.
-    place
-        (m,) a permutation: row and column place[i] of the inverse become row and column i.
+    R : (m, m) lower triangular factor.
+    place : (m,) a permutation: row and column place[i] of the inverse become row and column i.
 
     Returns
     -------
-    ndarray
-        (m, m) inverse, symmetric to the last digit.
+    (m, m) inverse, symmetric to the last digit.
     """
     X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
     C = X.T @ X  # NumPy keeps it symmetric
@@ -167,15 +168,12 @@ def triangle_product(R: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.n
 
     Parameters
     ----------
-    R, place
-        As for `triangle_inverse`.
-    load
-        (m,) or (m, j).
+    R, place : As for `triangle_inverse`.
+    load : (m,) or (m, j).
 
     Returns
     -------
-    ndarray
-        The product, of the shape of `load`.
+    The product, of the shape of `load`.
     """
     x = np.empty(load.shape)
     x[place] = load
@@ -187,19 +185,14 @@ def inverse_block(solver: Any, at: np.ndarray, n: int, columns: int = 64) -> np.
 
     Parameters
     ----------
-    solver
-        A BodySolver of n unknowns.
-    at
-        (m,) the unknowns of the block.
-    n
-        Number of unknowns.
-    columns
-        How many loads are solved for at a time.
+    solver : A BodySolver of n unknowns.
+    at : (m,) the unknowns of the block.
+    n : Number of unknowns.
+    columns : How many loads are solved for at a time.
 
     Returns
     -------
-    ndarray
-        (m, m) block, symmetric to the last digit [length / force].
+    (m, m) block, symmetric to the last digit [length / force].
     """
     C = np.empty((len(at), len(at)))
     for start in range(0, len(at), columns):
@@ -210,26 +203,22 @@ def inverse_block(solver: Any, at: np.ndarray, n: int, columns: int = 64) -> np.
     return np.asarray((C + C.T) / 2)
 
 
-def block_product(solver: Any, at: np.ndarray, n: int, load: np.ndarray, rtol: float | None) -> np.ndarray:
+def block_product(
+    solver: Any, at: np.ndarray, n: int, load: np.ndarray, rtol: float | None
+) -> np.ndarray:
     """Multiply with a block of the inverse, by one solve.
 
     Parameters
     ----------
-    solver
-        A BodySolver of n unknowns.
-    at
-        (m,) the unknowns of the block.
-    n
-        Number of unknowns.
-    load
-        (m,) or (m, j) [force].
-    rtol
-        Relative accuracy that is asked of an iterative solver; None: its own.
+    solver : A BodySolver of n unknowns.
+    at : (m,) the unknowns of the block.
+    n : Number of unknowns.
+    load : (m,) or (m, j) [force].
+    rtol : Relative accuracy that is asked of an iterative solver; None: its own.
 
     Returns
     -------
-    ndarray
-        The product, of the shape of `load` [length].
+    The product, of the shape of `load` [length].
     """
     full = np.zeros((n, *load.shape[1:]))
     full[at] = load

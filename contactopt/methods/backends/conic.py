@@ -32,13 +32,17 @@ class Conic:
         return cls(backend, program)
 
     def solve(self, **parameters: np.ndarray) -> dict[str, np.ndarray]:
-        """The variables and multipliers of the program by name; BackendError, naming the backend, without an answer."""
+        """The variables and multipliers of the program by name; BackendError, naming the backend,
+        without an answer.
+        """
         for name, value in parameters.items():
             self.program.parameters[name].value = value
         run(self.backend, self.program.problem)
         variables = {name: np.asarray(v.value) for name, v in self.program.variables.items()}
         if not all(np.all(np.isfinite(v)) for v in variables.values()):
-            raise BackendError(f"conic backend '{self.backend.name}' gave an answer that is not finite.")
+            raise BackendError(
+                f"conic backend '{self.backend.name}' gave an answer that is not finite."
+            )
         return variables | {name: np.nan_to_num(m) for name, m in self.program.multipliers.items()}
 
 
@@ -60,15 +64,21 @@ class DiscSOCP:
         check_semidefinite(Q)
         return cls(backend, *tangential_disc_program(Q, A))
 
-    def solve(self, c: np.ndarray, b: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """t (2k,) and the multipliers (p,) of A t = b; BackendError, naming the backend, if there is no answer."""
+    def solve(
+        self, c: np.ndarray, b: np.ndarray, radius: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """t (2k,) and the multipliers (p,) of A t = b; BackendError, naming the backend, if there
+        is no answer.
+        """
         self.parameters["c"].value, self.parameters["g"].value = c, radius
         if len(b):
             self.parameters["b"].value = b
         run(self.backend, self.program)
         t = np.asarray(self.variable.value)
         if not np.all(np.isfinite(t)):
-            raise BackendError(f"conic backend '{self.backend.name}' gave an answer that is not finite.")
+            raise BackendError(
+                f"conic backend '{self.backend.name}' gave an answer that is not finite."
+            )
         y = self.program.constraints[-1].dual_value if len(b) else np.zeros(0)
         return t, np.asarray(y, dtype=float).reshape(len(b))
 
@@ -78,15 +88,12 @@ def run(backend: Backend, problem: Any) -> None:
 
     Parameters
     ----------
-    backend
-        The conic backend.
-    problem
-        The cvxpy problem.
+    backend : The conic backend.
+    problem : The cvxpy problem.
 
     Raises
     ------
-    BackendError
-        If the backend crashes or leaves no answer. The message names it.
+    BackendError : If the backend crashes or leaves no answer. The message names it.
     """
     import cvxpy as cp
 
@@ -111,15 +118,15 @@ def check_semidefinite(Q: np.ndarray) -> None:
 
     Parameters
     ----------
-    Q
-        (n, n) matrix.
+    Q : (n, n) matrix.
 
     Raises
     ------
-    BackendError
-        If it is not.
+    BackendError : If it is not.
     """
     try:
         la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)
     except la.LinAlgError as error:
-        raise BackendError("the compliance is not positive semidefinite, so its program is not convex.") from error
+        raise BackendError(
+            "the compliance is not positive semidefinite, so its program is not convex."
+        ) from error

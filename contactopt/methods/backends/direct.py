@@ -17,11 +17,12 @@ from contactopt.methods.backends.conic import check_semidefinite
 
 @dataclass(eq=False)
 class CoulombSOCP:
-    """min r' Q r / 2 + c' r  subject to  |r_t| <= mu r_n at each contact,  V' r + s = 0, for many c.
+    """min r' Q r / 2 + c' r  subject to  |r_t| <= mu r_n at each contact,  V' r + s = 0, for many
+    c.
 
-    Q (k dim, k dim) symmetric positive semidefinite, mu (k,), V (k dim, p), s (p,). As rows A r + y = b: y = 0 for the
-    balance and for the tangential part of contacts with mu = 0; y >= 0 for their normal part; y in the second-order
-    cone for the others.
+    Q (k dim, k dim) symmetric positive semidefinite, mu (k,), V (k dim, p), s (p,). As rows A r + y
+    = b: y = 0 for the balance and for the tangential part of contacts with mu = 0; y >= 0 for their
+    normal part; y in the second-order cone for the others.
     """
 
     solver: Any
@@ -51,8 +52,13 @@ class CoulombSOCP:
             ],
             format="csc",
         )
-        cones = [(clarabel.ZeroConeT, p + smooth.sum() * (dim - 1)), (clarabel.NonnegativeConeT, smooth.sum())]
-        listed = [cone(int(size)) for cone, size in cones if size] + [clarabel.SecondOrderConeT(dim)] * int(rough.sum())
+        cones = [
+            (clarabel.ZeroConeT, p + smooth.sum() * (dim - 1)),
+            (clarabel.NonnegativeConeT, smooth.sum()),
+        ]
+        listed = [cone(int(size)) for cone, size in cones if size] + [
+            clarabel.SecondOrderConeT(dim)
+        ] * int(rough.sum())
         settings = clarabel.DefaultSettings()
         for name, value in backend.settings.items():
             setattr(settings, name, value)
@@ -66,7 +72,9 @@ class CoulombSOCP:
         return cls(clarabel.DefaultSolver(P, np.zeros(len(Q)), A, b, listed, settings), p)
 
     def solve(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r (k dim,) and the multipliers lambda (p,) of the balance; BackendError if there is no answer."""
+        """r (k dim,) and the multipliers lambda (p,) of the balance; BackendError if there is no
+        answer.
+        """
         self.solver.update(q=np.ascontiguousarray(c))
         check_time()
         left = time_left()

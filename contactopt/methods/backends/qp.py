@@ -16,7 +16,8 @@ from contactopt.methods.backends.child import Child
 
 @dataclass(eq=False)
 class BoxQP:
-    """min x'Px/2 + c'x  subject to  A x = b,  low <= x <= high, for one P and A and many c, b and bounds.
+    """min x'Px/2 + c'x  subject to  A x = b,  low <= x <= high, for one P and A and many c, b and
+    bounds.
 
     P (n, n) symmetric positive semidefinite, A (p, n).
     """
@@ -31,27 +32,47 @@ class BoxQP:
         return cls(find(name, QP), np.ascontiguousarray((P + P.T) / 2), np.ascontiguousarray(A))
 
     def solve(
-        self, c: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray, start: np.ndarray | None = None
+        self,
+        c: np.ndarray,
+        b: np.ndarray,
+        low: np.ndarray,
+        high: np.ndarray,
+        start: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """x (n,) and the multipliers y (p,) of A x = b, so that P x + c + A'y balances the bounds' forces.
+        """x (n,) and the multipliers y (p,) of A x = b, so that P x + c + A'y balances the bounds'
+        forces.
 
-        Raises BackendError, naming the backend, if it crashes or its answer is not a vector of finite numbers. What
-        the backend claims about optimality is ignored: the caller checks.
+        Raises BackendError, naming the backend, if it crashes or its answer is not a vector of
+        finite numbers. What the backend claims about optimality is ignored: the caller checks.
         """
         import qpsolvers
 
-        P, A = (sp.csc_matrix(self.P), sp.csc_matrix(self.A)) if self.backend.sparse else (self.P, self.A)
+        P, A = (
+            (sp.csc_matrix(self.P), sp.csc_matrix(self.A))
+            if self.backend.sparse
+            else (self.P, self.A)
+        )
         rows = {"A": A, "b": b} if len(b) else {}
-        arguments = {"P": P, "q": c, "lb": _finite_or_none(low), "ub": _finite_or_none(high), **rows}
+        arguments = {
+            "P": P,
+            "q": c,
+            "lb": _finite_or_none(low),
+            "ub": _finite_or_none(high),
+            **rows,
+        }
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 if Child.needed(self.backend, len(c)):
-                    x, y = self.child.solve(arguments, self.backend.name, start, self.backend.timed())
+                    x, y = self.child.solve(
+                        arguments, self.backend.name, start, self.backend.timed()
+                    )
                 else:
                     problem = qpsolvers.Problem(**arguments)
                     for settings in self.backend.rounds():
-                        answer = qpsolvers.solve_problem(problem, self.backend.name, initvals=start, **settings)
+                        answer = qpsolvers.solve_problem(
+                            problem, self.backend.name, initvals=start, **settings
+                        )
                         if answer.found:
                             break
                     x, y = answer.x, answer.y
@@ -61,7 +82,9 @@ class BoxQP:
         except Exception as error:  # any backend may raise anything: it must not end a campaign
             raise BackendError(f"QP backend '{self.backend.name}' failed: {error}") from error
         if x is None or not np.all(np.isfinite(x)):
-            raise BackendError(f"QP backend '{self.backend.name}' gave no answer; the problem may be infeasible.")
+            raise BackendError(
+                f"QP backend '{self.backend.name}' gave no answer; the problem may be infeasible."
+            )
         y = y if y is not None and np.size(y) == len(b) else np.zeros(len(b))
         return np.asarray(x), np.nan_to_num(np.asarray(y, dtype=float))
 

@@ -1,1 +1,3 @@
-"""The numerical algorithms that several methods share: Newton and Krylov steps, projections with balance, splittings."""
+"""The numerical algorithms that several methods share: Newton and Krylov steps, projections with
+balance, splittings.
+"""

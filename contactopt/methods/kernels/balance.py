@@ -1,10 +1,12 @@
-"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with lambda such that V' r + s = 0.
+"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with lambda such that V'
+r + s = 0.
 
-With P the projection on a convex set this is the projection on the set's part where V' r + s = 0, and lambda minimises
-a convex, piecewise smooth function of p unknowns: a few Newton steps with an exact line search, each O(k). It makes every
-first-order method on forces work with plates, without a penalty: lambda is the multiplier that the step itself determines.
-Where the forces are friction alone the function is nearly a sum of lengths, whose minimum is a weighted median: its slope
-jumps from contact to contact, and only the exact search finds the one that sticks.
+With P the projection on a convex set this is the projection on the set's part where V' r + s = 0,
+and lambda minimises a convex, piecewise smooth function of p unknowns: a few Newton steps with an
+exact line search, each O(k). It makes every first-order method on forces work with plates, without
+a penalty: lambda is the multiplier that the step itself determines. Where the forces are friction
+alone the function is nearly a sum of lengths, whose minimum is a weighted median: its slope jumps
+from contact to contact, and only the exact search finds the one that sticks.
 """
 
 from __future__ import annotations
@@ -22,10 +24,12 @@ LEAST_FELT = 1e-8  # share of a motion that closed and sticking contacts must fe
 DIRECT = 5  # steps of Newton's method that are tried without softened friction
 SURE = 1e-6  # error of the balance, over all friction bounds, with which a motion counts as found
 STEPS = 50  # of Newton's method
-SHARPER = 100.0  # by how much friction grows faster with the slip from one convex problem to the next
+# by how much friction grows faster with the slip from one convex problem to the next
+SHARPER = 100.0
 SEARCH = 200  # evaluations of one line search
 EXACT = 1e-13  # relative error of the balance at which the search ends
-CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
+# relative to V'V, added to the Newton matrix: nothing need be in contact at the start
+CURVATURE = 1e-10
 
 
 def project_balanced(
@@ -68,12 +72,15 @@ def project_balanced(
         error = V.T @ P.ravel() + s
         if np.all(np.abs(error) <= EXACT * size):
             break
-        # lambda minimises a convex function with the gradient -(V'P + s) and the second derivative V' rho D V.
+        # lambda minimises a convex function with the gradient -(V'P + s) and the second derivative
+        # V' rho D V.
         DV = np.einsum("kab,kbp->kap", rho[:, :, None] * D, V.reshape(k, d, -1)).reshape(V.shape)
         move = np.linalg.solve(V.T @ DV + ridge, error)
         way = (V @ move).reshape(k, d)
 
-        def slope(t: float, z: np.ndarray = z, way: np.ndarray = way, work: float = float(s @ move)) -> float:
+        def slope(
+            t: float, z: np.ndarray = z, way: np.ndarray = way, work: float = float(s @ move)
+        ) -> float:
             return -float(np.sum(way * project(z - t * rho * way)[0])) - work
 
         length = _least(slope, -float(error @ move))
@@ -84,7 +91,9 @@ def project_balanced(
 
 
 def _least(slope: Callable[[float], float], first: float) -> float:
-    """The t > 0 at which a slope that grows from `first` < 0 vanishes; 0 if it does not, or not above rounding."""
+    """The t > 0 at which a slope that grows from `first` < 0 vanishes; 0 if it does not, or not
+    above rounding.
+    """
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
     for trial in range(SEARCH):
         value = slope(t)
@@ -111,15 +120,12 @@ def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    V
-        (k d, p) rigid motions.
-    D
-        (k, d, d) derivative of the law's map.
+    V : (k d, p) rigid motions.
+    D : (k, d, d) derivative of the law's map.
 
     Returns
     -------
-    ndarray
-        (p, j) orthonormal columns, combinations of the multipliers.
+    (p, j) orthonormal columns, combinations of the multipliers.
     """
     d = D.shape[1]
     firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
@@ -129,28 +135,27 @@ def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
     return np.asarray(motions[:, values <= LEAST_FELT * max(values.max(initial=0.0), 1.0)])
 
 
-def settled(equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose: np.ndarray) -> np.ndarray | None:
-    """Find the change of the multipliers with which friction balances motions that no contact holds.
+def settled(
+    equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose: np.ndarray
+) -> np.ndarray | None:
+    """Find the change of the multipliers with which friction balances motions that no contact
+    holds.
 
-    Newton's method linearises the contacts. Where all of them slip, their forces do not change with such a motion, and its
-    system says nothing about it: it is singular, or its steps jump to and fro over the contact that should stick. Here the
-    normal forces are bounds of the friction, and the motion follows from a convex problem.
+    Newton's method linearises the contacts. Where all of them slip, their forces do not change with
+    such a motion, and its system says nothing about it: it is singular, or its steps jump to and
+    fro over the contact that should stick. Here the normal forces are bounds of the friction, and
+    the motion follows from a convex problem.
 
     Parameters
     ----------
-    equations
-        The equations of contact and friction.
-    law
-        Their law.
-    r, u
-        (k, d) forces and displacements.
-    loose
-        (p, j) the motions, as `loose_motions` finds them.
+    equations : The equations of contact and friction.
+    law : Their law.
+    r, u : (k, d) forces and displacements.
+    loose : (p, j) the motions, as `loose_motions` finds them.
 
     Returns
     -------
-    ndarray or None
-        The change (p,); None if no friction balances the loads.
+    The change (p,); None if no friction balances the loads.
     """
     k, d = r.shape
     y = r - equations.rho[:, None] * u
@@ -160,7 +165,12 @@ def settled(equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose:
     slide = bound > 0
     if not slide.any():
         return None
-    t, bound, rho, W = y[slide, 1:], bound[slide], equations.rho[slide], W[slide, 1:].reshape(-1, W.shape[2])
+    t, bound, rho, W = (
+        y[slide, 1:],
+        bound[slide],
+        equations.rho[slide],
+        W[slide, 1:].reshape(-1, W.shape[2]),
+    )
 
     def balanced(moved: np.ndarray, share: float, steps: int = STEPS) -> tuple[np.ndarray, bool]:
         P, moved = project_balanced(_softened(bound, share), t, W, s, rho, moved, steps)
@@ -177,7 +187,9 @@ def settled(equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose:
 
 
 def _softened(bound: np.ndarray, share: float) -> Projection:
-    """y -> the projection of share y on discs, and its derivative: friction that grows gradually with the slip."""
+    """y -> the projection of share y on discs, and its derivative: friction that grows gradually
+    with the slip.
+    """
 
     def project(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         P, D = disc_derivative(share * y, bound)

@@ -1,12 +1,14 @@
 """Newton steps at the price of one factorisation: most contacts of an elastic interface stick.
 
-If every contact stuck, each Newton step would solve the same bonded system B = [[Q, V], [V', 0]]. With z = Q dr + V
-dlambda the change of displacement, known where a contact sticks, a step has unknowns only at the other contacts N:
+If every contact stuck, each Newton step would solve the same bonded system B = [[Q, V], [V', 0]].
+With z = Q dr + V dlambda the change of displacement, known where a contact sticks, a step has
+unknowns only at the other contacts N:
 
     dr = G z + h,   G = (B^-1)_rr,   ((I - D) G_NN + D rho) z_N = error_N - (I - D) h_N.
 
-One Cholesky factorisation of Q (n^3/3) serves all steps; a contact that leaves the sticking state costs `dim` columns of G
-once, 2 n^2 operations each. The bonded solution, the cold start of Newton's method, comes with it.
+One Cholesky factorisation of Q (n^3/3) serves all steps; a contact that leaves the sticking state
+costs `dim` columns of G once, 2 n^2 operations each. The bonded solution, the cold start of
+Newton's method, comes with it.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-LEAST_PIVOT = 1e-7  # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
+# least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
+LEAST_PIVOT = 1e-7
 
 
 class Bonded:
@@ -36,7 +39,9 @@ class Bonded:
         self.place = np.full(n, -1)  # unknown -> its column of G, -1 if not there yet
 
     def solve(self, z: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The solution dr, dlambda of Q dr + V dlambda = z (n,) or (n, j), V' dr = -balance (p,) or (p, j)."""
+        """The solution dr, dlambda of Q dr + V dlambda = z (n,) or (n, j), V' dr = -balance (p,) or
+        (p, j).
+        """
         dr = la.cho_solve(self.factor, z, check_finite=False)
         if self.V.shape[1] == 0:
             return dr, np.zeros_like(balance)
@@ -48,13 +53,11 @@ class Bonded:
 
         Parameters
         ----------
-        unknowns
-            (m,) numbers of the columns.
+        unknowns : (m,) numbers of the columns.
 
         Returns
         -------
-        ndarray
-            (n, m).
+        (n, m).
         """
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
@@ -72,27 +75,22 @@ class Bonded:
 
         Parameters
         ----------
-        rho
-            (k,) steps of the map.
-        error
-            (k, d) right-hand side of the contact equations.
-        balance
-            (p,) error of the balance.
-        D
-            (k, d, d) derivatives of the law's map.
+        rho : (k,) steps of the map.
+        error : (k, d) right-hand side of the contact equations.
+        balance : (p,) error of the balance.
+        D : (k, d, d) derivatives of the law's map.
 
         Returns
         -------
-        tuple
-            dr (k, d) and dlambda (p,).
+        dr (k, d) and dlambda (p,).
 
         Raises
         ------
-        LinAlgError
-            If the system is singular.
+        LinAlgError : If the system is singular.
         """
         k, d = error.shape
-        # N, the unknowns of the contacts that are open or slip. The right-hand side of those that stick is error / rho.
+        # N, the unknowns of the contacts that are open or slip. The right-hand side of those that
+        # stick is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()
@@ -100,7 +98,8 @@ class Bonded:
         dr, multipliers = self.solve(z, balance)
         # So far every contact sticks. The others correct that by their displacements z_N.
         if len(N):
-            # With dr = (bonded dr) + G z_N their rows (I - D) dr + rho D z = error are a small dense system for z_N.
+            # With dr = (bonded dr) + G z_N their rows (I - D) dr + rho D z = error are a small
+            # dense system for z_N.
             G = self.inverse(N)
             keep = np.eye(d) - D[loose]
 

@@ -1,17 +1,20 @@
-"""Newton's steps on the contact equations and the equilibrium of the bodies at once: no solve inside a solve.
+"""Newton's steps on the contact equations and the equilibrium of the bodies at once: no solve
+inside a solve.
 
-The unknowns are the displacements X of the bodies, the contact forces r and the multipliers lambda. With Q = T A^-1 T' + R
-(contactopt.linear.saddle_point) one step of Newton's method on r = P(r - rho (T X + R r + V lambda + q)) is
+The unknowns are the displacements X of the bodies, the contact forces r and the multipliers lambda.
+With Q = T A^-1 T' + R (contactopt.linear.saddle_point) one step of Newton's method on r = P(r - rho
+(T X + R r + V lambda + q)) is
 
     A dX - T' dr = T' r - A X
     (I - D + D rho R) dr + D rho (T dX + V dlambda) = error,   V' dr = -balance.
 
-Flexible GMRES solves it to the accuracy that the step is worth. Its preconditioner is block triangular: the Schur complement
-for a model of Q gives (dr, dlambda), then one V-cycle per body gives dX for the right side T' dr and the rest. The
-displacements are carried from step to step, so that equilibrium becomes as accurate as the contact equations.
+Flexible GMRES solves it to the accuracy that the step is worth. Its preconditioner is block
+triangular: the Schur complement for a model of Q gives (dr, dlambda), then one V-cycle per body
+gives dX for the right side T' dr and the rest. The displacements are carried from step to step, so
+that equilibrium becomes as accurate as the contact equations.
 
-Source of the preconditioner: Bramble, Pasciak (1988), A preconditioning technique for indefinite systems; Murphy, Golub,
-Wathen (2000), A note on preconditioning for indefinite linear systems.
+Source of the preconditioner: Bramble, Pasciak (1988), A preconditioning technique for indefinite
+systems; Murphy, Golub, Wathen (2000), A note on preconditioning for indefinite linear systems.
 """
 
 from __future__ import annotations
@@ -73,7 +76,9 @@ class Coupled:
 
     @cached_property
     def weights(self) -> Stacked:
-        """Weights of the residuals of X, r and the balance: in units of the root of an energy, whatever the mesh."""
+        """Weights of the residuals of X, r and the balance: in units of the root of an energy,
+        whatever the mesh.
+        """
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
         return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
@@ -83,7 +88,9 @@ class Coupled:
         return np.asarray(u.reshape(at.r.shape) + self.equations.q)
 
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
-        """The right side of Newton's step there, in parts for X, r and the balance, and its contact equations."""
+        """The right side of Newton's step there, in parts for X, r and the balance, and its contact
+        equations.
+        """
         equations = self.equations
         P, D = equations.project(at.r - equations.rho[:, None] * self.moved(at))
         balance = equations.V.T @ at.r.ravel() + equations.s
@@ -118,10 +125,12 @@ class Coupled:
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces r + error, at the solution equal to r and within the bounds to the last digit, with what Q makes of them.
+        """The forces r + error, at the solution equal to r and within the bounds to the last digit,
+        with what Q makes of them.
 
-        One V-cycle improves the displacements. The accuracy stated is that before it, by the criterion with which
-        conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f over that of the displacements.
+        One V-cycle improves the displacements. The accuracy stated is that before it, by the
+        criterion with which conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f
+        over that of the displacements.
         """
         form, r = self.form, at.r + error
         missing = form.unbalanced(at.X, r.ravel())
@@ -143,32 +152,36 @@ def coupled_steps(
 
     Parameters
     ----------
-    problem
-        A dimensionless interface problem.
-    form
-        Its Q before condensation.
-    preconditioner
-        A name, as for `model_of`.
-    start
-        Forces (k, dim) and multipliers (p,) to start from; None: the bonded solution.
+    problem : A dimensionless interface problem.
+    form : Its Q before condensation.
+    preconditioner : A name, as for `model_of`.
+    start : Forces (k, dim) and multipliers (p,) to start from; None: the bonded solution.
 
     Yields
     ------
-    tuple
-        An iterate, and the residual of the equations that its step began with. The iteration ends where a step fails.
+    An iterate, and the residual of the equations that its step began with. The iteration ends where
+    a step fails.
     """
     with one_blas_thread():
         several = len(problem.pairs) > 1
         P = model_of(problem, preconditioner, deflate=several)
         equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
         coupled = Coupled(equations, form, P if several else fitted(P, form))
-        at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
+        at = (
+            _bonded(problem, coupled)
+            if start is None
+            else State(in_equilibrium(form, start[0]), *start)
+        )
     last = np.inf
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
             loose = loose_motions(problem.V, linearised.D)
-            change = settled(equations, problem.law, at.r, coupled.moved(at), loose) if loose.size else None
+            change = (
+                settled(equations, problem.law, at.r, coupled.moved(at), loose)
+                if loose.size
+                else None
+            )
             if change is not None:
                 at = replace(at, multipliers=at.multipliers + change)
                 right, linearised = coupled.linearised(at)
@@ -186,7 +199,9 @@ def coupled_steps(
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
-    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to COUPLED_FIRST, or no force at all."""
+    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to COUPLED_FIRST,
+    or no force at all.
+    """
     none = np.zeros(problem.q.shape)
     zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
     glued = glued_contacts(problem)
@@ -201,25 +216,24 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
 
 
 def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
-    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a random force does most of
+    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a
+    random force does most of
     its work.
 
-    One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
-    too large than too small.
+    One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur
+    complement that is rather too large than too small.
 
     Parameters
     ----------
-    P
-        The preconditioner, with its model of Q if it has one.
-    form
-        Q before condensation.
+    P : The preconditioner, with its model of Q if it has one.
+    form : Q before condensation.
 
     Returns
     -------
-    Preconditioner
-        P and its model, scaled.
+    P and its model, scaled.
     """
-    # The mean eigenvalue of P Q, weighted with the work of a random force x: (Qx)' P (Qx) over x' Qx.
+    # The mean eigenvalue of P Q, weighted with the work of a random force x: (Qx)' P (Qx) over x'
+    # Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])
     Qx = form.moved(form.approximate(form.pulled(x)), x)
     factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
@@ -232,19 +246,16 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE
 
     Parameters
     ----------
-    form
-        Q before condensation.
-    r
-        (k, dim) contact forces.
-    rtol
-        Relative accuracy in the energy norm.
+    form : Q before condensation.
+    r : (k, dim) contact forces.
+    rtol : Relative accuracy in the energy norm.
 
     Returns
     -------
-    Stacked
-        Displacements X of the bodies.
+    Displacements X of the bodies.
     """
-    # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy residual' B
+    # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy
+    # residual' B
     # residual.
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0

@@ -1,24 +1,27 @@
 """A path that turns back where it must, from a problem with one solution to Coulomb's problem.
 
-In the cones and the scaling of contactopt.methods.kernels.interior, with x in the place of the forces r, z in that of
-u + mu |u_t| n, and t from 1 to 0:
+In the cones and the scaling of contactopt.methods.kernels.interior, with x in the place of the
+forces r, z in that of u + mu |u_t| n, and t from 1 to 0:
 
     z = u + (1 - t) mu slip(z) n + t c,    V' r + s = t b,    x o z = t m e at each contact,
 
-where c and b are such that the first point solves it at t = 1. There it is a convex problem with this solution alone. An
-interior-point method lowers t and ends where the path turns back, as it does on jammed packings. Here the path is followed
-by its length, t rises where it has to, and the end is a solution. slip is smooth inside the cones,
+where c and b are such that the first point solves it at t = 1. There it is a convex problem with
+this solution alone. An interior-point method lowers t and ends where the path turns back, as it
+does on jammed packings. Here the path is followed by its length, t rises where it has to, and the
+end is a solution. slip is smooth inside the cones,
 
     slip(z)^2 = (1 - BEND^2) |z_t|^2 + BEND^2 z_n^2,
 
-and the end solves Coulomb's problem as it is: where a contact sticks z = 0, where it slips z_n = |z_t|, and where it is open
-u_n = z_n - slip(z) >= 0 as long as z_n >= |z_t|. Each step goes along the tangent, and Newton steps across it lead back to
-the path; both come from one factorisation. The sign of the determinant tells forward from backward: where it changes, t
-begins to rise or fall. The path cannot come back to t = 1, where the first point is the only solution. As long as it stays
-bounded it ends at t = 0, unless it has singular points, which almost every c avoids. That it stays bounded is not proved here,
-and a step that is too long may land on another path. Lemke's method follows such a path for polygonal cones.
-Source: Kellogg, Li, Yorke (1976), A constructive proof of the Brouwer fixed-point theorem and computational results;
-Allgower, Georg (1990), Numerical Continuation Methods, chapters 2 to 6; Acary, Cadoux, Lemarechal, Malick (2011) for existence.
+and the end solves Coulomb's problem as it is: where a contact sticks z = 0, where it slips z_n =
+|z_t|, and where it is open u_n = z_n - slip(z) >= 0 as long as z_n >= |z_t|. Each step goes along
+the tangent, and Newton steps across it lead back to the path; both come from one factorisation. The
+sign of the determinant tells forward from backward: where it changes, t begins to rise or fall. The
+path cannot come back to t = 1, where the first point is the only solution. As long as it stays
+bounded it ends at t = 0, unless it has singular points, which almost every c avoids. That it stays
+bounded is not proved here, and a step that is too long may land on another path. Lemke's method
+follows such a path for polygonal cones. Source: Kellogg, Li, Yorke (1976), A constructive proof of
+the Brouwer fixed-point theorem and computational results; Allgower, Georg (1990), Numerical
+Continuation Methods, chapters 2 to 6; Acary, Cadoux, Lemarechal, Malick (2011) for existence.
 """
 
 from __future__ import annotations
@@ -30,18 +33,29 @@ from typing import NamedTuple
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.methods.kernels.interior import RIDGE, Iterate, Scaling, det, direction, lorentz, times
+from contactopt.methods.kernels.interior import (
+    RIDGE,
+    Iterate,
+    Scaling,
+    det,
+    direction,
+    lorentz,
+    times,
+)
 from contactopt.methods.kernels.sparse_blocks import Blocks, Solver
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone
 
 BEND = 0.5  # between 0, where slip has a kink at z_t = 0, and 1, where nothing is left of friction
-NEAR, FAR = 0.4, 0.8  # Newton steps, over the point: on the path, and beyond which a step along it was too long
+# Newton steps, over the point: on the path, and beyond which a step along it was too long
+NEAR, FAR = 0.4, 0.8
 SLOW = 0.6  # a Newton step that is longer than this share of the last one does not converge
 MOST = 6  # Newton steps back to the path
 AIM = 0.25  # first Newton step that the length of the next step along the path aims at
-FIRST, LONGEST, SHORTEST = 0.3, 3.0, 1e-8  # steps along the path, as the largest relative change of a contact
-GROWTH, AGAIN, CUT = 3.0, 1.5, 0.35  # largest growth of the step, the same after one that failed, and the cut then
+# steps along the path, as the largest relative change of a contact
+FIRST, LONGEST, SHORTEST = 0.3, 3.0, 1e-8
+# largest growth of the step, the same after one that failed, and the cut then
+GROWTH, AGAIN, CUT = 3.0, 1.5, 0.35
 LEAST, SHRINK = 0.1, 0.7  # of t that one step leaves, and of a step that would leave the cones
 SHARP = 1e-4  # step up to which a turn that is too sharp is taken for a step that was too long
 TURN = 0.2  # least cosine between two tangents
@@ -68,7 +82,9 @@ class Point(NamedTuple):
     @property
     def inside(self) -> bool:
         """Whether x and z are inside the cones, and t is positive."""
-        return self.t > 0 and all(bool(np.all(det(a) > 0) and np.all(a[:, 0] > 0)) for a in (self.x, self.z))
+        return self.t > 0 and all(
+            bool(np.all(det(a) > 0) and np.all(a[:, 0] > 0)) for a in (self.x, self.z)
+        )
 
 
 Relative = tuple[np.ndarray, np.ndarray, float]
@@ -96,7 +112,10 @@ class Along:
     def relative(self, change: Point) -> Relative:
         """A change over the point, in Nesterov and Todd's scaling."""
         root = np.sqrt(self.mean)
-        x, z = times(self.scaling.M, change.x) / root, times(self.scaling.M_inverse, change.z) / root
+        x, z = (
+            times(self.scaling.M, change.x) / root,
+            times(self.scaling.M_inverse, change.z) / root,
+        )
         return x, z, change.t / self.point.t
 
     def size(self, change: Point) -> float:
@@ -120,11 +139,15 @@ def _inner(a: Relative, b: Relative) -> float:
 
 
 def _slip(z: np.ndarray) -> np.ndarray:
-    return np.asarray(np.sqrt((1 - BEND**2) * np.sum(z[:, 1:] ** 2, axis=1) + BEND**2 * z[:, 0] ** 2))
+    return np.asarray(
+        np.sqrt((1 - BEND**2) * np.sum(z[:, 1:] ** 2, axis=1) + BEND**2 * z[:, 0] ** 2)
+    )
 
 
 class Homotopy:
-    """The equations of the path through a first point (x, z, 0, 1) with x o z = m e; sizes (k,) of its x."""
+    """The equations of the path through a first point (x, z, 0, 1) with x o z = m e; sizes (k,) of
+    its x.
+    """
 
     def __init__(self, problem: InterfaceProblem, matrix: Blocks, sizes: np.ndarray):
         self.problem, self.matrix, self.m = problem, matrix, START**2
@@ -162,8 +185,12 @@ class Homotopy:
         solve = self.matrix.factor(None, added, self.kept.ravel())
         if solve is None:
             return None
-        newton = direction(solve, scaling, shear, gap, scale, self.kept, V, unbalanced, mean * scaling.inverse - z)
-        tangent = direction(solve, scaling, shear, ahead, scale, self.kept, V, -self.b, self.m * scaling.inverse)
+        newton = direction(
+            solve, scaling, shear, gap, scale, self.kept, V, unbalanced, mean * scaling.inverse - z
+        )
+        tangent = direction(
+            solve, scaling, shear, ahead, scale, self.kept, V, -self.b, self.m * scaling.inverse
+        )
         if newton is None or tangent is None:
             return None
         step, way = Point(*newton, 0.0), Point(*tangent, 1.0)
@@ -190,9 +217,11 @@ class Homotopy:
 def homotopy_iterates(
     problem: InterfaceProblem, matrix: Blocks, steps: int, random: np.random.Generator | None = None
 ) -> Iterator[tuple[Iterate, float]]:
-    """Points (r (k, dim), lambda (p,)) of a dimensionless problem and how far each is from a solution: one at each new half of t.
+    """Points (r (k, dim), lambda (p,)) of a dimensionless problem and how far each is from a
+    solution: one at each new half of t.
 
-    It ends near a solution, where the path cannot be followed further, or after that many factorisations.
+    It ends near a solution, where the path cannot be followed further, or after that many
+    factorisations.
 
     random  draws another first point, of another path
     """
@@ -231,7 +260,9 @@ def homotopy_iterates(
 
 
 def _inside(here: Along, way: Point, length: float) -> tuple[float, Point]:
-    """The longest step of at most that length along the way that stays inside the cones, and its end."""
+    """The longest step of at most that length along the way that stays inside the cones, and its
+    end.
+    """
     while True:
         ahead = here.point.plus(here.back).plus(way.times(length))
         if (ahead.inside and ahead.t > LEAST * here.point.t) or length < SHORTEST:
@@ -240,7 +271,9 @@ def _inside(here: Along, way: Point, length: float) -> tuple[float, Point]:
 
 
 def _corrected(path: Homotopy, point: Point, left: int) -> tuple[Along | None, int, float]:
-    """Newton's steps back to the path: where they end, None if they do not converge; their number, the size of the first."""
+    """Newton's steps back to the path: where they end, None if they do not converge; their number,
+    the size of the first.
+    """
     last, first = np.inf, 0.0
     for used in range(1, min(MOST, left) + 1):
         check_time()

@@ -1,15 +1,18 @@
-"""An interior-point method for Coulomb friction, on a symmetric or unsymmetric Q, sparse or an array.
+"""An interior-point method for Coulomb friction, on a symmetric or unsymmetric Q, sparse or an
+array.
 
 With the cones K of forces and K* dual to them, De Saxce's form of Coulomb's law is
-    r in K,   z = u + mu |u_t| n in K*,   r' z = 0  at each contact,   u = Q r + V lambda + q,   V' r + s = 0.
-In x = (mu r_n, r_t) and (z_n / mu, z_t) both cones are Lorentz's. Each iteration is one Newton step on z = u + mu |u_t| n
-with |u_t| linearised (where that led to a short step: as it is), the balance, and x o z = sigma (x'z / k) e in the scaling of Nesterov and Todd, predictor and
-corrector from one factorisation of Q + blocks, whose pattern is that of Q. It tells open, sticking and slipping contacts
-apart in few iterations where Newton's method cycles, and the null space of Q does not disturb it; the last digits are
-left to Newton's method. For Coulomb's law it is a method without a proof of convergence; it ends when it makes no
-progress.
-Source: Acary, Armand, Nguyen, Shpakovych (2024), Second-order cone programming for frictional contact mechanics using
-interior point algorithm; Nesterov, Todd (1997); Mehrotra (1992) for the corrector.
+    r in K,   z = u + mu |u_t| n in K*,   r' z = 0  at each contact,   u = Q r + V lambda + q,   V'
+              r + s = 0.
+In x = (mu r_n, r_t) and (z_n / mu, z_t) both cones are Lorentz's. Each iteration is one Newton step
+on z = u + mu |u_t| n with |u_t| linearised (where that led to a short step: as it is), the balance,
+and x o z = sigma (x'z / k) e in the scaling of Nesterov and Todd, predictor and corrector from one
+factorisation of Q + blocks, whose pattern is that of Q. It tells open, sticking and slipping
+contacts apart in few iterations where Newton's method cycles, and the null space of Q does not
+disturb it; the last digits are left to Newton's method. For Coulomb's law it is a method without a
+proof of convergence; it ends when it makes no progress. Source: Acary, Armand, Nguyen, Shpakovych
+(2024), Second-order cone programming for frictional contact mechanics using interior point
+algorithm; Nesterov, Todd (1997); Mehrotra (1992) for the corrector.
 """
 
 from __future__ import annotations
@@ -55,11 +58,15 @@ Iterate = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Which path to a solution is followed. On jammed packings many paths end early, and another one does not.
+    """Which path to a solution is followed.
 
-    full    |u_t| is linearised in every step, with shorter steps; else not after a step that had to be short
-    smooth  |u_t| is replaced by (|u_t|^2 + (smooth z_n)^2)^1/2, which has no kink where a contact begins to slip the other way;
-            its derivative by z_n is left out. The end of the path is a solution but for terms of order smooth^2
+    On jammed packings many paths end early, and another one does not.
+
+    full    |u_t| is linearised in every step, with shorter steps; else not after a step that had to
+            be short
+    smooth  |u_t| is replaced by (|u_t|^2 + (smooth z_n)^2)^1/2, which has no kink where a contact
+            begins to slip the other way; its derivative by z_n is left out. The end of the path is
+            a solution but for terms of order smooth^2
     first   r_n mu and z_n / mu of the first point, (2,) or one for every contact, (2, k)
     """
 
@@ -71,7 +78,10 @@ class Path:
     def random(cls, rng: np.random.Generator, contacts: int) -> Path:
         """A path drawn at random."""
         size = START ** rng.uniform() * np.exp(rng.normal(size=(2, contacts)))
-        return cls(smooth=float(np.exp(rng.uniform(*np.log((LEAST_SMOOTHING, MOST_SMOOTHING))))), first=size)
+        return cls(
+            smooth=float(np.exp(rng.uniform(*np.log((LEAST_SMOOTHING, MOST_SMOOTHING))))),
+            first=size,
+        )
 
 
 def interior_iterates(
@@ -81,18 +91,14 @@ def interior_iterates(
 
     Parameters
     ----------
-    problem
-        The dimensionless interface problem of k contacts.
-    matrix
-        Its Q, ready for block systems.
-    path
-        How the path to the solution is taken; by default as Path() says.
+    problem : The dimensionless interface problem of k contacts.
+    matrix : Its Q, ready for block systems.
+    path : How the path to the solution is taken; by default as Path() says.
 
     Yields
     ------
-    tuple
-        A point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the largest of the mean
-        complementarity, the error of the law and that of the balance [-].
+    A point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the largest
+    of the mean complementarity, the error of the law and that of the balance [-].
     """
     path = path or Path()
     full = path.full
@@ -105,7 +111,8 @@ def interior_iterates(
     x[:, 0], z[:, 0] = path.first
     best, since, last = np.inf, 0, 1.0
     for _ in range(INTERIOR_STEPS):
-        # The residuals of the three conditions: z = scale (u + mu |u_t| n), the balance, and x'z = 0 per contact.
+        # The residuals of the three conditions: z = scale (u + mu |u_t| n), the balance, and x'z =
+        # 0 per contact.
         slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + (path.smooth * z[:, 0]) ** 2 + TINY)
         r = scale * x
         gap = scale * ((matrix.Q @ r.ravel() + V @ lam).reshape(k, d) + problem.q) - z
@@ -113,14 +120,20 @@ def interior_iterates(
         gap[~kept] = 0.0
         unbalanced = V.T @ r.ravel() + problem.s
         mean = float(np.sum(x * z)) / k
-        error = max(mean, float(np.linalg.norm(gap)) / np.sqrt(k), float(np.abs(unbalanced).max(initial=0.0)))
+        error = max(
+            mean,
+            float(np.linalg.norm(gap)) / np.sqrt(k),
+            float(np.abs(unbalanced).max(initial=0.0)),
+        )
         yield (coulomb_cone(r, problem.mu), lam), error
         since = 0 if error < INTERIOR_PROGRESS * best else since + 1
         best = min(best, error)
         if error < NEAR or since >= STALLED or not np.isfinite(error):
             return
-        # Linearise |u_t| = |z_t|: `shear` is the derivative of z - |z_t| n by z. The scaling gives dz = target - F dx.
-        # Put in, the system for dr is (Q + shear F / scale^2) dr + V dlambda = right, with one block added per contact.
+        # Linearise |u_t| = |z_t|: `shear` is the derivative of z - |z_t| n by z. The scaling gives
+        # dz = target - F dx.
+        # Put in, the system for dr is (Q + shear F / scale^2) dr + V dlambda = right, with one
+        # block added per contact.
         scaling = Scaling(x, z)
         bend = 1.0 if full or last > STUCK else 0.0
         shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
@@ -139,7 +152,11 @@ def interior_iterates(
         # The better the predictor, the less the next step is centred (Mehrotra).
         ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
         centering = float(
-            np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, LEAST_CENTERING if bend else STUCK_CENTERING, MOST_CENTERING)
+            np.clip(
+                np.clip(ahead / mean, 0.0, 1.0) ** 3,
+                LEAST_CENTERING if bend else STUCK_CENTERING,
+                MOST_CENTERING,
+            )
         )
         # Corrector: the same system with the centring and the second-order term of the predictor.
         second = scaling.corrector(first[0], first[1]) if length > CORRECTED else 0.0
@@ -147,11 +164,15 @@ def interior_iterates(
         if step is None:
             return
         length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
-        # Shorten the step until no contact comes near the boundary of its cones long before the others.
+        # Shorten the step until no contact comes near the boundary of its cones long before the
+        # others.
         least = np.minimum(CENTRAL, CENTRAL_KEPT * scaling.centrality / mean)
         for _ in range(BACKTRACKS):
             new = x + length * step[0], z + length * step[1]
-            if np.all(np.sqrt(np.maximum(det(new[0]) * det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
+            if np.all(
+                np.sqrt(np.maximum(det(new[0]) * det(new[1]), 0.0))
+                >= least * np.sum(new[0] * new[1]) / k
+            ):
                 break
             length *= BACKTRACK
         last = length
@@ -159,7 +180,9 @@ def interior_iterates(
 
 
 def lorentz(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """scale (k, d) with r = scale x and z = scale (u + mu |u_t| n), and the mask kept (k, d) of what friction leaves free."""
+    """scale (k, d) with r = scale x and z = scale (u + mu |u_t| n), and the mask kept (k, d) of
+    what friction leaves free.
+    """
     scale, kept = np.ones(problem.q.shape), np.ones(problem.q.shape, dtype=bool)
     smooth = problem.mu < FRICTIONLESS
     scale[:, 0] = 1 / np.where(smooth, 1.0, np.minimum(problem.mu, ROUGHEST))
@@ -178,9 +201,12 @@ def direction(
     unbalanced: np.ndarray,
     target: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None if there are none."""
+    """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None if
+    there are none.
+    """
     flat = kept.ravel()
-    # Put dz = target - F dx into the linearised z = scale (u + mu |u_t| n); what remains are equations for dr and
+    # Put dz = target - F dx into the linearised z = scale (u + mu |u_t| n); what remains are
+    # equations for dr and
     # dlambda.
     right = ((times(shear, target) - gap) / scale).ravel()[flat]
     answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
@@ -194,7 +220,9 @@ def direction(
 
 
 class Scaling:
-    """Nesterov and Todd's scaling of points x, z (k, d) inside Lorentz's cones: F = M M with M x = M^-1 z."""
+    """Nesterov and Todd's scaling of points x, z (k, d) inside Lorentz's cones: F = M M with M x =
+    M^-1 z.
+    """
 
     def __init__(self, x: np.ndarray, z: np.ndarray):
         d = x.shape[1]
@@ -202,7 +230,8 @@ class Scaling:
         # Both points divided by the root of their determinant lie on the hyperboloid det = 1.
         det_x, det_z = det(x), det(z)
         unit_x, unit_z = x / np.sqrt(det_x)[:, None], z / np.sqrt(det_z)[:, None]
-        # The scaling point w lies half-way between z and the inverse of x; F is the quadratic map of w, times the ratio
+        # The scaling point w lies half-way between z and the inverse of x; F is the quadratic map
+        # of w, times the ratio
         # of sizes.
         w = unit_z + self.sign * unit_x
         w /= np.sqrt(2 * (1 + np.sum(unit_x * unit_z, axis=1)))[:, None]
@@ -214,16 +243,21 @@ class Scaling:
         half /= np.sqrt(2 * half[:, 0])[:, None]
         self.M = np.sqrt(size) * (2 * half[:, :, None] * half[:, None, :] - np.diag(self.sign))
         turned = self.sign * half
-        self.M_inverse = (2 * turned[:, :, None] * turned[:, None, :] - np.diag(self.sign)) / np.sqrt(size)
+        self.M_inverse = (
+            2 * turned[:, :, None] * turned[:, None, :] - np.diag(self.sign)
+        ) / np.sqrt(size)
         self.inverse = self.sign * x / det_x[:, None]  # of x in Jordan's algebra
         self.centrality = np.sqrt(det_x * det_z)
 
     def corrector(self, dx: np.ndarray, dz: np.ndarray) -> np.ndarray:
         """Mehrotra's second-order term of the predictor (dx, dz), in the units of z."""
-        # In scaled variables x and z are one point c. With the product o of Jordan's algebra the term y solves c o y =
+        # In scaled variables x and z are one point c. With the product o of Jordan's algebra the
+        # term y solves c o y =
         # dx o dz.
         a, b, c = times(self.M, dx), times(self.M_inverse, dz), times(self.M, self.x)
-        product = np.concatenate([np.sum(a * b, axis=1)[:, None], a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1)
+        product = np.concatenate(
+            [np.sum(a * b, axis=1)[:, None], a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1
+        )
         # The product with c is an arrow matrix, which is solved by elimination.
         out = np.empty_like(product)
         out[:, 0] = (c[:, 0] * product[:, 0] - np.sum(c[:, 1:] * product[:, 1:], axis=1)) / det(c)
@@ -251,4 +285,6 @@ def _longest(x: np.ndarray, dx: np.ndarray) -> float:
     root = -0.5 * (b + np.where(b >= 0, 1.0, -1.0) * np.sqrt(np.maximum(square, 0.0)))
     with np.errstate(all="ignore"):
         ends = np.stack([root / a, c / root])
-    return float(np.where((ends > 0) & np.isfinite(ends) & (square >= 0), ends, np.inf).min(initial=np.inf))
+    return float(
+        np.where((ends > 0) & np.isfinite(ends) & (square >= 0), ends, np.inf).min(initial=np.inf)
+    )

@@ -1,14 +1,19 @@
-"""Newton steps from products with Q alone: PCG and GMRES preconditioned by the same step for a model of Q.
+"""Newton steps from products with Q alone: PCG and GMRES preconditioned by the same step for a
+model of Q.
 
-A step solves  (I - D + D rho Q) dr + D rho V dlambda = error,  V' dr = -balance  (contactopt.methods.kernels.semismooth). Where D is
-symmetric (all contacts glued, the normal problem, Tresca friction) let U diag(delta) U' = D with delta > 0. Then
+A step solves  (I - D + D rho Q) dr + D rho V dlambda = error,  V' dr = -balance
+               (contactopt.methods.kernels.semismooth). Where D is
+symmetric (all contacts glued, the normal problem, Tresca friction) let U diag(delta) U' = D with
+delta > 0. Then
 
-    dr = U alpha + dr0,   dr0 = (I - U U') error,   (U'QU + B) alpha + U'V dlambda = U'error / (delta rho) - U'Q dr0,
+    dr = U alpha + dr0,   dr0 = (I - U U') error,   (U'QU + B) alpha + U'V dlambda = U'error /
+                          (delta rho) - U'Q dr0,
 
-B = (1 - delta) / (delta rho), symmetric positive definite on the balance V'U alpha = -balance - V'dr0: projected PCG
-(Gould, Hribar, Nocedal 2001). Coulomb's D is not symmetric: GMRES. In both the preconditioner is the same system with Q
-replaced by its model G, whose products cost an FFT, solved by an inner iteration: if c1 G <= Q <= c2 G then the
-preconditioned system is that well conditioned whatever sticks, slips or is open. Q is needed once per iteration.
+B = (1 - delta) / (delta rho), symmetric positive definite on the balance V'U alpha = -balance -
+V'dr0: projected PCG (Gould, Hribar, Nocedal 2001). Coulomb's D is not symmetric: GMRES. In both the
+preconditioner is the same system with Q replaced by its model G, whose products cost an FFT, solved
+by an inner iteration: if c1 G <= Q <= c2 G then the preconditioned system is that well conditioned
+whatever sticks, slips or is open. Q is needed once per iteration.
 """
 
 from __future__ import annotations
@@ -25,7 +30,13 @@ from contactopt.methods.constants import MODEL_PRODUCTS, MODEL_STEP, PRODUCT_SHA
 from contactopt.methods.kernels.linearised import CYCLES, RESTART, Linearised
 from contactopt.methods.kernels.semismooth import Equations
 from contactopt.methods.notes import note
-from contactopt.methods.preconditioners import Preconditioner, deflated, preconditioner, restricted, smooth_motions
+from contactopt.methods.preconditioners import (
+    Preconditioner,
+    deflated,
+    preconditioner,
+    restricted,
+    smooth_motions,
+)
 from contactopt.problem import InterfaceProblem
 
 logger = logging.getLogger(__name__)
@@ -35,67 +46,72 @@ FLAT = 1e-8  # eigenvalues of D below this are zero
 Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 
 
-def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool = True) -> Preconditioner:
+def model_of(
+    problem: InterfaceProblem, name: str | None = None, deflate: bool = True
+) -> Preconditioner:
     """Make the preconditioner of a problem, with the smooth motions deflated if asked for.
 
     Parameters
     ----------
-    problem
-        The interface problem.
-    name
-        A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the contacts lie on a grid,
-        `laplacian` on other surfaces whose cells are known, else the identity, with a note that says why.
-    deflate
-        Whether the smooth motions of the bodies are solved for exactly, which costs a few products with Q.
+    problem : The interface problem.
+    name : A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the
+        contacts lie on a grid, `laplacian` on other surfaces whose cells are known, else the
+        identity, with a note that says why.
+    deflate : Whether the smooth motions of the bodies are solved for exactly, which costs a few
+        products with Q.
 
     Returns
     -------
-    Preconditioner
-        An approximate inverse of Q, on arrays (k dim,).
+    An approximate inverse of Q, on arrays (k dim,).
 
     Raises
     ------
-    InputError
-        If the preconditioner that was named is unknown or does not fit the contacts.
+    InputError : If the preconditioner that was named is unknown or does not fit the contacts.
     """
     missing: list[str] = []
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
         try:
             P = preconditioner(problem, choice)
-            return deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem)) if deflate else P
+            return (
+                deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem))
+                if deflate
+                else P
+            )
         except InputError as error:
             if name is not None:
                 raise
             missing.append(str(error))
     if missing:
-        note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {' '.join(missing)}")
+        note(
+            logger,
+            "no preconditioner fits these contacts, so iterative steps go without one:"
+            f" {' '.join(missing)}",
+        )
     return Preconditioner(problem.q.size, lambda x: x)
 
 
 def krylov_step(
-    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+    equations: Equations,
+    P: Preconditioner,
+    error: np.ndarray,
+    balance: np.ndarray,
+    D: np.ndarray,
+    rtol: float,
 ) -> Step | None:
     """Solve for a Newton step from products with Q alone.
 
     Parameters
     ----------
-    equations
-        The equations of contact and friction at k contacts in d components.
-    P
-        The preconditioner.
-    error
-        (k, d) right-hand side of the contact equations.
-    balance
-        (p,) error of the balance.
-    D
-        (k, d, d) derivatives of the law's map.
-    rtol
-        Relative accuracy of the step.
+    equations : The equations of contact and friction at k contacts in d components.
+    P : The preconditioner.
+    error : (k, d) right-hand side of the contact equations.
+    balance : (p,) error of the balance.
+    D : (k, d, d) derivatives of the law's map.
+    rtol : Relative accuracy of the step.
 
     Returns
     -------
-    tuple or None
-        dr (k, d) and dlambda (p,); None if the iteration does not get anywhere.
+    dr (k, d) and dlambda (p,); None if the iteration does not get anywhere.
     """
     symmetric = np.array_equal(D, D.transpose(0, 2, 1))
     solve = _symmetric_step if symmetric else _unsymmetric_step
@@ -106,10 +122,16 @@ def krylov_step(
 
 
 def _symmetric_step(
-    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+    equations: Equations,
+    P: Preconditioner,
+    error: np.ndarray,
+    balance: np.ndarray,
+    D: np.ndarray,
+    rtol: float,
 ) -> Step:
     Q, V = loosened(equations.Q, PRODUCT_SHARE * rtol), equations.V
-    # The unknowns alpha are the amounts of the directions U in which a contact may still change its force.
+    # The unknowns alpha are the amounts of the directions U in which a contact may still change its
+    # force.
     U, delta, rho = _directions(D, equations.rho)
     # B of the module's head; a proximal subproblem adds its weight to Q.
     added = (1 - delta) / (delta * rho) + equations.weight
@@ -123,15 +145,18 @@ def _symmetric_step(
     m = len(delta)
     if m == 0:
         return known.reshape(error.shape), np.zeros(len(balance))
-    # N, an approximate inverse of the system U'QU + B, and Y = N W, K = (W'N W)^-1. They make two projections:
+    # N, an approximate inverse of the system U'QU + B, and Y = N W, K = (W'N W)^-1. They make two
+    # projections:
     near = restricted(P, U, added)
     Y = np.stack([near @ w for w in W.T], axis=1) if W.shape[1] else W
     K = np.linalg.pinv(W.T @ Y)
 
-    def off(x: np.ndarray) -> np.ndarray:  # I - Y K W', onto the alpha that do not change the balance, W' alpha = 0
+    # I - Y K W', onto the alpha that do not change the balance, W' alpha = 0
+    def off(x: np.ndarray) -> np.ndarray:
         return x - Y @ (K @ (W.T @ x))
 
-    def off_t(x: np.ndarray) -> np.ndarray:  # its transpose I - W K Y', which removes multipliers from a residual
+    # its transpose I - W K Y', which removes multipliers from a residual
+    def off_t(x: np.ndarray) -> np.ndarray:
         return x - W @ (K @ (Y.T @ x))
 
     def product(x: np.ndarray) -> np.ndarray:
@@ -143,8 +168,11 @@ def _symmetric_step(
     system = LinearOperator((m, m), matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
     inverse = LinearOperator((m, m), matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
     size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
-    # The residual is compared with the right side without multipliers, or with the first residual if that is larger.
-    beta, _ = cg(system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES)
+    # The residual is compared with the right side without multipliers, or with the first residual
+    # if that is larger.
+    beta, _ = cg(
+        system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES
+    )
     alpha = start + off(beta)
     # The multipliers are what is left of the residual, which lies in the range of W.
     multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
@@ -152,9 +180,12 @@ def _symmetric_step(
 
 
 def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
-    """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho (m,) of each."""
+    """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho
+    (m,) of each.
+    """
     k, d = D.shape[:2]
-    # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact only.
+    # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact
+    # only.
     values, vectors = np.linalg.eigh(D)
     contact, which = np.nonzero(values > FLAT)
     columns = vectors[contact, :, which]  # (m, d)
@@ -166,7 +197,12 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
 
 
 def _unsymmetric_step(
-    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+    equations: Equations,
+    P: Preconditioner,
+    error: np.ndarray,
+    balance: np.ndarray,
+    D: np.ndarray,
+    rtol: float,
 ) -> Step:
     Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
     inverse = linearised.inverse(P, MODEL_STEP * rtol)

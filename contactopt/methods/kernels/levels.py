@@ -1,12 +1,16 @@
-"""Contact problems whose Q is a convolution, on a grid and on coarser ones, and Newton's steps for them.
+"""Contact problems whose Q is a convolution, on a grid and on coarser ones, and Newton's steps for
+them.
 
-A Level holds a problem component by component, r (c, k), for the components that its law makes matter: the normal one alone
-where there is no friction. A coarse level lumps pairs or squares of contacts; its kernel follows from the finer one.
+A Level holds a problem component by component, r (c, k), for the components that its law makes
+matter: the normal one alone where there is no friction. A coarse level lumps pairs or squares of
+contacts; its kernel follows from the finer one.
 
-A step solves  (I - D) dr + D rho (Q dr + V dlambda) = error,  V' dr = -balance  on the contacts with D != 0; all others have
-dr = error. Products with Q are taken in single precision, which is enough for a correction. Without friction the system is
-symmetric and solved by projected PCG, otherwise by GMRES. Both are preconditioned by the inverse of the symbol of Q on the
-grid without padding, restricted to the contacts that are closed and to the directions that are held.
+A step solves  (I - D) dr + D rho (Q dr + V dlambda) = error,  V' dr = -balance  on the contacts
+               with D != 0; all others have
+dr = error. Products with Q are taken in single precision, which is enough for a correction. Without
+friction the system is symmetric and solved by projected PCG, otherwise by GMRES. Both are
+preconditioned by the inverse of the symbol of Q on the grid without padding, restricted to the
+contacts that are closed and to the directions that are held.
 """
 
 from __future__ import annotations
@@ -21,7 +25,13 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from contactopt.linear.convolution import Convolution, Kernel, backward, forward
 from contactopt.linear.counter import Counter
 from contactopt.linear.deadline import check_time
-from contactopt.methods.constants import COARSEST, FIRST_SHIFT, LEAST_DETERMINANT, LEAST_SYMBOL, SHIFT_RATIO
+from contactopt.methods.constants import (
+    COARSEST,
+    FIRST_SHIFT,
+    LEAST_DETERMINANT,
+    LEAST_SYMBOL,
+    SHIFT_RATIO,
+)
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
 
@@ -77,13 +87,24 @@ class Level:
     def coarse(self) -> Level:
         """The problem for contacts lumped along each axis in pairs."""
         kernel = self.kernel.coarse()
-        V = np.stack([self._means(column) for column in np.moveaxis(self.V, 2, 0)] or [np.zeros((0, 0))], axis=-1)
+        V = np.stack(
+            [self._means(column) for column in np.moveaxis(self.V, 2, 0)] or [np.zeros((0, 0))],
+            axis=-1,
+        )
         V = V if len(self.s) else np.zeros((len(self.components), int(np.prod(kernel.grid)), 0))
         first = np.arange(np.prod(self.kernel.grid)).reshape(self.kernel.grid)[
             (slice(None, None, 2),) * len(kernel.grid)
         ]
         law = self.law.lumped(first.ravel(), 2 ** len(kernel.grid))
-        return Level(kernel, self.components, self._means(self.q), V, self.s, law, 1 / float(kernel.diagonal.mean()))
+        return Level(
+            kernel,
+            self.components,
+            self._means(self.q),
+            V,
+            self.s,
+            law,
+            1 / float(kernel.diagonal.mean()),
+        )
 
     def _means(self, x: np.ndarray) -> np.ndarray:
         """(c, k) -> (c, k of the coarse level): means over the lumped contacts."""
@@ -125,7 +146,9 @@ class Level:
         if self.counter is not None:
             self.counter.add()
         grid = self.kernel.grid
-        return self.kernel.act(r.reshape(-1, *grid), self.components, self.components, single).reshape(r.shape)
+        return self.kernel.act(
+            r.reshape(-1, *grid), self.components, self.components, single
+        ).reshape(r.shape)
 
     def evaluate(self, r: np.ndarray, lam: np.ndarray) -> Evaluation:
         """Errors of the equations r = P(r - rho u), V' r + s = 0, and the derivative of P."""
@@ -138,7 +161,9 @@ class Level:
             error[0, closed] += y[0, closed]
         else:
             busy = np.flatnonzero(~self.law.idle(y.T))
-            whole = y[:, busy].T if len(r) == self.law_dim else np.pad(y[:, busy].T, ((0, 0), (0, 1)))
+            whole = (
+                y[:, busy].T if len(r) == self.law_dim else np.pad(y[:, busy].T, ((0, 0), (0, 1)))
+            )
             P, D = self.law.select(busy).project(np.ascontiguousarray(whole))
             P, D = P[:, : len(r)], D[:, : len(r), : len(r)]
             error[:, busy] += P.T
@@ -153,7 +178,9 @@ class Level:
 
     @cached_property
     def inverse(self) -> dict[tuple[int, int], np.ndarray]:
-        """Symbols of an approximate inverse of Q, without the coupling of normal and tangential components."""
+        """Symbols of an approximate inverse of Q, without the coupling of normal and tangential
+        components.
+        """
         return self.inverse_symbols(self.components[:1]) | self.inverse_symbols(self.components[1:])
 
     @cached_property
@@ -161,8 +188,11 @@ class Level:
         """The largest value of the symbol of Q [length / force]."""
         return float(max(self.kernel.symbols[a, a].max() for a in self.components))
 
-    def inverse_symbols(self, components: tuple[int, ...], shift: float = 0.0) -> dict[tuple[int, int], np.ndarray]:
-        """Symbols of an approximate inverse of Q + shift on the grid without padding, for (0,), (1,) or (1, 2).
+    def inverse_symbols(
+        self, components: tuple[int, ...], shift: float = 0.0
+    ) -> dict[tuple[int, int], np.ndarray]:
+        """Symbols of an approximate inverse of Q + shift on the grid without padding, for (0,),
+        (1,) or (1, 2).
 
         The symbol on the smaller grid is that of the kernel that repeats itself there.
         """
@@ -181,9 +211,16 @@ class Level:
         first = positive(symbols[components[0], components[0]])
         if len(components) == 1:
             return {(components[0], components[0]): (1 / first).astype(np.float32)}
-        second, mixed = positive(symbols[2, 2]), symbols[1, 2][every] if (1, 2) in symbols else 0.0 * first
+        second, mixed = (
+            positive(symbols[2, 2]),
+            symbols[1, 2][every] if (1, 2) in symbols else 0.0 * first,
+        )
         determinant = np.maximum(first * second - mixed**2, LEAST_DETERMINANT * first * second)
-        inverse = {(1, 1): second / determinant, (2, 2): first / determinant, (1, 2): -mixed / determinant}
+        inverse = {
+            (1, 1): second / determinant,
+            (2, 2): first / determinant,
+            (1, 2): -mixed / determinant,
+        }
         return {pair: symbol.astype(np.float32) for pair, symbol in inverse.items()}
 
     def rough_solve(
@@ -193,7 +230,9 @@ class Level:
         components: tuple[int, ...],
         symbols: dict[tuple[int, int], np.ndarray] | None = None,
     ) -> np.ndarray:
-        """An approximate inverse on the closed contacts, x (components, m) -> (components, m); by default that of Q."""
+        """An approximate inverse on the closed contacts, x (components, m) -> (components, m); by
+        default that of Q.
+        """
         inverse, grid = self.inverse if symbols is None else symbols, self.kernel.grid
         padded = grid if self.periodic else tuple(m // 2 for m in self.kernel.padded)
         spectra = []
@@ -214,7 +253,9 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Errors at a point: error (c, k), balance (p,), the m contacts with a derivative D (m, c, c) that is not zero."""
+    """Errors at a point: error (c, k), balance (p,), the m contacts with a derivative D (m, c, c)
+    that is not zero.
+    """
 
     error: np.ndarray
     balance: np.ndarray
@@ -231,21 +272,21 @@ def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
 
     Parameters
     ----------
-    level
-        The problem on its grid, of c components and k contacts.
-    at
-        The equations at the present point.
-    rtol
-        Relative accuracy of the step.
+    level : The problem on its grid, of c components and k contacts.
+    at : The equations at the present point.
+    rtol : Relative accuracy of the step.
 
     Returns
     -------
-    tuple
-        The step, dr (c, k) and dlambda (p,), and the number of iterations that it took.
+    The step, dr (c, k) and dlambda (p,), and the number of iterations that it took.
     """
     known = at.error.copy()
     known[:, at.closed] = 0.0
-    moved = level.product(known, single=True)[:, at.closed] if np.any(known) else np.zeros((len(known), len(at.closed)))
+    moved = (
+        level.product(known, single=True)[:, at.closed]
+        if np.any(known)
+        else np.zeros((len(known), len(at.closed)))
+    )
     V = level.V[:, at.closed]
     balance = -at.balance - np.einsum("ckp,ck->p", level.V, known)
     identity = np.array_equal(at.D, np.broadcast_to(np.eye(len(known)), at.D.shape))
@@ -255,7 +296,9 @@ def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
     return (known, lam), count
 
 
-def _act(level: Level, closed: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
+def _act(
+    level: Level, closed: np.ndarray, shape: tuple[int, int]
+) -> Callable[[np.ndarray], np.ndarray]:
     """Products with Q on the closed contacts, (c, m) -> (c, m), in single precision."""
 
     def act(x: np.ndarray) -> np.ndarray:
@@ -269,10 +312,13 @@ def _act(level: Level, closed: np.ndarray, shape: tuple[int, int]) -> Callable[[
 def _symmetric(
     level: Level, at: Evaluation, moved: np.ndarray, V: np.ndarray, balance: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by projected PCG."""
+    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by
+    projected PCG.
+    """
     c, m = moved.shape
     act = _act(level, at.closed, at.error.shape)
-    # W holds the columns of the balance; N is the rough inverse, normal and tangential components by themselves.
+    # W holds the columns of the balance; N is the rough inverse, normal and tangential components
+    # by themselves.
     right = (at.error[:, at.closed] / level.rho - moved).ravel()
     W = V.reshape(c * m, -1)
     normal, tangential = (level.components[:1], level.components[1:])
@@ -284,7 +330,8 @@ def _symmetric(
             out.append(level.rough_solve(parts[1:], at.closed, tangential))
         return np.concatenate(out).astype(float).ravel()
 
-    # Y = N W and K = (W'N W)^-1. The start x = Y K balance meets the balance W'x; all corrections keep it.
+    # Y = N W and K = (W'N W)^-1. The start x = Y K balance meets the balance W'x; all corrections
+    # keep it.
     Y = np.stack([near(w) for w in W.T], axis=1) if W.shape[1] else W
     K = np.linalg.pinv(W.T @ Y)
     x = Y @ (K @ balance)
@@ -295,7 +342,8 @@ def _symmetric(
         z = near(residual)
         return np.asarray(z - Y @ (K @ (W.T @ z)))
 
-    # Conjugate gradients among the x that meet the balance, until residual' N residual has fallen enough.
+    # Conjugate gradients among the x that meet the balance, until residual' N residual has fallen
+    # enough.
     z = projected(residual)
     gamma = float(residual @ z)
     aim, p, count = rtol**2 * abs(gamma), z, 0
@@ -329,7 +377,9 @@ def _unsymmetric(
     def system(x: np.ndarray) -> np.ndarray:
         x = x.ravel()
         dr = x[:n].reshape(c, m)
-        return np.concatenate([rows(dr, act(dr) + V @ x[n:]).ravel(), np.einsum("ckp,ck->p", V, dr)])
+        return np.concatenate(
+            [rows(dr, act(dr) + V @ x[n:]).ravel(), np.einsum("ckp,ck->p", V, dr)]
+        )
 
     near = _rough_inverse(level, at, V)
     count = [0]
@@ -351,17 +401,21 @@ def _unsymmetric(
     return x[:n].reshape(c, m), x[n:], count[0]
 
 
-def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """An approximate inverse of the system of `_unsymmetric`: first the normal forces, then those that hold or slip.
+def _rough_inverse(
+    level: Level, at: Evaluation, V: np.ndarray
+) -> Callable[[np.ndarray], np.ndarray]:
+    """An approximate inverse of the system of `_unsymmetric`: first the normal forces, then those
+    that hold or slip.
 
     With the derivative [[1, 0], [D_tn, D_tt]] of a contact, its tangential row is
-    (I - D_tt) dr_t + D_tt rho w_t = right + D_tn (dr_n - rho w_n). For an eigenvalue d > 0 of D_tt it is
+    (I - D_tt) dr_t + D_tt rho w_t = right + D_tn (dr_n - rho w_n). For an eigenvalue d > 0 of D_tt
+    it is
 
         (sigma + rho Q) dr = right / d,   sigma = (1 - d) / d,
 
-    where sigma is zero for contacts that stick and grows with the slip, without bound on ever finer grids. The symbol
-    of Q is inverted for a few shifts sigma, and each contact takes part in the two next to its own, in shares that sum
-    to one. Beyond the last shift rho Q hardly matters.
+    where sigma is zero for contacts that stick and grows with the slip, without bound on ever finer
+    grids. The symbol of Q is inverted for a few shifts sigma, and each contact takes part in the
+    two next to its own, in shares that sum to one. Beyond the last shift rho Q hardly matters.
     """
     c, m = V.shape[:2]
     D, rho, tangential = at.D, level.rho, level.components[1:]
@@ -374,7 +428,11 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
         return np.einsum("kab,kb,kcb->kac", vectors, weights, vectors)
 
     parts_of = [
-        (turned(np.sqrt(share)), turned(np.sqrt(share) / values), level.inverse_symbols(tangential, shift / rho))
+        (
+            turned(np.sqrt(share)),
+            turned(np.sqrt(share) / values),
+            level.inverse_symbols(tangential, shift / rho),
+        )
         for shift, share in zip(shifts, shares)
         if share.any()
     ]
@@ -383,11 +441,15 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
     def apply(x: np.ndarray) -> np.ndarray:
         parts = x.reshape(c, m)
         out = np.empty((c, m))
-        out[:1] = np.where(pressed, level.rough_solve(parts[:1] * pressed / rho, at.closed, (0,)), parts[:1])
+        out[:1] = np.where(
+            pressed, level.rough_solve(parts[:1] * pressed / rho, at.closed, (0,)), parts[:1]
+        )
         right = parts[1:] + np.einsum("ka,k->ak", D[:, 1:, 0], out[0] - parts[0])
         out[1:] = np.einsum("kab,bk->ak", free, right)
         for back, forth, symbols in parts_of:
-            inner = level.rough_solve(np.einsum("kab,bk->ak", forth, right) / rho, at.closed, tangential, symbols)
+            inner = level.rough_solve(
+                np.einsum("kab,bk->ak", forth, right) / rho, at.closed, tangential, symbols
+            )
             out[1:] += np.einsum("kab,bk->ak", back, inner)
         return out.ravel()
 
@@ -406,9 +468,11 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
 
 
 def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of them.
+    """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of
+    them.
 
-    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift sum to less than one.
+    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift
+    sum to less than one.
     """
     count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
     place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)

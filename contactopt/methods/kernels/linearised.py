@@ -1,4 +1,5 @@
-"""The linear system of one Newton step with an unsymmetric derivative, and its inverse for a model of Q.
+"""The linear system of one Newton step with an unsymmetric derivative, and its inverse for a model
+of Q.
 
     (I - D + D rho Q) dr + D rho V dlambda = error,   V' dr = -balance         (contactopt.methods.kernels.semismooth)
 
@@ -37,14 +38,18 @@ class Linearised:
         return np.flatnonzero(np.repeat(np.any(self.D != 0, axis=(1, 2)), self.D.shape[1]))
 
     def rows(self, dr: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """dr - D (dr - rho (moved + weight dr)) (k d,): the left sides of all contacts that move by `moved` under dr."""
+        """dr - D (dr - rho (moved + weight dr)) (k d,): the left sides of all contacts that move by
+        `moved` under dr.
+        """
         k, d = self.D.shape[:2]
         shift = moved + self.equations.weight * dr
         inner = dr.reshape(k, d) - self.equations.rho[:, None] * shift.reshape(k, d)
         return (dr.reshape(k, d) - np.einsum("kab,kb->ka", self.D, inner)).ravel()
 
     def system(self, product: Act) -> Act:
-        """The left sides (n + p,) of closed contacts and balance, for the products with Q or its model."""
+        """The left sides (n + p,) of closed contacts and balance, for the products with Q or its
+        model.
+        """
         n, V = len(self.closed), self.equations.V
 
         def act(x: np.ndarray) -> np.ndarray:
@@ -55,7 +60,12 @@ class Linearised:
         return act
 
     def solve(
-        self, product: Act, inverse: LinearOperator, error: np.ndarray, balance: np.ndarray, rtol: float
+        self,
+        product: Act,
+        inverse: LinearOperator,
+        error: np.ndarray,
+        balance: np.ndarray,
+        rtol: float,
     ) -> tuple[np.ndarray, np.ndarray]:
         """dr (k d,) and dlambda (p,) for the right sides error (k d,) and -balance, by GMRES."""
         closed, V = self.closed, self.equations.V
@@ -73,15 +83,21 @@ class Linearised:
         return LinearOperator((size, size), matvec=self.system(product), dtype=float)
 
     def inverse(self, P: Preconditioner, rtol: float) -> LinearOperator:
-        """The inverse of the system with Q replaced by the model of P, to that accuracy; `rough` without a model."""
+        """The inverse of the system with Q replaced by the model of P, to that accuracy; `rough`
+        without a model.
+        """
         rough = self.rough(P)
         if P.model is None:
             return rough
         model = self.operator(P.model.matvec)
-        return LinearOperator(rough.shape, matvec=lambda x: _gmres(model, x.ravel(), rtol, rough), dtype=float)
+        return LinearOperator(
+            rough.shape, matvec=lambda x: _gmres(model, x.ravel(), rtol, rough), dtype=float
+        )
 
     def rough(self, P: Preconditioner) -> LinearOperator:
-        """P where a component is held by contact, the identity where it slips, bordered by the balance."""
+        """P where a component is held by contact, the identity where it slips, bordered by the
+        balance.
+        """
         closed, d = self.closed, self.D.shape[1]
         rho, V = np.repeat(self.equations.rho, d)[closed], self.equations.V[closed]
         n, p = V.shape
@@ -95,7 +111,8 @@ class Linearised:
             y[inside] = (P @ full)[unknowns]
             return y
 
-        # The border of the balance: K is the inverse of V' N (D rho V), the Schur complement for the rough inverse N.
+        # The border of the balance: K is the inverse of V' N (D rho V), the Schur complement for
+        # the rough inverse N.
         # Motions that no contact feels stay out of it.
         shifts = (rho[:, None] * V).reshape(n // d, d, p)
         border = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
@@ -103,7 +120,8 @@ class Linearised:
         K = np.linalg.pinv(V.T @ Y, rcond=UNFELT)
 
         def solve(x: np.ndarray) -> np.ndarray:
-            # First without multipliers, then the multipliers that restore the balance, then their share of dr.
+            # First without multipliers, then the multipliers that restore the balance, then their
+            # share of dr.
             y = apply(x[:n])
             multipliers = K @ (V.T @ y - x[n:])
             return np.concatenate([y - Y @ multipliers, multipliers])

@@ -1,15 +1,18 @@
-"""Bound-constrained quadratic programs by gradient projections and conjugate gradients, without a factorisation.
+"""Bound-constrained quadratic programs by gradient projections and conjugate gradients, without a
+factorisation.
 
-    min  x'Px/2 + c'x    subject to  x >= low,    optionally  A x = b            (the normal problem, paper, eq (21))
+    min  x'Px/2 + c'x    subject to  x >= low,    optionally  A x = b            (the normal
+         problem, paper, eq (21))
 
-MPRGP (Dostal): conjugate gradients on the free unknowns; a gradient step that frees bound unknowns where their part of
-the projected gradient dominates (proportioning); where a conjugate gradient step leaves the bounds, its projection if
-that lowers the objective, else a step to the first bound and a projected gradient step of fixed length (expansion).
-Each step costs one product with P, two in an expansion. Converges for every positive definite P, at a rate that
-depends on its condition number only. `box_qp` takes the products in single precision, half the memory traffic that
-limits them, and refines; `smalbe` adds equality rows by the augmented Lagrangian method.
-Sources: Dostal (2009), Optimal Quadratic Programming Algorithms, chapters 5 and 6; the projected step: Kruzik, Horak,
-Cermak, Pospisil, Pecha (2020), Active set expansion strategies in MPRGP algorithm.
+MPRGP (Dostal): conjugate gradients on the free unknowns; a gradient step that frees bound unknowns
+where their part of the projected gradient dominates (proportioning); where a conjugate gradient
+step leaves the bounds, its projection if that lowers the objective, else a step to the first bound
+and a projected gradient step of fixed length (expansion). Each step costs one product with P, two
+in an expansion. Converges for every positive definite P, at a rate that depends on its condition
+number only. `box_qp` takes the products in single precision, half the memory traffic that limits
+them, and refines; `smalbe` adds equality rows by the augmented Lagrangian method. Sources: Dostal
+(2009), Optimal Quadratic Programming Algorithms, chapters 5 and 6; the projected step: Kruzik,
+Horak, Cermak, Pospisil, Pecha (2020), Active set expansion strategies in MPRGP algorithm.
 """
 
 from __future__ import annotations
@@ -32,8 +35,10 @@ from contactopt.methods.constants import (
     STIFFER,
 )
 
-LENGTH = 1.9  # of gradient steps, over 1 / the largest eigenvalue; they converge below 2 (Dostal 2009, chapter 5)
-STIFFEST = 1e6  # largest penalty, relative to P's largest eigenvalue; beyond it half of the digits are lost
+# of gradient steps, over 1 / the largest eigenvalue; they converge below 2 (Dostal 2009, chapter 5)
+LENGTH = 1.9
+# largest penalty, relative to P's largest eigenvalue; beyond it half of the digits are lost
+STIFFEST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,19 +52,17 @@ class BoxResult:
 
 
 def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
-    """Estimate the largest eigenvalue of a symmetric positive semidefinite matrix from below, by power steps.
+    """Estimate the largest eigenvalue of a symmetric positive semidefinite matrix from below, by
+    power steps.
 
     Parameters
     ----------
-    P
-        (n, n) an array or sparse.
-    steps
-        Number of products with P.
+    P : (n, n) an array or sparse.
+    steps : Number of products with P.
 
     Returns
     -------
-    float
-        The estimate; 0 for an empty or a zero matrix.
+    The estimate; 0 for an empty or a zero matrix.
     """
     n = P.shape[0]
     v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(P.dtype)
@@ -78,13 +81,11 @@ def projected_gradient(x: np.ndarray, g: np.ndarray, low: np.ndarray) -> np.ndar
 
     Parameters
     ----------
-    x, g, low
-        (n,) point, gradient there, and lower bounds.
+    x, g, low : (n,) point, gradient there, and lower bounds.
 
     Returns
     -------
-    ndarray
-        (n,) the gradient where x is free, its negative part where x is at its bound.
+    (n,) the gradient where x is free, its negative part where x is at its bound.
     """
     return np.where(x > low, g, np.minimum(g, 0))
 
@@ -98,7 +99,8 @@ def mprgp(
     max_iterations: int = 10_000,
     largest: float | None = None,
 ) -> BoxResult:
-    """Solve min x'Px/2 + c'x, x >= low, until the norm of the projected gradient is at most tol |c|.
+    """Solve min x'Px/2 + c'x, x >= low, until the norm of the projected gradient is at most tol
+    |c|.
 
     The arithmetic is that of P's type.
 
@@ -122,7 +124,9 @@ def mprgp(
     """
     _check(P, c, low)
     target = tol * float(np.linalg.norm(c))
-    x, steps, met = _descend(P, c, low, _start(c, low, start), target, max_iterations, largest or _bound(P))
+    x, steps, met = _descend(
+        P, c, low, _start(c, low, start), target, max_iterations, largest or _bound(P)
+    )
     return BoxResult(x, np.zeros(0), steps, met)
 
 
@@ -133,7 +137,10 @@ def _bound(P: np.ndarray) -> float:
 def _check(P: np.ndarray, c: np.ndarray, low: np.ndarray) -> None:
     n = len(c)
     if P.shape != (n, n) or low.shape != (n,):
-        raise InputError(f"a QP in {n} unknowns needs P ({n}, {n}) and low ({n},); got {P.shape} and {low.shape}.")
+        raise InputError(
+            f"a QP in {n} unknowns needs P ({n}, {n}) and low ({n},); got {P.shape} and"
+            f" {low.shape}."
+        )
 
 
 def _start(c: np.ndarray, low: np.ndarray, start: np.ndarray | None) -> np.ndarray:
@@ -141,9 +148,17 @@ def _start(c: np.ndarray, low: np.ndarray, start: np.ndarray | None) -> np.ndarr
 
 
 def _descend(
-    P: np.ndarray, c: np.ndarray, low: np.ndarray, x: np.ndarray, target: float, limit: int, largest: float
+    P: np.ndarray,
+    c: np.ndarray,
+    low: np.ndarray,
+    x: np.ndarray,
+    target: float,
+    limit: int,
+    largest: float,
 ) -> tuple[np.ndarray, int, bool]:
-    """MPRGP from the feasible x: the last x, the steps taken, whether |projected gradient| <= target."""
+    """MPRGP from the feasible x: the last x, the steps taken, whether |projected gradient| <=
+    target.
+    """
     length = LENGTH / largest
     g = P @ x + c
     p = None  # direction of the conjugate gradients; None: start afresh from the free gradient
@@ -195,28 +210,25 @@ def box_qp(
     tol: float = 1e-10,
     max_iterations: int = 10_000,
 ) -> BoxResult:
-    """Solve the same problem as `mprgp`, in less time where P does not fit the processor's cache (reports/dense_speed).
+    """Solve the same problem as `mprgp`, in less time where P does not fit the processor's cache
+    (reports/dense_speed).
 
-    Iterative refinement: the correction d of x minimises d'Pd/2 + (P x + c)'d, d >= low - x, in single precision to a
-    few digits, scaled so that no digit is lost; its gradient is taken anew in double precision. It ends in double
-    precision if P is too ill-conditioned for that.
+    Iterative refinement: the correction d of x minimises d'Pd/2 + (P x + c)'d, d >= low - x, in
+    single precision to a few digits, scaled so that no digit is lost; its gradient is taken anew in
+    double precision. It ends in double precision if P is too ill-conditioned for that.
 
     Parameters
     ----------
-    P
-        (n, n) symmetric positive semidefinite array of float64.
-    c, low, start, tol, max_iterations
-        As for `mprgp`.
+    P : (n, n) symmetric positive semidefinite array of float64.
+    c, low, start, tol, max_iterations : As for `mprgp`.
 
     Returns
     -------
-    BoxResult
-        The solution, without multipliers.
+    The solution, without multipliers.
 
     Raises
     ------
-    InputError
-        On shapes that do not fit.
+    InputError : On shapes that do not fit.
     """
     _check(P, c, low)
     x, target = _start(c, low, start), tol * float(np.linalg.norm(c))
@@ -258,12 +270,13 @@ def smalbe(
     tol: float = 1e-10,
     max_iterations: int = 20_000,
 ) -> BoxResult:
-    """min x'Px/2 + c'x, x >= low, A x = b: MPRGP inside the augmented Lagrangian method (SMALBE-M, Dostal).
+    """min x'Px/2 + c'x, x >= low, A x = b: MPRGP inside the augmented Lagrangian method (SMALBE-M,
+    Dostal).
 
-    The rows of A are made orthonormal first. The penalty starts as P's largest eigenvalue and grows where the error of the
-    rows falls too slowly. The accuracy of each inner solve is proportional to that error. The tolerance is met when the
-    projected gradient of the Lagrangian is at most tol |c + A'y| and the error of the orthonormal rows at most tol times
-    their right side.
+    The rows of A are made orthonormal first. The penalty starts as P's largest eigenvalue and grows
+    where the error of the rows falls too slowly. The accuracy of each inner solve is proportional
+    to that error. The tolerance is met when the projected gradient of the Lagrangian is at most tol
+    |c + A'y| and the error of the orthonormal rows at most tol times their right side.
 
     Parameters
     ----------
@@ -297,7 +310,9 @@ def smalbe(
         linear = c + A.T @ (y - penalty * b)
         target = tol * float(np.linalg.norm(c + A.T @ y))
         wanted = max(ROWS_SHARE * min(penalty * error, before), FINEST_SHARE * target)
-        x, steps, met = _descend(augmented, linear, low, x, wanted, max_iterations - total, largest + penalty)
+        x, steps, met = _descend(
+            augmented, linear, low, x, wanted, max_iterations - total, largest + penalty
+        )
         total += max(steps, 1)
         y = y + penalty * (A @ x - b)
         error, last = float(np.linalg.norm(A @ x - b)), error

@@ -1,9 +1,11 @@
-"""Semismooth Newton steps on r = P(r - rho u), u = Q r + V lambda + q, V' r + s = 0, for any projection P.
+"""Semismooth Newton steps on r = P(r - rho u), u = Q r + V lambda + q, V' r + s = 0, for any
+projection P.
 
-With P the projection onto half-lines, intervals or discs this is the primal-dual active set method of one convex
-subproblem, and a few steps of it make a backend's approximate answer exact (`crossover`): an interior-point answer is
-the square root of its accuracy away from the solution wherever force and gap vanish together. With P the Coulomb map of
-contactopt.problem.laws it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
+With P the projection onto half-lines, intervals or discs this is the primal-dual active set method
+of one convex subproblem, and a few steps of it make a backend's approximate answer exact
+(`crossover`): an interior-point answer is the square root of its accuracy away from the solution
+wherever force and gap vanish together. With P the Coulomb map of contactopt.problem.laws it is
+Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
 from __future__ import annotations
@@ -27,9 +29,11 @@ logger = logging.getLogger(__name__)
 Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 STEPS = 20  # of a crossover
-RIDGE = 1e-10  # added to Q in every Newton system: directions without compliance stay where they are
+# added to Q in every Newton system: directions without compliance stay where they are
+RIDGE = 1e-10
 GOOD = 1e-14  # relative residual below which rounding is all that is left
-EXACT, WRONG = 1e-9, 1e-5  # relative residuals up to which an answer needs no second try, and above which it is none
+# relative residuals up to which an answer needs no second try, and above which it is none
+EXACT, WRONG = 1e-9, 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +44,8 @@ class Equations:
     V, s     (k d, p) rigid motions and (p,) resultants
     project  the map P with its generalised derivative
     rho      (k,) or one number
-    center   (k, d), and weight: with weight > 0 the equations are those of the proximal subproblem, in which
-             u = Q r + V lambda + q + weight (r - center)
+    center   (k, d), and weight: with weight > 0 the equations are those of the proximal subproblem,
+             in which u = Q r + V lambda + q + weight (r - center)
     """
 
     Q: Interface
@@ -54,10 +58,16 @@ class Equations:
     weight: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rho", np.broadcast_to(np.asarray(self.rho, dtype=float), (len(self.q),)))
+        object.__setattr__(
+            self, "rho", np.broadcast_to(np.asarray(self.rho, dtype=float), (len(self.q),))
+        )
 
-    def evaluate(self, r: np.ndarray, lam: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r - rho u."""
+    def evaluate(
+        self, r: np.ndarray, lam: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r -
+        rho u.
+        """
         u = (self.Q @ r.ravel() + self.V @ lam).reshape(r.shape) + self.q
         if self.center is not None:
             u += self.weight * (r - self.center)
@@ -70,12 +80,14 @@ class Equations:
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """dr (k, d), dlambda (p,) of one Newton step; None if the linear system is singular.
 
-        It solves (I - D (I - rho Q)) dr + D rho V dlambda = error, V' dr = -balance. Open contacts, D = 0, are known at
-        once and leave the system. Where D = I, in stick or in contact without friction, its rows are those of rho Q.
+        It solves (I - D (I - rho Q)) dr + D rho V dlambda = error, V' dr = -balance. Open contacts,
+        D = 0, are known at once and leave the system. Where D = I, in stick or in contact without
+        friction, its rows are those of rho Q.
         """
         k, d = error.shape
         p = self.V.shape[1]
-        # Open contacts: dr = error. The unknowns are the other dr and dlambda, in one square matrix.
+        # Open contacts: dr = error. The unknowns are the other dr and dlambda, in one square
+        # matrix.
         closed = np.any(D != 0, axis=(1, 2))
         mask = np.repeat(closed, d)
         rows, gone = np.flatnonzero(mask), np.flatnonzero(~mask)
@@ -90,7 +102,9 @@ class Equations:
         matrix[:n, n:] = self.V[rows]
         matrix[:n] *= rho[:, None]  # now rho (Q dr + V dlambda), the rows of a contact that sticks
         matrix[n:, :n] = self.V[rows].T
-        coupling = rho * (self.Q[np.ix_(rows, gone)] @ dr[gone]) if np.any(dr[gone]) else np.zeros(n)
+        coupling = (
+            rho * (self.Q[np.ix_(rows, gone)] @ dr[gone]) if np.any(dr[gone]) else np.zeros(n)
+        )
         # Where D is not I the rows become D (rho (Q dr + V dlambda) - dr) + dr.
         D = D[closed]
         bent = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))  # contacts that slip
@@ -103,7 +117,8 @@ class Equations:
         right = np.concatenate([dr[rows] - coupling, -balance - self.V[gone].T @ dr[gone]])
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
+                # a bad step is seen by its residual
+                warnings.simplefilter("ignore", la.LinAlgWarning)
                 # The transpose of a C array is what LAPACK factorises in place.
                 factors = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
                 x = la.lu_solve(factors, right, trans=1, check_finite=False)
@@ -125,10 +140,11 @@ def crossover(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Improve an approximate answer of a subproblem by Newton steps, and return the best point on the way.
+    """Improve an approximate answer of a subproblem by Newton steps, and return the best point on
+    the way.
 
-    The problem is dimensionless, so that rho = 1 is right. The residual of what comes back is never larger than that of
-    the projection of what came in.
+    The problem is dimensionless, so that rho = 1 is right. The residual of what comes back is never
+    larger than that of the projection of what came in.
 
     Parameters
     ----------
@@ -143,7 +159,9 @@ def crossover(
     -------
     r (k, d) and multipliers (p,)
     """
-    residual, r, multipliers = _improve(Equations(Q, c.reshape(r.shape), V, s, project), r, multipliers, steps)
+    residual, r, multipliers = _improve(
+        Equations(Q, c.reshape(r.shape), V, s, project), r, multipliers, steps
+    )
     if steps == STEPS and residual > EXACT * max(1.0, float(np.linalg.norm(r))):
         note(logger, "Newton steps did not make the answer of a convex subproblem exact")
     return r, multipliers
@@ -155,8 +173,8 @@ def certified(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ask backends one after the other until Newton steps make an answer exact.
 
-    A backend may call anything optimal, so that every answer is checked by its residual. The next solver, usually the same
-    backend at tighter settings, is asked only if the answer is not exact.
+    A backend may call anything optimal, so that every answer is checked by its residual. The next
+    solver, usually the same backend at tighter settings, is asked only if the answer is not exact.
 
     Parameters
     ----------
@@ -169,12 +187,17 @@ def certified(
 
     Raises
     ------
-    BackendError : if the relative residual of even the best answer is above WRONG; it names the last backend
+    BackendError : if the relative residual of even the best answer is above WRONG; it names the
+        last backend
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
     for attempt, (asked, solver) in enumerate(solvers):
         if attempt:
-            note(logger, f"the answer of backend '{asked}' was not exact, so it was asked again at tighter settings")
+            note(
+                logger,
+                f"the answer of backend '{asked}' was not exact, so it was asked again at tighter"
+                " settings",
+            )
         r, multipliers = solver()
         answer = _improve(equations, r.reshape(equations.q.shape), multipliers, STEPS)
         best = min(best, answer, key=lambda a: a[0])
@@ -182,7 +205,10 @@ def certified(
         if best[0] <= EXACT * size:
             return best[1:]
     if best[0] > WRONG * size:
-        raise BackendError(f"backend '{asked}' misses the problem it was given by {best[0] / size:.1e}, asked twice.")
+        raise BackendError(
+            f"backend '{asked}' misses the problem it was given by {best[0] / size:.1e}, asked"
+            " twice."
+        )
     return best[1:]
 
 

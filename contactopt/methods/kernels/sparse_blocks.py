@@ -1,9 +1,11 @@
-"""Linear systems of block form: diag(left) Q + diag(added), both block diagonal, with Q an array or sparse.
+"""Linear systems of block form: diag(left) Q + diag(added), both block diagonal, with Q an array or
+sparse.
 
-Newton's method and interior-point methods for contact solve many of them that differ in the d x d blocks of the contacts
-only. For a sparse Q the pattern of its blocks, the order of elimination and the places of its entries in compressed
-columns are found once; a system then costs a few array operations and one sparse LU factorisation (SuperLU). Memory is
-linear in the non-zeros of the factors.
+Newton's method and interior-point methods for contact solve many of them that differ in the d x d
+blocks of the contacts only. For a sparse Q the pattern of its blocks, the order of elimination and
+the places of its entries in compressed columns are found once; a system then costs a few array
+operations and one sparse LU factorisation (SuperLU). Memory is linear in the non-zeros of the
+factors.
 """
 
 from __future__ import annotations
@@ -46,18 +48,25 @@ class DenseBlocks:
         self.Q, self.d = Q, d
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
-        """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added); left, added (k, d, d); None if singular.
+        """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added); left, added (k,
+        d, d); None if singular.
 
         left None stands for the identity.
         """
         k, d = len(added), self.d
-        A = self.Q.copy() if left is None else (left @ self.Q.reshape(k, d, k * d)).reshape(k * d, k * d)
+        A = (
+            self.Q.copy()
+            if left is None
+            else (left @ self.Q.reshape(k, d, k * d)).reshape(k * d, k * d)
+        )
         diagonal = np.arange(k)
         A.reshape(k, d, k, d)[diagonal, :, diagonal, :] += added
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
             try:
-                factors = la.lu_factor(A if kept.all() else A[np.ix_(kept, kept)], overwrite_a=True, check_finite=False)
+                factors = la.lu_factor(
+                    A if kept.all() else A[np.ix_(kept, kept)], overwrite_a=True, check_finite=False
+                )
             except (la.LinAlgError, ValueError):
                 return None
         lu, swapped = factors
@@ -66,20 +75,25 @@ class DenseBlocks:
             swaps = np.count_nonzero(swapped != np.arange(len(lu)))
             return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
 
-        return Solver(lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign)
+        return Solver(
+            lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign
+        )
 
 
 class SparseBlocks:
-    """Q (n, n) by its d x d blocks, with the places of their entries in the columns of an LU factorisation.
+    """Q (n, n) by its d x d blocks, with the places of their entries in the columns of an LU
+    factorisation.
 
-    rows, columns  (b,) contacts that each block couples, ordered by rows; every diagonal block is there
+    rows, columns  (b,) contacts that each block couples, ordered by rows; every diagonal block is
+                   there
     blocks         (b, d, d)
     home           (k,) index of each contact's diagonal block
     """
 
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
-        # Every entry belongs to the block of its row's and its column's contact. Blocks are numbered row by row, and
+        # Every entry belongs to the block of its row's and its column's contact. Blocks are
+        # numbered row by row, and
         # every diagonal block is there, because something will be added to it.
         entries = sp.coo_array(Q)
         i, j = (index.astype(np.int64) for index in entries.coords)
@@ -93,16 +107,27 @@ class SparseBlocks:
         self.unknown, self.order, self.row, self.column = self._arranged()
 
     def _arranged(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The unknowns in an order of elimination of least degree, and the entries by compressed columns of that order."""
+        """The unknowns in an order of elimination of least degree, and the entries by compressed
+        columns of that order.
+        """
         d, n = self.d, self.d * self.k
-        # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that nothing is pivoted.
+        # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that
+        # nothing is pivoted.
         size = float(np.abs(self.Q.data).max(initial=0.0)) or 1.0
-        safe = sp.csc_array(abs(self.Q) + sp.diags_array(np.full(n, 2 * size * self.k)))  # pivots are on the diagonal
-        place = splu(safe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c
-        # Row and column of every entry of every block in that order, sorted as compressed columns want them.
+        # pivots are on the diagonal
+        safe = sp.csc_array(abs(self.Q) + sp.diags_array(np.full(n, 2 * size * self.k)))
+        place = splu(
+            safe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        ).perm_c
+        # Row and column of every entry of every block in that order, sorted as compressed columns
+        # want them.
         local = np.arange(d)
-        row = place[np.broadcast_to((self.rows[:, None] * d + local)[:, :, None], self.blocks.shape)].ravel()
-        column = place[np.broadcast_to((self.columns[:, None] * d + local)[:, None, :], self.blocks.shape)].ravel()
+        row = place[
+            np.broadcast_to((self.rows[:, None] * d + local)[:, :, None], self.blocks.shape)
+        ].ravel()
+        column = place[
+            np.broadcast_to((self.columns[:, None] * d + local)[:, None, :], self.blocks.shape)
+        ].ravel()
         order = np.lexsort((row, column))
         return np.argsort(place), order, row[order], column[order]
 
@@ -121,7 +146,12 @@ class SparseBlocks:
         ends = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=m))])
         matrix = sp.csc_array((values, row.astype(np.int32), ends.astype(np.int32)), shape=(m, m))
         try:
-            factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=PIVOT, options={"SymmetricMode": True})
+            factors = splu(
+                matrix,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=PIVOT,
+                options={"SymmetricMode": True},
+            )
         except (RuntimeError, ValueError):
             return None
         index = (np.cumsum(kept) - 1)[self.unknown[stays]]  # places in the right-hand side
@@ -144,7 +174,9 @@ Blocks = DenseBlocks | SparseBlocks
 def _parity(order: np.ndarray) -> int:
     """1 for an even permutation, -1 for an odd one: by its cycles."""
     n = len(order)
-    cycles = connected_components(sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n)))[0]
+    cycles = connected_components(sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n)))[
+        0
+    ]
     return -1 if (n - cycles) % 2 else 1
 
 
@@ -153,15 +185,12 @@ def block_matrix(Q: Interface, d: int) -> Blocks:
 
     Parameters
     ----------
-    Q
-        (n, n) an array or sparse.
-    d
-        Number of components of a contact.
+    Q : (n, n) an array or sparse.
+    d : Number of components of a contact.
 
     Returns
     -------
-    Blocks
-        The matrix, which solves with other diagonal blocks added.
+    The matrix, which solves with other diagonal blocks added.
     """
     if not sp.issparse(Q):
         return DenseBlocks(Q, d)
@@ -176,19 +205,15 @@ def bordered(
 
     Parameters
     ----------
-    solve
-        Solves with A (m, m) for right-hand sides (m, j).
-    right
-        (m,) right-hand side.
-    V, left
-        (m, p) columns of the border.
-    balance
-        (p,) right-hand side of the border.
+    solve : Solves with A (m, m) for right-hand sides (m, j).
+    right : (m,) right-hand side.
+    V, left : (m, p) columns of the border.
+    balance : (p,) right-hand side of the border.
 
     Returns
     -------
-    tuple or None
-        x (m,) and lambda (p,), the latter by least squares where it is not unique. None if a number is not finite.
+    x (m,) and lambda (p,), the latter by least squares where it is not unique. None if a number is
+    not finite.
     """
     p = len(balance)
     x = solve(np.column_stack([right, left]) if p else right[:, None])

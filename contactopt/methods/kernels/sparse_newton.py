@@ -1,7 +1,9 @@
-"""Newton steps on r = P(r - rho u), u = Q r + V lambda + q + weight (r - center), V' r + s = 0, with Q sparse or an array.
+"""Newton steps on r = P(r - rho u), u = Q r + V lambda + q + weight (r - center), V' r + s = 0,
+with Q sparse or an array.
 
-One step solves J dr + D rho V dlambda = P - r, V' dr = -(V' r + s) with J = I - D + D rho (Q + weight I), D the
-generalised derivative of P, block diagonal. Contacts where D = 0 (open) are known at once and leave the system.
+One step solves J dr + D rho V dlambda = P - r, V' dr = -(V' r + s) with J = I - D + D rho (Q +
+weight I), D the generalised derivative of P, block diagonal. Contacts where D = 0 (open) are known
+at once and leave the system.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, d), multipliers (p,)
 
 @dataclass(frozen=True, eq=False)
 class ProximalEquations:
-    """The equations of one proximal subproblem of a dimensionless problem; with weight 0 they are those of the problem itself.
+    """The equations of one proximal subproblem of a dimensionless problem; with weight 0 they are
+    those of the problem itself.
 
     matrix        Q, with the factors of Newton's matrices
     q, V, s       (k, d), (k d, p) and (p,) of the problem
@@ -51,9 +54,17 @@ class ProximalEquations:
         """(k,) steps of the fixed-point equations."""
         return np.asarray(1 / np.maximum(self.compliance + self.weight, 1e-3))
 
-    def evaluate(self, r: np.ndarray, lam: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r - rho u."""
-        u = (self.matrix.Q @ r.ravel() + self.V @ lam).reshape(r.shape) + self.q + self.weight * (r - self.center)
+    def evaluate(
+        self, r: np.ndarray, lam: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r -
+        rho u.
+        """
+        u = (
+            (self.matrix.Q @ r.ravel() + self.V @ lam).reshape(r.shape)
+            + self.q
+            + self.weight * (r - self.center)
+        )
         P, D = self.project(r - self.rho[:, None] * u)
         error, balance = P - r, self.V.T @ r.ravel() + self.s
         return float(np.sqrt(np.sum(error**2) + np.sum(balance**2))), error, balance, D
@@ -80,7 +91,9 @@ class ProximalEquations:
         return dr.reshape(k, d), answer[1]
 
     def solve(self, r: np.ndarray, lam: np.ndarray) -> tuple[Iterate, bool, int]:
-        """The last iterate of Newton's method with a line search, whether it solves the subproblem, and the steps."""
+        """The last iterate of Newton's method with a line search, whether it solves the subproblem,
+        and the steps.
+        """
         residual, error, balance, D = self.evaluate(r, lam)
         recent = [residual]
         for steps in range(1, SUBPROBLEM_STEPS + 1):

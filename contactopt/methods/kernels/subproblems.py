@@ -1,9 +1,10 @@
-"""The normal and the tangential problem from products with Q alone: active sets outside, preconditioned CG inside.
+"""The normal and the tangential problem from products with Q alone: active sets outside,
+preconditioned CG inside.
 
-Both are semismooth Newton methods on r = P(r - rho u), where P projects one kind of component and leaves the other as
-it is given: half-lines for the normal problem (primal-dual active set method), intervals or discs of the given friction
-bounds for the tangential one. Each step is one PCG of contactopt.methods.kernels.krylov. Penalty: give them Q with 1 / factor on its
-diagonal.
+Both are semismooth Newton methods on r = P(r - rho u), where P projects one kind of component and
+leaves the other as it is given: half-lines for the normal problem (primal-dual active set method),
+intervals or discs of the given friction bounds for the tangential one. Each step is one PCG of
+contactopt.methods.kernels.krylov. Penalty: give them Q with 1 / factor on its diagonal.
 """
 
 from __future__ import annotations
@@ -28,9 +29,13 @@ Iterate = tuple[np.ndarray, np.ndarray]
 
 
 class KrylovSubproblem:
-    """One kind of components of a dimensionless problem; columns: mask (p,) of the multipliers that belong to it."""
+    """One kind of components of a dimensionless problem; columns: mask (p,) of the multipliers that
+    belong to it.
+    """
 
-    def __init__(self, problem: InterfaceProblem, P: Preconditioner, columns: np.ndarray, normal: bool):
+    def __init__(
+        self, problem: InterfaceProblem, P: Preconditioner, columns: np.ndarray, normal: bool
+    ):
         self.problem, self.P, self.columns, self.normal = problem, P, columns, normal
         self.own = slice(0, 1) if normal else slice(1, None)
         compliance = diagonal(problem.Q).reshape(problem.q.shape)
@@ -39,8 +44,9 @@ class KrylovSubproblem:
     def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
         """r (k, dim) with its own components new, and the multipliers (columns,).
 
-        Active sets from r, from the glued solution if r has no such force yet. Where they cycle: the proximal loop
-        (contactopt.methods.proximal), each step a problem whose active sets are easier to find. Raises BackendError if that does not come near a solution either.
+        Active sets from r, from the glued solution if r has no such force yet. Where they cycle:
+        the proximal loop (contactopt.methods.proximal), each step a problem whose active sets are
+        easier to find. Raises BackendError if that does not come near a solution either.
         """
         equations = self._equations(r, multipliers, None, 0.0)
         point = r, multipliers[self.columns]
@@ -62,13 +68,26 @@ class KrylovSubproblem:
             raise BackendError(f"backend 'pcg' misses the {kind} problem by {residual / size:.1e}")
         return point
 
-    def _equations(self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | None, weight: float) -> Equations:
+    def _equations(
+        self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | None, weight: float
+    ) -> Equations:
         problem, own = self.problem, self.columns
         q = problem.q + (problem.V[:, ~own] @ multipliers[~own]).reshape(r.shape)
         rho = 1 / (self.compliance + weight)
-        return Equations(problem.Q, q, problem.V[:, own], problem.s[own], self._projection(r), rho, center, weight)
+        return Equations(
+            problem.Q,
+            q,
+            problem.V[:, own],
+            problem.s[own],
+            self._projection(r),
+            rho,
+            center,
+            weight,
+        )
 
-    def _active_sets(self, equations: Equations, r: np.ndarray, lam: np.ndarray) -> tuple[float, Iterate]:
+    def _active_sets(
+        self, equations: Equations, r: np.ndarray, lam: np.ndarray
+    ) -> tuple[float, Iterate]:
         """The best of ACTIVE_SETS Newton iterates, and its residual."""
         best, point, last = np.inf, (r, lam), np.inf
         for _ in range(ACTIVE_SETS):
@@ -93,11 +112,15 @@ class KrylovSubproblem:
         u = (equations.Q @ r.ravel() + equations.V @ lam).reshape(r.shape) + equations.q
         error = np.zeros(r.shape)
         error[:, self.own] = -equations.rho[:, None] * u[:, self.own]
-        step = krylov_step(equations, self.P, error, equations.V.T @ r.ravel() + equations.s, D, 1e-2)
+        step = krylov_step(
+            equations, self.P, error, equations.V.T @ r.ravel() + equations.s, D, 1e-2
+        )
         return (r, lam) if step is None else (r + step[0], lam + step[1])
 
     def _projection(self, given: np.ndarray) -> Projection:
-        """y (k, dim) -> the projection of the own components beside the given others, and its derivative."""
+        """y (k, dim) -> the projection of the own components beside the given others, and its
+        derivative.
+        """
         own, low, radius = self.own, self.problem.law.lowest, self.problem.law.bound(given[:, 0])
 
         def project(y: np.ndarray) -> Iterate:

@@ -1,24 +1,29 @@
-"""Preconditioners of the interface operator Q = S1^-1 + S2^-1: approximate inverses of Q, O(k log k) per product.
+"""Preconditioners of the interface operator Q = S1^-1 + S2^-1: approximate inverses of Q, O(k log
+k) per product.
 
-Paper, section 5.2: the H^1/2 seminorm of a function on the contact line, extended by zero (E) to a closed curve of 2m
-nodes, is a circulant matrix Q_c (27), the H^1 norm another, L_c (28); with m the smallest power of two >= k,
+Paper, section 5.2: the H^1/2 seminorm of a function on the contact line, extended by zero (E) to a
+closed curve of 2m nodes, is a circulant matrix Q_c (27), the H^1 norm another, L_c (28); with m the
+smallest power of two >= k,
     P21 = E' Q_c E   (25),      P22 = (E' L_c^-1 Q_c E)^-1   (26),
-up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P22 inverts resembles Q itself. In 3D
-the sum of P21 along both directions of the contact surface is P31 (29).
+up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P22 inverts resembles
+Q itself. In 3D the sum of P21 along both directions of the contact surface is P31 (29).
 
-P maps a relative displacement, the residual b - Q r of an iteration, to a force. P21 extends that displacement by zero,
-which is right only for displacements that vanish at the ends (H00^1/2). They do not vanish at a free edge. The matrix
-that P22 inverts, like Q, acts on forces. There are none outside the contact, so that extending them by zero is right. The
-third preconditioner,
+P maps a relative displacement, the residual b - Q r of an iteration, to a force. P21 extends that
+displacement by zero, which is right only for displacements that vanish at the ends (H00^1/2). They
+do not vanish at a free edge. The matrix that P22 inverts, like Q, acts on forces. There are none
+outside the contact, so that extending them by zero is right. The third preconditioner,
     `neumann`, the square root of the Laplacian of the contact line or surface (contactopt.methods.preconditioners.neumann),
-needs no extension, for its cosine transforms leave the ends free. A contact line that is closed by itself needs none for P21 and P22 either: the circulant matrices act
-on its own nodes. Contacts are found on their line or grid in the problem's chart, so that it does not matter how the
-bodies are turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions of the two bodies against
-each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
+needs no extension, for its cosine transforms leave the ends free. A contact line that is closed by
+itself needs none for P21 and P22 either: the circulant matrices act on its own nodes. Contacts are
+found on their line or grid in the problem's chart, so that it does not matter how the bodies are
+turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions
+of the two bodies against each other, first of all the sway of a slender body: `deflated` solves for
+them exactly (balancing, Mandel 1993).
 
-Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a cheap product G, which
-`neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G holds on every subspace with the same constants,
-so that (G_AA)^-1, by an inner PCG that needs no body, has the condition number of P on any active set (`restricted`).
+Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a
+cheap product G, which `neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G
+holds on every subspace with the same constants, so that (G_AA)^-1, by an inner PCG that needs no
+body, has the condition number of P on any active set (`restricted`).
 """
 
 from __future__ import annotations
@@ -40,7 +45,8 @@ from contactopt.methods.preconditioners.grid import GridMap
 from contactopt.problem import InterfaceProblem, part_of
 
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
-DEPENDENT = 1e-10  # share of a smooth motion's energy, apart from that of others, below which it is one of them
+# share of a smooth motion's energy, apart from that of others, below which it is one of them
+DEPENDENT = 1e-10
 LEFT = 1e-6  # share of a random force's work below which deflation leaves nothing to scale by
 
 
@@ -48,8 +54,10 @@ class Preconditioner(LinearOperator):
     """P (n, n), an approximate inverse of Q.
 
     model   G = P^-1 by cheap products, None where there is no such thing
-    blocks  the unknowns of each pair of surfaces; P couples none of them with each other, and each has a scale of its own
-    factors (n,) by what deflation multiplied P: how much stiffer the contacts are than the diagonal of Q says, once smooth
+    blocks  the unknowns of each pair of surfaces; P couples none of them with each other, and each
+            has a scale of its own
+    factors (n,) by what deflation multiplied P: how much stiffer the contacts are than the diagonal
+    of Q says, once smooth
             motions are taken out of it
     """
 
@@ -64,7 +72,11 @@ class Preconditioner(LinearOperator):
         super().__init__(np.dtype(float), (n, n))
         self.factors = np.ones(n) if factors is None else factors
         self.product, self.blocks = product, tuple(blocks) or (slice(0, n),)
-        self.model = None if model is None else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
+        self.model = (
+            None
+            if model is None
+            else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
+        )
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
         return np.asarray(self.product(x.ravel()))
@@ -73,7 +85,8 @@ class Preconditioner(LinearOperator):
         return self._matvec(x)
 
 
-# name -> (module, function (problem, mask (k, dim) of what cannot move) giving products (k, dim) -> (k, dim) with P and, where
+# name -> (module, function (problem, mask (k, dim) of what cannot move) giving products (k, dim) ->
+# (k, dim) with P and, where
 # it is cheap, P^-1, for a Q of mean diagonal one, what it is)
 PRECONDITIONERS = {
     "p21": (
@@ -104,20 +117,22 @@ def find_preconditioner(name: str | None) -> None:
 
     Parameters
     ----------
-    name
-        The name that the user gave.
+    name : The name that the user gave.
 
     Raises
     ------
-    InputError
-        If there is none.
+    InputError : If there is none.
     """
     if name not in (None, "none", *PRECONDITIONERS):
-        raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
+        raise InputError(
+            f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}."
+        )
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q, (k dim, k dim). Each pair of surfaces has its own block of it.
+    """The named approximate inverse of problem.Q, (k dim, k dim).
+
+    Each pair of surfaces has its own block of it.
 
     Of Q it uses the mean of the diagonal, and which components cannot move.
 
@@ -132,16 +147,20 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
 
     Raises
     ------
-    InputError : for an unknown name, for fewer than 3 contacts a side, and for contacts on no line and no rectangular grid.
-        The caller says what it does instead.
+    InputError : for an unknown name, for fewer than 3 contacts a side, and for contacts on no line
+        and no rectangular grid. The caller says what it does instead.
     """
     find_preconditioner(name)
     if len(problem.pairs) > 1:
-        return _blocks(problem, [preconditioner(part_of(problem, pair), name) for pair in problem.pairs])
+        return _blocks(
+            problem, [preconditioner(part_of(problem, pair), name) for pair in problem.pairs]
+        )
     is_held = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~is_held])) if not is_held.all() else 1.0
     module, function, _ = PRECONDITIONERS[name]
-    product, inverse = getattr(import_module(module), function)(problem, is_held.reshape(problem.q.shape))
+    product, inverse = getattr(import_module(module), function)(
+        problem, is_held.reshape(problem.q.shape)
+    )
 
     def beside(act: GridMap, factor: float) -> GridMap:
         def apply(x: np.ndarray) -> np.ndarray:
@@ -166,51 +185,61 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
     def model(x: np.ndarray) -> np.ndarray:
         return np.concatenate([part @ x[own] for part, own in zip(models, rows)])
 
-    return Preconditioner(problem.q.size, product, model if len(models) == len(parts) else None, rows)
+    return Preconditioner(
+        problem.q.size, product, model if len(models) == len(parts) else None, rows
+    )
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Write smooth motions on every pair of surfaces as columns: polynomials of the place, in every component.
+    """Write smooth motions on every pair of surfaces as columns: polynomials of the place, in every
+    component.
 
-    On a pair that is far from all others they are constant and linear. Forces whose waves are longer than the distance to the
-    next pair reach it through the body in between, which no model of one pair knows. A thin slice of a body bends
-    under them as a plate does. Therefore the degree grows with the length of a pair over that distance.
+    On a pair that is far from all others they are constant and linear. Forces whose waves are
+    longer than the distance to the next pair reach it through the body in between, which no model
+    of one pair knows. A thin slice of a body bends under them as a plate does. Therefore the degree
+    grows with the length of a pair over that distance.
 
     Parameters
     ----------
-    problem
-        The interface problem of k contacts.
+    problem : The interface problem of k contacts.
 
     Returns
     -------
-    ndarray
-        (k dim, j) forces.
+    (k dim, j) forces.
     """
-    parts = [_smooth_motions(part_of(problem, pair), degree) for pair, degree in zip(problem.pairs, degrees(problem))]
+    parts = [
+        _smooth_motions(part_of(problem, pair), degree)
+        for pair, degree in zip(problem.pairs, degrees(problem))
+    ]
     return np.asarray(la.block_diag(*parts))
 
 
 def degrees(problem: InterfaceProblem) -> list[int]:
     """The degree of the smooth motions of each pair of surfaces.
 
-    The distance between two pairs is the median over the contacts of one of them, so that pairs that meet at a corner are
-    not taken for neighbours along all of their length.
+    The distance between two pairs is the median over the contacts of one of them, so that pairs
+    that meet at a corner are not taken for neighbours along all of their length.
     """
     points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
     trees = [KDTree(own) for own in points]
     found = []
     for own, tree in zip(points, trees):
-        apart = min((float(np.median(other.query(own)[0])) for other in trees if other is not tree), default=np.inf)
+        apart = min(
+            (float(np.median(other.query(own)[0])) for other in trees if other is not tree),
+            default=np.inf,
+        )
         length = float(np.linalg.norm(np.ptp(own, axis=0)))
-        found.append(int(np.clip(length / (WAVES * apart) if apart > 0 else MOST_WAVES, 1, MOST_WAVES)))
+        found.append(
+            int(np.clip(length / (WAVES * apart) if apart > 0 else MOST_WAVES, 1, MOST_WAVES))
+        )
     return found
 
 
 def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
     """(k dim, j): polynomials of the place up to a degree, those of Chebyshev, in every component.
 
-    On a closed line, which has no polynomials, cosines and sines take their place. Components that cannot move stay at rest;
-    what is then no motion of its own is left out.
+    On a closed line, which has no polynomials, cosines and sines take their place. Components that
+    cannot move stay at rest; what is then no motion of its own is left out.
     """
     chart = problem.chart
     if chart.period is not None:
@@ -223,7 +252,9 @@ def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
         powers: list[tuple[int, ...]] = [(i,) for i in range(degree + 1)]
         if len(waves) == 2:
             powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
-        functions = [np.prod([wave[i] for wave, i in zip(waves, power)], axis=0) for power in powers]
+        functions = [
+            np.prod([wave[i] for wave, i in zip(waves, power)], axis=0) for power in powers
+        ]
     Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
     Z[held(problem.Q)] = 0.0
     _, R = np.linalg.qr(Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300))
@@ -231,29 +262,26 @@ def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
 
 
 def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
-    """Make a preconditioner exact on some columns: (I - Z Z'Q) c P (I - Q Z Z') + Z Z', with Z'QZ = I.
+    """Make a preconditioner exact on some columns: (I - Z Z'Q) c P (I - Q Z Z') + Z Z', with Z'QZ =
+    I.
 
-    The columns are made orthonormal in the energy first. The factors c, one for each block of P, put the mean eigenvalue
-    of P Q on what is not exact about 1, where those of the exact part are. It needs j products with Q once, and another
-    one for each block; each application adds O(n j). Its inverse is the block secant update of P^-1 = G,
-    G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ (QZ)'.
+    The columns are made orthonormal in the energy first. The factors c, one for each block of P,
+    put the mean eigenvalue of P Q on what is not exact about 1, where those of the exact part are.
+    It needs j products with Q once, and another one for each block; each application adds O(n j).
+    Its inverse is the block secant update of P^-1 = G, G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ (QZ)'.
 
-    Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods using multiple secant
-    equations.
+    Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods
+    using multiple secant equations.
 
     Parameters
     ----------
-    P
-        The preconditioner, with its model G of Q if it has one.
-    Q
-        (n, n) interface operator.
-    Z
-        (n, j) the columns.
+    P : The preconditioner, with its model G of Q if it has one.
+    Q : (n, n) interface operator.
+    Z : (n, j) the columns.
 
     Returns
     -------
-    Preconditioner
-        The preconditioner, with the model that belongs to it.
+    The preconditioner, with the model that belongs to it.
     """
     Z, QZ = _orthonormal(Z, np.asarray(Q @ Z))
     c = _scales(P, Q, QZ) if len(P.blocks) > 1 else _scale(P, Q, Z, QZ)
@@ -276,9 +304,11 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend on others, and QZ.
+    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend
+    on others, and QZ.
 
-    Forces that move nothing, as those that are constant on a periodic half-space, have no energy and are left out.
+    Forces that move nothing, as those that are constant on a periodic half-space, have no energy
+    and are left out.
     """
     energy = np.einsum("ij,ij->j", Z, QZ)
     each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)
@@ -291,7 +321,9 @@ def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np.ndarray:
-    """The factor (n,) of a P of one block, by a random force x without a part in what is exact: x'Qx over (Qx)'P(Qx)."""
+    """The factor (n,) of a P of one block, by a random force x without a part in what is exact:
+    x'Qx over (Qx)'P(Qx).
+    """
     x = np.random.default_rng(0).normal(size=len(Z))
     x -= Z @ (QZ.T @ x)
     Qx = np.asarray(Q @ x)
@@ -301,8 +333,8 @@ def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np
 def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
     """The factor (n,) of every block of P, the same for all of its unknowns.
 
-    A random force x = P y of one block does the work y'P y by the model. Its work by Q is x'Q x, less what the exact
-    part does of it, |QZ'x|^2.
+    A random force x = P y of one block does the work y'P y by the model. Its work by Q is x'Q x,
+    less what the exact part does of it, |QZ'x|^2.
     """
     random = np.where(held(Q), 0.0, np.random.default_rng(0).normal(size=len(QZ)))
     made = P @ random
@@ -322,30 +354,31 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
     """Make an approximate inverse of U'QU + diag(added).
 
-    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q it is
-    (U'GU + diag(added))^-1 by an inner PCG; without one it is U'PU (paper, section 5.2).
+    U selects the unknowns of an active set, or directions in which contacts may still move. With a
+    model G of Q it is (U'GU + diag(added))^-1 by an inner PCG; without one it is U'PU (paper,
+    section 5.2).
 
     Parameters
     ----------
-    P
-        The preconditioner, with its model G of Q if it has one.
-    U
-        (n, m) sparse matrix with orthonormal columns.
-    added
-        (m,) at least zero.
+    P : The preconditioner, with its model G of Q if it has one.
+    U : (n, m) sparse matrix with orthonormal columns.
+    added : (m,) at least zero.
 
     Returns
     -------
-    LinearOperator
-        (m, m).
+    (m, m).
     """
     m = U.shape[1]
     rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
     if P.model is None:
         return rows
     model = P.model
-    system = LinearOperator((m, m), matvec=lambda x: U.T @ (model @ (U @ x.ravel())) + added * x.ravel(), dtype=float)
-    return LinearOperator((m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float)
+    system = LinearOperator(
+        (m, m), matvec=lambda x: U.T @ (model @ (U @ x.ravel())) + added * x.ravel(), dtype=float
+    )
+    return LinearOperator(
+        (m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float
+    )
 
 
 def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
@@ -353,15 +386,12 @@ def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
 
     Parameters
     ----------
-    n
-        Number of all unknowns.
-    unknowns
-        (m,) the chosen ones.
+    n : Number of all unknowns.
+    unknowns : (m,) the chosen ones.
 
     Returns
     -------
-    csr_matrix
-        U (n, m).
+    U (n, m).
     """
     m = len(unknowns)
     return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

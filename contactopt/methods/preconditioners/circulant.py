@@ -10,23 +10,23 @@ from contactopt.errors import InputError
 from contactopt.methods.preconditioners.grid import Grid, GridMap, GridMaps, on_grid
 from contactopt.problem import InterfaceProblem
 
-INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
+# relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
+INNER = 1e-13
 
 
 def seminorm(m: float) -> np.ndarray:
     """Compute the first column of the sparse circulant matrix of the H^1/2 seminorm, eq (27).
 
-    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the
+    kernel of a seminorm.
 
     Parameters
     ----------
-    m
-        Half the number of nodes of the closed curve.
+    m : Half the number of nodes of the closed curve.
 
     Returns
     -------
-    ndarray
-        (2 m,) column.
+    (2 m,) column.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
@@ -42,15 +42,12 @@ def norm(m: float, h: float) -> np.ndarray:
 
     Parameters
     ----------
-    m
-        Half the number of nodes of the closed curve.
-    h
-        The distance of two nodes.
+    m : Half the number of nodes of the closed curve.
+    h : The distance of two nodes.
 
     Returns
     -------
-    ndarray
-        (2 m,) column.
+    (2 m,) column.
     """
     column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
@@ -96,7 +93,8 @@ def p22(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
 
 
 def extended(grid: Grid) -> tuple[GridMap, None]:
-    """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq (29).
+    """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq
+    (29).
 
     Parameters
     ----------
@@ -109,14 +107,18 @@ def extended(grid: Grid) -> tuple[GridMap, None]:
     if grid.closed:
         symbol, smallest = _closed_symbol(*grid.shape)
         return _circular(np.maximum(symbol, smallest / 2)), None
-    lines = [restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
+    lines = [
+        restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis)
+        for axis, k in enumerate(grid.shape)
+    ]
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
 
 def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients.
 
-    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do not matter.
+    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do
+    not matter.
 
     Parameters
     ----------
@@ -131,7 +133,9 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     InputError : on a surface, where the paper defines no P22
     """
     if len(grid.shape) > 1:
-        raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
+        raise InputError(
+            "preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann."
+        )
     (k,) = grid.shape
     if grid.closed:
         symbol, smallest = _closed_symbol(k)
@@ -150,10 +154,12 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
 
 
 def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
-    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that is not zero.
+    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that
+    is not zero.
 
-    A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is no power of two, the
-    column of eq (27) does not sum to zero, and its sum is subtracted from every eigenvalue.
+    A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is
+    no power of two, the column of eq (27) does not sum to zero, and its sum is subtracted from
+    every eigenvalue.
     """
     symbol = fft(seminorm(k / 2)).real
     symbol = symbol - symbol[0]
@@ -170,33 +176,28 @@ def closed_curve(k: int) -> int:
 
     Parameters
     ----------
-    k
-        Number of contacts.
+    k : Number of contacts.
 
     Returns
     -------
-    int
-        A power of two, at least k.
+    A power of two, at least k.
     """
     return int(2 ** np.ceil(np.log2(k)))
 
 
 def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
-    """Make the product E' C E along one axis of k nodes, for a circulant matrix C and the extension E by zero.
+    """Make the product E' C E along one axis of k nodes, for a circulant matrix C and the extension
+    E by zero.
 
     Parameters
     ----------
-    symbol
-        (m + 1,) eigenvalues of C, which is real and symmetric, of size 2 m.
-    k
-        Number of nodes along the axis.
-    axis
-        The axis of the grid.
+    symbol : (m + 1,) eigenvalues of C, which is real and symmetric, of size 2 m.
+    k : Number of nodes along the axis.
+    axis : The axis of the grid.
 
     Returns
     -------
-    callable
-        The product on arrays on the grid.
+    The product on arrays on the grid.
     """
     n = 2 * (len(symbol) - 1)
 

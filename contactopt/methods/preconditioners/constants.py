@@ -1,27 +1,45 @@
 """The fitted numbers of the preconditioners, all of them, and what they were fitted on.
 
 ALONG was chosen for small condition numbers of `laplacian` on the disc of
-`python -m experiments.questions.contact_surfaces`, whose other surfaces judge it (reports/contact_surfaces/report.md). They judge
-PIECE, THINNEST and DISTORTED, too, which were chosen by trial.
+`python -m experiments.questions.contact_surfaces`, whose other surfaces judge it
+(reports/contact_surfaces/report.md). They judge PIECE, THINNEST and DISTORTED, too, which were
+chosen by trial.
 
-EIGENVECTORS was chosen by the times of both ways, `python -m experiments.questions.contact_surfaces roots`; a solve takes up to thousands
-of products.
+EIGENVECTORS was chosen by the times of both ways, `python -m experiments.questions.contact_surfaces
+roots`; a solve takes up to thousands of products.
 
-DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
-`python -m experiments.questions.preconditioners` (reports/preconditioners/report.md). On bodies that had no part in that fit, `neumann` is
-judged by `python -m experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
+DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the
+bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md). On
+bodies that had no part in that fit, `neumann` is judged by `python -m
+experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
 
-WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m experiments.questions.several_pairs`.
+WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m
+experiments.questions.several_pairs`.
 """
 
-SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is
-ALONG = 2.0  # resistance of `laplacian` to tangential waves along their own direction; 1 / (1 - SPLIT)^2 - 1 for a half-space
-DISPERSION = 0.28  # share by which bilinear elements lower the compliance of the shortest tangential waves along their own direction
-CELL = 0.45  # power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
-EDGE = 0.2  # power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a quarter-space
-EIGENVECTORS = 800  # unknowns of a surface up to which `laplacian` takes its inverse root from eigenvectors: some 300 products pay for them
-PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
+# Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is
+SPLIT = 0.3
+# resistance of `laplacian` to tangential waves along their own direction; 1 / (1 - SPLIT)^2 - 1 for
+# a half-space
+ALONG = 2.0
+# share by which bilinear elements lower the compliance of the shortest tangential waves along their
+# own direction
+DISPERSION = 0.28
+# power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
+CELL = 0.45
+# power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a
+# quarter-space
+EDGE = 0.2
+# unknowns of a surface up to which `laplacian` takes its inverse root from eigenvectors: some 300
+# products pay for them
+EIGENVECTORS = 800
+# shift over the least eigenvalue of a piece of the surface that is as long as this one
+PIECE = 0.25
 THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
-DISTORTED = 2.0  # area of a cell in the chart over that in space, or one over it, beyond which the chart has no directions there
-WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth motions
+# area of a cell in the chart over that in space, or one over it, beyond which the chart has no
+# directions there
+DISTORTED = 2.0
+# length of a pair of surfaces over its distance to the next pair that is worth one more degree of
+# smooth motions
+WAVES = 3.0
 MOST_WAVES = 12  # the highest degree

@@ -20,14 +20,17 @@ EVEN = 1e-6  # relative difference of spacings that counts as none
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Contacts on a line, a closed curve or a rectangular grid, in the order of C arrays of that shape.
+    """Contacts on a line, a closed curve or a rectangular grid, in the order of C arrays of that
+    shape.
 
     ticks    places along each direction [length]
-    held     (dim, directions, 2): whether a component is held at the first and at the last contact of a direction
-    weights  (k,) weights w: the diagonal of Q is about proportional to 1 / w^2, because larger nodes give way less
-             (contactopt.problem.chart.nodal_weights)
+    held     (dim, directions, 2): whether a component is held at the first and at the last contact
+             of a direction
+    weights  (k,) weights w: the diagonal of Q is about proportional to 1 / w^2, because larger
+             nodes give way less (contactopt.problem.chart.nodal_weights)
     closed   whether the line returns to its start
-    turn     (dim - 1, dim - 1) rotation from tangential components in the chart to those along the directions
+    turn     (dim - 1, dim - 1) rotation from tangential components in the chart to those along the
+             directions
     """
 
     ticks: tuple[np.ndarray, ...]
@@ -76,40 +79,48 @@ def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndar
     order = np.lexsort(places[::-1])
     full = min(shape) > 2 and np.prod(shape) == problem.contacts
     if not full or np.any(np.diff(np.ravel_multi_index(places, shape)[order]) != 1):
-        raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
+        raise InputError(
+            "the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a"
+            " side."
+        )
     oblique = not np.array_equal(turn, np.eye(2))
     if oblique and np.any(held[:, 1:].any(axis=1) & ~held[:, 1:].all(axis=1)):
-        raise InputError("a grid at an angle to tangential directions that are held has no preconditioner.")
+        raise InputError(
+            "a grid at an angle to tangential directions that are held has no preconditioner."
+        )
     on_grid = held[order].reshape(*shape, problem.dim)
     ends = [[on_grid.take(end, axis).all(axis=0) for end in (0, -1)] for axis in range(2)]
     areas = problem.areas[order]
     cells = np.multiply.outer(*(cells_along(t) for t in ticks)).ravel()
     weights = cells**CELL * (areas * cells.sum() / areas.sum() / cells) ** EDGE
     weights /= np.sqrt(np.mean(weights**2))
-    return Grid(tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None), order
+    return (
+        Grid(
+            tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None
+        ),
+        order,
+    )
 
 
-def on_grid(problem: InterfaceProblem, held: np.ndarray, make: Callable[[Grid], GridMaps]) -> GridMaps:
+def on_grid(
+    problem: InterfaceProblem, held: np.ndarray, make: Callable[[Grid], GridMaps]
+) -> GridMaps:
     """Make products on arrays (k, dim) from those on the grid of the contacts.
 
     Parameters
     ----------
-    problem
-        The interface problem of k contacts on a line, a closed curve or a rectangular grid.
-    held
-        (k, dim) mask of the components that cannot move.
-    make
-        A function of the Grid that returns the product on arrays (n0[, n1], dim), and its inverse or None.
+    problem : The interface problem of k contacts on a line, a closed curve or a rectangular grid.
+    held : (k, dim) mask of the components that cannot move.
+    make : A function of the Grid that returns the product on arrays (n0[, n1], dim), and its
+        inverse or None.
 
     Returns
     -------
-    tuple
-        The product on arrays (k, dim), and its inverse or None.
+    The product on arrays (k, dim), and its inverse or None.
 
     Raises
     ------
-    InputError
-        If the contacts lie on no grid.
+    InputError : If the contacts lie on no grid.
     """
     grid, order = _grid_of(problem, held)
     product, inverse = make(grid)
@@ -136,24 +147,33 @@ def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray
     chart, order = problem.chart, problem.chart.order()
     ticks = chart.places[0, order]
     if len(ticks) < 3 or np.any(np.diff(ticks) <= 0):
-        raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
+        raise InputError(
+            "the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a"
+            " side."
+        )
     weights = nodal_weights(chart, problem.areas)[order]
-    ends = held[order][[0, -1]].T[:, None, :] if not chart.closed else np.zeros((2, 1, 2), dtype=bool)
+    ends = (
+        held[order][[0, -1]].T[:, None, :] if not chart.closed else np.zeros((2, 1, 2), dtype=bool)
+    )
     return Grid((ticks,), ends, weights, chart.closed), order
 
 
 def _turn(places: np.ndarray) -> np.ndarray:
-    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k) along the axes.
+    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k) along the
+    axes.
 
-    On a rectangular grid these are the directions of its sides. Their angle is known up to quarter turns only, and the
-    smallest of the possible angles is taken. A grid that lies along the axes already gives the identity to the last digit.
+    On a rectangular grid these are the directions of its sides. Their angle is known up to quarter
+    turns only, and the smallest of the possible angles is taken. A grid that lies along the axes
+    already gives the identity to the last digit.
     """
     points = places.T
     if len(points) < 4:
         return np.eye(2)
     step = points[KDTree(points).query(points, k=2)[1][:, 1]] - points
     # Directions that differ by a quarter turn have the same fourth power as complex numbers.
-    fourth = ((step[:, 0] + 1j * step[:, 1]) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)) ** 4
+    fourth = (
+        (step[:, 0] + 1j * step[:, 1]) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)
+    ) ** 4
     angle = np.angle(np.mean(fourth)) / 4
     if abs(angle) <= EVEN:
         return np.eye(2)
@@ -161,18 +181,17 @@ def _turn(places: np.ndarray) -> np.ndarray:
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
-    """Measure how much of a line belongs to every tick: half-way to either neighbour, beyond an end as far as before
+    """Measure how much of a line belongs to every tick: half-way to either neighbour, beyond an end
+    as far as before
     it.
 
     Parameters
     ----------
-    ticks
-        (k,) places along the line, ascending, at least two [length].
+    ticks : (k,) places along the line, ascending, at least two [length].
 
     Returns
     -------
-    ndarray
-        (k,) lengths [length].
+    (k,) lengths [length].
     """
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

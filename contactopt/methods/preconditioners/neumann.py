@@ -1,10 +1,11 @@
 """`neumann`: the square root of the Laplacian of the contacts, by cosine transforms.
 
-A traction does not vanish at a free end of a contact line or surface: the Laplacian is even there. It is odd where a
-plane of symmetry or an axis holds a component. That makes cosine and sine transforms; a closed line has neither end, and
-takes the Fourier transform. On a line the spacing does not matter: in terms of nodal forces the kernel of Q is
-log |x_i - x_j|, a function of the node numbers up to smooth terms. On a surface the kernel is 1 / |x_i - x_j|, and a
-direction with uneven spacing has eigenvectors of its own: a matrix as small as one side of the grid.
+A traction does not vanish at a free end of a contact line or surface: the Laplacian is even there.
+It is odd where a plane of symmetry or an axis holds a component. That makes cosine and sine
+transforms; a closed line has neither end, and takes the Fourier transform. On a line the spacing
+does not matter: in terms of nodal forces the kernel of Q is log |x_i - x_j|, a function of the node
+numbers up to smooth terms. On a surface the kernel is 1 / |x_i - x_j|, and a direction with uneven
+spacing has eigenvectors of its own: a matrix as small as one side of the grid.
 """
 
 from __future__ import annotations
@@ -17,10 +18,18 @@ import scipy.linalg as la
 from scipy.fft import dct, dst, fft, idct, idst
 
 from contactopt.methods.preconditioners.constants import DISPERSION, SPLIT
-from contactopt.methods.preconditioners.grid import EVEN, Grid, GridMap, GridMaps, cells_along, on_grid
+from contactopt.methods.preconditioners.grid import (
+    EVEN,
+    Grid,
+    GridMap,
+    GridMaps,
+    cells_along,
+    on_grid,
+)
 from contactopt.problem import InterfaceProblem
 
-# held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
+# held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j
+# + shift) / k
 TRANSFORMS = {
     (False, False): (dct, idct, 2, 0.0),
     (True, False): (dst, idst, 4, 0.5),
@@ -45,7 +54,9 @@ class Direction:
 
 
 def _closed_line(k: int) -> Direction:
-    """The Laplacian around a closed line of k evenly spaced nodes, by the Hartley transform, which is its own inverse."""
+    """The Laplacian around a closed line of k evenly spaced nodes, by the Hartley transform, which
+    is its own inverse.
+    """
 
     def hartley(x: np.ndarray, axis: int) -> np.ndarray:
         spectrum = fft(x, axis=axis, norm="ortho")
@@ -56,7 +67,9 @@ def _closed_line(k: int) -> Direction:
 
 
 def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
-    """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were evenly spaced."""
+    """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were evenly
+    spaced.
+    """
     to, back, kind, shift = TRANSFORMS[bool(held[0]), bool(held[1])]
     k, steps = len(ticks), np.diff(ticks)
     waves = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
@@ -71,7 +84,9 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     stiffness[:-1] += 1 / steps
     stiffness[1:] += 1 / steps
     stiffness[[0, -1]] += 2 / steps[[0, -1]] * held
-    values, vectors = la.eigh_tridiagonal(stiffness / cells, -1 / steps / np.sqrt(cells[:-1] * cells[1:]))
+    values, vectors = la.eigh_tridiagonal(
+        stiffness / cells, -1 / steps / np.sqrt(cells[:-1] * cells[1:])
+    )
 
     def along(matrix: np.ndarray) -> Callable[[np.ndarray, int], np.ndarray]:
         return lambda x, axis: np.moveaxis(np.tensordot(matrix, x, (1, axis)), 0, axis)
@@ -101,8 +116,8 @@ def neumann(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
 def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
     """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
 
-    The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue of the root stands in
-    its place.
+    The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue
+    of the root stands in its place.
 
     Parameters
     ----------
@@ -136,10 +151,11 @@ def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
 def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
     """Square root of the symbol of a component, without units, and the directions.
 
-    On a surface the Laplacian is that of bilinear elements with sides 1 and a: where the waves along the two directions are
-    x and y, it is a x + y / a - (a + 1 / a) x y / 6. A half-space gives way less, by a factor of 1 - nu, to tangential
-    tractions that vary along their own direction than to those that vary across it. With bilinear elements the difference
-    is larger, the more so the shorter the wave.
+    On a surface the Laplacian is that of bilinear elements with sides 1 and a: where the waves
+    along the two directions are x and y, it is a x + y / a - (a + 1 / a) x y / 6. A half-space
+    gives way less, by a factor of 1 - nu, to tangential tractions that vary along their own
+    direction than to those that vary across it. With bilinear elements the difference is larger,
+    the more so the shorter the wave.
     """
     held = grid.held[component]
     if grid.closed:
@@ -148,7 +164,8 @@ def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
         directions = [_direction(t, h, len(grid.ticks) == 1) for t, h in zip(grid.ticks, held)]
     waves = np.meshgrid(*(d.waves for d in directions), indexing="ij")
     squares = sum(np.meshgrid(*(d.squares for d in directions), indexing="ij"))
-    spacing = [1.0 if grid.closed else np.ptp(t) / (len(t) - 1) for t in grid.ticks]  # the mean is scaled out later
+    # the mean is scaled out later
+    spacing = [1.0 if grid.closed else np.ptp(t) / (len(t) - 1) for t in grid.ticks]
     total = np.maximum(sum(waves), 1e-300)
     if len(waves) == 2:
         (x, y), a = waves, spacing[1] / spacing[0]

@@ -1,23 +1,27 @@
-"""`laplacian`: the square root of the Laplacian of any contact surface, on the mesh of the contacts itself.
+"""`laplacian`: the square root of the Laplacian of any contact surface, on the mesh of the contacts
+itself.
 
-A half-space moves under a traction t by (-Laplace)^-1/2 t. With linear elements on the cells of the contacts, K the stiffness
-of the Laplacian with natural (Neumann) conditions at free edges and M the lumped mass, nodal forces r = M t move the
-contacts by
+A half-space moves under a traction t by (-Laplace)^-1/2 t. With linear elements on the cells of the
+contacts, K the stiffness of the Laplacian with natural (Neumann) conditions at free edges and M the
+lumped mass, nodal forces r = M t move the contacts by
 
     G r = M^-1/2 L^-1/2 M^-1/2 r,   L = M^-1/2 K M^-1/2 + shift,   P = M^1/2 L^1/2 M^1/2.
 
-On a surface in space this is what normal forces do. Tangential ones have two directions: waves along their own direction
-meet more resistance than waves across it. There K is the stiffness of the form  grad u : grad v + ALONG div u div v  for
-tangential fields u and v, which couples both components.
+On a surface in space this is what normal forces do. Tangential ones have two directions: waves
+along their own direction meet more resistance than waves across it. There K is the stiffness of the
+form  grad u : grad v + ALONG div u div v  for tangential fields u and v, which couples both
+components.
 
-At an edge M is what a contact inside would have, and the share of it that is there enters with the power EDGE, as in
-`neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
-Components that cannot move are left out. The inverse root is a rational function whose error falls exponentially with the
-number of its poles: each of them is one sparse factorisation of a matrix of the surface. On a surface of few contacts the
-eigenvectors of L take less time than those factors, and so does a product with them.
+At an edge M is what a contact inside would have, and the share of it that is there enters with the
+power EDGE, as in `neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it
+belongs to each connected piece of the surface. Components that cannot move are left out. The
+inverse root is a rational function whose error falls exponentially with the number of its poles:
+each of them is one sparse factorisation of a matrix of the surface. On a surface of few contacts
+the eigenvectors of L take less time than those factors, and so does a product with them.
 
-Source: Hale, Higham, Trefethen (2008), Computing A^alpha, log(A), and related matrix functions by contour integrals,
-method 3 for the square root. Johnson (1985), Contact mechanics, section 3.6, for the compliance of the half-space.
+Source: Hale, Higham, Trefethen (2008), Computing A^alpha, log(A), and related matrix functions by
+contour integrals, method 3 for the square root. Johnson (1985), Contact mechanics, section 3.6, for
+the compliance of the half-space.
 """
 
 from __future__ import annotations
@@ -32,7 +36,15 @@ from scipy.sparse.linalg import splu
 from scipy.special import ellipj, ellipk, ellipkm1
 
 from contactopt.errors import InputError
-from contactopt.methods.preconditioners.constants import ALONG, DISTORTED, EDGE, EIGENVECTORS, PIECE, SPLIT, THINNEST
+from contactopt.methods.preconditioners.constants import (
+    ALONG,
+    DISTORTED,
+    EDGE,
+    EIGENVECTORS,
+    PIECE,
+    SPLIT,
+    THINNEST,
+)
 from contactopt.problem import InterfaceProblem
 
 ACCURACY = 1e-4  # of the rational function
@@ -42,7 +54,8 @@ Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 
 def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
-    """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of one.
+    """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of
+    one.
 
     The mean diagonal is an estimate by random signs (Hutchinson 1989).
 
@@ -57,23 +70,28 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
 
     Raises
     ------
-    InputError
-        If the problem does not know the cells of its contact surface.
+    InputError : If the problem does not know the cells of its contact surface.
     """
     cells = problem.chart.cells
     if cells is None:
         raise InputError(
-            "the preconditioner 'laplacian' needs the cells of the contact surface, which are not known here."
+            "the preconditioner 'laplacian' needs the cells of the contact surface, which are not"
+            " known here."
         )
-    points = problem.coordinates if len(problem.coordinates) == problem.dim else problem.chart.places
+    points = (
+        problem.coordinates if len(problem.coordinates) == problem.dim else problem.chart.places
+    )
     K, mass, shift, share = surface_matrices(points, cells)
-    # Forces are spread over the nodal areas, which differ from the mass where the surface goes around an axis.
+    # Forces are spread over the nodal areas, which differ from the mass where the surface goes
+    # around an axis.
     depth = problem.areas / mass
     depth = np.maximum(depth / depth.mean(), THINNEST)
     normal, tangential = slice(0, 1), slice(1, problem.dim)
     roots = [(normal, 1.0 - SPLIT, K), (tangential, 1.0, K)]
     if problem.dim == 3:
-        vector = sp.kron(K, sp.identity(2), format="csr") + ALONG * divergences(points, problem.chart.places, cells)
+        vector = sp.kron(K, sp.identity(2), format="csr") + ALONG * divergences(
+            points, problem.chart.places, cells
+        )
         roots[1] = (tangential, 1.0, vector)
     made = []
     for components, factor, matrix in roots:
@@ -86,7 +104,9 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
         out = np.zeros(X.shape)
         for components, moves, factor, root in made:
             own = np.zeros(moves.shape)
-            own[moves] = root[inverse](X[:, components][moves]) * (factor if inverse else 1 / factor)
+            own[moves] = root[inverse](X[:, components][moves]) * (
+                factor if inverse else 1 / factor
+            )
             out[:, components] = own
         return out
 
@@ -95,26 +115,25 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
     return lambda X: mean * product(X, False), lambda X: product(X, True) / mean
 
 
-def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
+def surface_matrices(
+    points: np.ndarray, cells: np.ndarray
+) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
     """Compute the stiffness and the mass of the Laplacian on the mesh of the contacts.
 
     Parameters
     ----------
-    points
-        (d, k) positions [length].
-    cells
-        (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both ways to cut them.
+    points : (d, k) positions [length].
+    cells : (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both
+        ways to cut them.
 
     Returns
     -------
-    tuple
-        Stiffness K (k, k), lumped mass (k,), the shift (k,) of the piece that each contact is on, and the share (k,) of
-        a full turn that the cells of a contact span: a half at a straight edge.
+    Stiffness K (k, k), lumped mass (k,), the shift (k,) of the piece that each contact is on, and
+    the share (k,) of a full turn that the cells of a contact span: a half at a straight edge.
 
     Raises
     ------
-    InputError
-        If the cells leave out contacts.
+    InputError : If the cells leave out contacts.
     """
     k = points.shape[1]
     K, mass, share = sp.csr_matrix((k, k)), np.zeros(k), np.zeros(k)
@@ -127,10 +146,15 @@ def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matr
                 entries = part * measure * np.einsum("dc,dc->c", gradients[i], gradients[j])
                 K = K + sp.csr_matrix((entries, (own, other)), (k, k))
     if np.any(mass <= 0):
-        raise InputError("the cells of the contact surface leave out contacts, so that it has no Laplacian.")
+        raise InputError(
+            "the cells of the contact surface leave out contacts, so that it has no Laplacian."
+        )
     piece = connected_components(K, directed=False)[1]
-    lengths = [np.linalg.norm(np.ptp(points[:, piece == i], axis=1)) for i in range(piece.max() + 1)]
-    # The least eigenvalue of a convex surface is at least (pi / diameter)^2 (Payne, Weinberger 1960).
+    lengths = [
+        np.linalg.norm(np.ptp(points[:, piece == i], axis=1)) for i in range(piece.max() + 1)
+    ]
+    # The least eigenvalue of a convex surface is at least (pi / diameter)^2 (Payne, Weinberger
+    # 1960).
     return K, mass, PIECE * (np.pi / np.array(lengths)[piece]) ** 2, np.minimum(share, 1.0)
 
 
@@ -139,43 +163,47 @@ def divergences(points: np.ndarray, places: np.ndarray, cells: np.ndarray) -> sp
 
     Parameters
     ----------
-    points
-        (3, k) or (2, k) positions in space [length].
-    places
-        (2, k) positions in the chart, along whose axes the components are [length].
-    cells
-        (v, c) as for `surface_matrices`. Those whose area differs by a factor of DISTORTED in the chart, as at its
-        seam, are left out.
+    points : (3, k) or (2, k) positions in space [length].
+    places : (2, k) positions in the chart, along whose axes the components are [length].
+    cells : (v, c) as for `surface_matrices`. Those whose area differs by a factor of DISTORTED in
+        the chart, as at its seam, are left out.
 
     Returns
     -------
-    csr_matrix
-        (2 k, 2 k), the components of a contact in a row.
+    (2 k, 2 k), the components of a contact in a row.
     """
     k = places.shape[1]
     total = sp.csr_matrix((2 * k, 2 * k))
     for corners, part in _cut(cells):
         gradients, measure = _simplices(places, corners)
         true = _simplices(points, corners)[1]
-        measure = np.where(np.abs(np.log(np.maximum(measure, 1e-300) / true)) < np.log(DISTORTED), measure, 0.0)
+        measure = np.where(
+            np.abs(np.log(np.maximum(measure, 1e-300) / true)) < np.log(DISTORTED), measure, 0.0
+        )
         for i, own in enumerate(corners):
             for j, other in enumerate(corners):
                 for a in range(2):
                     for b in range(2):
                         entries = part * measure * gradients[i][a] * gradients[j][b]
-                        total = total + sp.csr_matrix((entries, (2 * own + a, 2 * other + b)), (2 * k, 2 * k))
+                        total = total + sp.csr_matrix(
+                            (entries, (2 * own + a, 2 * other + b)), (2 * k, 2 * k)
+                        )
     return total
 
 
 def _cut(cells: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Corners of lines or triangles, and the weight with which they count: quadrilaterals are cut both ways, half each."""
+    """Corners of lines or triangles, and the weight with which they count: quadrilaterals are cut
+    both ways, half each.
+    """
     if len(cells) < 4:
         return [(cells, 1.0)]
     return [(cells[list(corners)], 0.5) for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
 
 
 def _angle(x: np.ndarray) -> np.ndarray:
-    """Share (c,) of a full turn at the first corner of lines or triangles x (d, v, c); a line is half of what meets there."""
+    """Share (c,) of a full turn at the first corner of lines or triangles x (d, v, c); a line is
+    half of what meets there.
+    """
     if x.shape[1] == 2:
         return np.full(x.shape[2], 0.5)
     a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
@@ -184,7 +212,9 @@ def _angle(x: np.ndarray) -> np.ndarray:
 
 
 def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Gradients (d, c) of the linear functions of each corner, and the lengths or areas (c,), of lines or triangles."""
+    """Gradients (d, c) of the linear functions of each corner, and the lengths or areas (c,), of
+    lines or triangles.
+    """
     x = points[:, corners]  # (d, v, c)
     if len(corners) == 2:
         chord = x[:, 1] - x[:, 0]
@@ -221,26 +251,29 @@ def _by_eigenvectors(L: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
 def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray]:
     """Products with L^-1/2, a sum of sparse solves, for L with eigenvalues of at least `low`."""
     eye = sp.eye(L.shape[0], format="csc")
-    order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    order = {
+        "permc_spec": "MMD_AT_PLUS_A",
+        "diag_pivot_thresh": 0.0,
+        "options": {"SymmetricMode": True},
+    }
     high = float(abs(L).sum(axis=1).max())
     poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
     return lambda x: np.asarray(sum(c * factors.solve(x) for c, factors in poles))
 
 
-def inverse_root(low: float, high: float, accuracy: float = ACCURACY) -> tuple[np.ndarray, np.ndarray]:
+def inverse_root(
+    low: float, high: float, accuracy: float = ACCURACY
+) -> tuple[np.ndarray, np.ndarray]:
     """Approximate x^-1/2 by a sum of c / (x + s).
 
     Parameters
     ----------
-    low, high
-        The bounds of x.
-    accuracy
-        The accuracy of the sum.
+    low, high : The bounds of x.
+    accuracy : The accuracy of the sum.
 
     Returns
     -------
-    tuple
-        The coefficients c (j,) and the shifts s (j,) > 0.
+    The coefficients c (j,) and the shifts s (j,) > 0.
     """
     m = low / high
     inner, outer = float(ellipk(m)), float(ellipkm1(m))  # K(m) and K(1 - m)

@@ -1,21 +1,25 @@
-"""Laws of contact and friction: one file each, one line here. Nothing is imported before it is used.
+"""Laws of contact and friction: one file each, one line here.
 
-A law says which forces a contact can carry and how they go with its displacement. It is a frozen dataclass whose fields
-are its parameters, one number per contact, and an InterfaceProblem carries it. Every law here can be written in De Saxce's
-form with a closed convex set K_i of forces per contact and an opening g_i that slip adds to the gap:
+Nothing is imported before it is used.
+
+A law says which forces a contact can carry and how they go with its displacement. It is a frozen
+dataclass whose fields are its parameters, one number per contact, and an InterfaceProblem carries
+it. Every law here can be written in De Saxce's form with a closed convex set K_i of forces per
+contact and an opening g_i that slip adds to the gap:
 
     r_i = proj_{K_i} (r_i - rho (u_i + g_i(u_t) n)),      for one and then every rho > 0.
 
     law            K, forces that a contact can carry                  g, added to the gap
     coulomb        |r_t| <= mu r_n                                     mu |u_t|
     frictionless   r_n >= 0, r_t = 0                                   0
-    associated     |r_t| <= mu r_n                                     0: slip itself opens the gap by mu |u_t|
+    associated     |r_t| <= mu r_n                                     0: slip itself opens the gap
+                   by mu |u_t|
     tresca         r_n >= 0, |r_t| <= bound                            0
     bilateral      |r_t| <= mu |r_n|, the bound taken as given         0
     tied           all                                                 0
 
-Sources: De Saxce, Feng (1998), The bipotential method; Alart, Curnier (1991), A mixed formulation for frictional contact
-problems prone to Newton like solution methods.
+Sources: De Saxce, Feng (1998), The bipotential method; Alart, Curnier (1991), A mixed formulation
+for frictional contact problems prone to Newton like solution methods.
 """
 
 from __future__ import annotations
@@ -31,15 +35,31 @@ from contactopt.problem.laws.law import Law
 
 # name -> (module, class, what it is)
 LAWS = {
-    "coulomb": ("contactopt.problem.laws.coulomb", "Coulomb", "contact that may open; Coulomb friction"),
-    "bilateral": ("contactopt.problem.laws.bilateral", "Bilateral", "no separation; friction bound mu |r_n|"),
-    "tresca": ("contactopt.problem.laws.tresca", "Tresca", "contact that may open; friction bound given beforehand"),
+    "coulomb": (
+        "contactopt.problem.laws.coulomb",
+        "Coulomb",
+        "contact that may open; Coulomb friction",
+    ),
+    "bilateral": (
+        "contactopt.problem.laws.bilateral",
+        "Bilateral",
+        "no separation; friction bound mu |r_n|",
+    ),
+    "tresca": (
+        "contactopt.problem.laws.tresca",
+        "Tresca",
+        "contact that may open; friction bound given beforehand",
+    ),
     "associated": (
         "contactopt.problem.laws.associated",
         "Associated",
         "Coulomb's cone; slip opens the gap by mu |u_t|",
     ),
-    "frictionless": ("contactopt.problem.laws.frictionless", "Frictionless", "contact that may open; no friction"),
+    "frictionless": (
+        "contactopt.problem.laws.frictionless",
+        "Frictionless",
+        "contact that may open; no friction",
+    ),
     "tied": ("contactopt.problem.laws.tied", "Tied", "surfaces glued to each other"),
 }
 
@@ -49,18 +69,15 @@ def find_law(name: str) -> type[Law]:
 
     Parameters
     ----------
-    name
-        A name in LAWS.
+    name : A name in LAWS.
 
     Returns
     -------
-    type
-        The subclass of Law.
+    The subclass of Law.
 
     Raises
     ------
-    InputError
-        If there is no law of that name.
+    InputError : If there is no law of that name.
     """
     if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
@@ -74,27 +91,24 @@ def make_law(name: str, value: Any, areas: np.ndarray, places: np.ndarray) -> La
 
     Parameters
     ----------
-    name
-        A name in LAWS.
-    value
-        What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array
-        (k,), or a function of the places (dim, k) that gives either.
-    areas, places
-        Nodal areas (k,) and positions (dim, k) of the contacts.
+    name : A name in LAWS.
+    value : What the law reads: a friction coefficient, or for `tresca` a traction bound [stress].
+        One number, an array (k,), or a function of the places (dim, k) that gives either.
+    areas, places : Nodal areas (k,) and positions (dim, k) of the contacts.
 
     Returns
     -------
-    Law
-        The law, with one parameter for each contact.
+    The law, with one parameter for each contact.
 
     Raises
     ------
-    InputError
-        On an unknown name and on values that are not numbers, negative, or not one per contact.
+    InputError : On an unknown name and on values that are not numbers, negative, or not one per
+        contact.
     """
     values = real_array("the friction of a scene", value(places) if callable(value) else value)
     if values.shape not in ((), areas.shape):
         raise InputError(
-            f"the friction of a scene must be one number or one per contact, shape {areas.shape}; got {values.shape}."
+            f"the friction of a scene must be one number or one per contact, shape {areas.shape};"
+            f" got {values.shape}."
         )
     return find_law(name).of_place(np.broadcast_to(values, areas.shape), areas).spread(len(areas))

@@ -1,4 +1,6 @@
-"""Friction with an associated flow rule: forces and displacements are normal to each other's cones, so slip dilates."""
+"""Friction with an associated flow rule: forces and displacements are normal to each other's cones,
+so slip dilates.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,11 @@ from contactopt.problem.laws.law import Kinks, Law, Projected
 
 @dataclass(frozen=True, eq=False)
 class Associated(Law):
-    """|r_t| <= mu r_n,  u_n >= mu |u_t|,  r' u = 0: where a contact slips its gap opens by mu |u_t|.
+    """|r_t| <= mu r_n,  u_n >= mu |u_t|,  r' u = 0: where a contact slips its gap opens by mu
+    |u_t|.
 
-    This is the optimality condition of min r' Q r / 2 + q' r over Coulomb's cones (contactopt.models.associated).
+    This is the optimality condition of min r' Q r / 2 + q' r over Coulomb's cones
+    (contactopt.models.associated).
 
     mu  (k,) friction coefficients
     """
@@ -38,16 +42,22 @@ class Associated(Law):
         return coulomb_cone_derivative(y, self.mu)
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """Between the cone and its polar the nearest point is h (1, mu unit), h = (y_n + mu |y_t|) / (1 + mu^2)."""
+        """Between the cone and its polar the nearest point is h (1, mu unit), h = (y_n + mu |y_t|)
+        / (1 + mu^2).
+        """
         n, t = split(y)
         size, mu = np.linalg.norm(t, axis=1), self.mu
         beside = (mu * size > -n) & (size > mu * n)
         h = (n + mu * size) / (1 + mu**2)
         change = (size - 2 * mu * h) / (1 + mu**2)
-        return beside[:, None] * np.concatenate([change[:, None], (h + mu * change)[:, None] * unit(t)], axis=1)
+        return beside[:, None] * np.concatenate(
+            [change[:, None], (h + mu * change)[:, None] * unit(t)], axis=1
+        )
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
-        """The edge of the polar cone, where contacts open, and that of the cone itself, where they begin to slip."""
+        """The edge of the polar cone, where contacts open, and that of the cone itself, where they
+        begin to slip.
+        """
         n, t = split(y)
         size = np.linalg.norm(t, axis=1)
         normal = np.abs(n + self.mu * size) <= distance

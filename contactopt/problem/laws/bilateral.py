@@ -1,4 +1,6 @@
-"""Contact without separation: the gap stays zero, the normal force may pull, and friction counts its size."""
+"""Contact without separation: the gap stays zero, the normal force may pull, and friction counts
+its size.
+"""
 
 from __future__ import annotations
 
@@ -45,4 +47,6 @@ class Bilateral(Law):
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
         n, t = split(y)
         slides = np.linalg.norm(t, axis=1) > self.mu * np.abs(n)
-        return np.concatenate([np.zeros((len(y), 1)), (slides * np.abs(n))[:, None] * unit(t)], axis=1)
+        return np.concatenate(
+            [np.zeros((len(y), 1)), (slides * np.abs(n))[:, None] * unit(t)], axis=1
+        )

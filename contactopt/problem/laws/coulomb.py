@@ -1,4 +1,6 @@
-"""Coulomb friction at contacts that may open: the law of contactopt.problem.interface_problem, eqs (15) to (17)."""
+"""Coulomb friction at contacts that may open: the law of contactopt.problem.interface_problem, eqs
+(15) to (17).
+"""
 
 from __future__ import annotations
 
@@ -6,13 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, disc_of_height, split, unit
+from contactopt.problem.cones import (
+    coulomb_cone,
+    coulomb_cone_derivative,
+    disc_of_height,
+    split,
+    unit,
+)
 from contactopt.problem.laws.law import Law, Projected
 
 
 @dataclass(frozen=True, eq=False)
 class Coulomb(Law):
-    """u_n >= 0, r_n >= 0, u_n r_n = 0;  |r_t| <= mu r_n, and where u_t != 0: r_t = -mu r_n u_t / |u_t|.
+    """u_n >= 0, r_n >= 0, u_n r_n = 0;  |r_t| <= mu r_n, and where u_t != 0: r_t = -mu r_n u_t /
+    |u_t|.
 
     mu  (k,) friction coefficients
     """
@@ -37,9 +46,11 @@ class Coulomb(Law):
         return coulomb_cone_derivative(y, self.mu)
 
     def project(self, y: np.ndarray) -> Projected:
-        """Alart and Curnier's map: max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0).
+        """Alart and Curnier's map: max(y_n, 0), and y_t projected on the disc of radius mu max(y_n,
+        0).
 
-        It is no projection on a convex set, but r = P(r - rho u) exactly at the solutions of Coulomb's law.
+        It is no projection on a convex set, but r = P(r - rho u) exactly at the solutions of
+        Coulomb's law.
         """
         n, t = split(y)
         closed = n > 0

@@ -24,7 +24,9 @@ class Frictionless(Law):
     def __post_init__(self) -> None:
         super().__post_init__()
         if np.any(self.mu):
-            raise InputError("contact without friction has mu = 0; for another value use the law 'coulomb'.")
+            raise InputError(
+                "contact without friction has mu = 0; for another value use the law 'coulomb'."
+            )
 
     def idle(self, y: np.ndarray) -> np.ndarray:
         return np.asarray(y[:, 0] <= 0)

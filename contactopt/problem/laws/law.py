@@ -15,14 +15,17 @@ from contactopt.problem.cones import unit
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
 
 
-BELOW = 1e-6  # a tangential force sticks if it is below its bound by more than this, relative to the bound
+# a tangential force sticks if it is below its bound by more than this, relative to the bound
+BELOW = 1e-6
 
 
-Projected = tuple[np.ndarray, np.ndarray]  # points (k, dim) and the generalised derivative (k, dim, dim)
+# points (k, dim) and the generalised derivative (k, dim, dim)
+Projected = tuple[np.ndarray, np.ndarray]
 
 
 class Kinks(NamedTuple):
-    """Where the map P of a law has no derivative: two masks (k,), of which both hold at the apex of a cone.
+    """Where the map P of a law has no derivative: two masks (k,), of which both hold at the apex of
+    a cone.
 
     normal      on the edge between open and closed;  tangential  on the edge between stick and slip
     """
@@ -32,12 +35,15 @@ class Kinks(NamedTuple):
 
 
 class Law:
-    """What all laws share. A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
+    """What all laws share.
 
-    The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one number for all contacts.
-    Methods ask a law for these properties, never for its name:
+    A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
 
-    convex        solutions minimise r' Q r / 2 + q' r over a fixed convex set, and `project` is the projection on it
+    The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one
+    number for all contacts. Methods ask a law for these properties, never for its name:
+
+    convex        solutions minimise r' Q r / 2 + q' r over a fixed convex set, and `project` is the
+                  projection on it
     proportional  the friction bound is mu |r_n|, with mu the coefficient
     dilatant      slip opens the gap
     bounded       tangential forces have a bound
@@ -52,10 +58,16 @@ class Law:
         for name in self.parameters:
             value = real_array(name, getattr(self, name))
             if value.ndim > 1:
-                raise InputError(f"{name} must be a number or one number per contact; got shape {value.shape}.")
+                raise InputError(
+                    f"{name} must be a number or one number per contact; got shape {value.shape}."
+                )
             if np.any(value < 0):
-                what = {"mu": "the friction coefficient mu", "limit": "the friction bound"}.get(name, name)
-                raise InputError(f"{what} must not be negative; its least value is {value.min():g}.")
+                what = {"mu": "the friction coefficient mu", "limit": "the friction bound"}.get(
+                    name, name
+                )
+                raise InputError(
+                    f"{what} must not be negative; its least value is {value.min():g}."
+                )
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
@@ -94,13 +106,11 @@ class Law:
 
         Parameters
         ----------
-        r_n
-            (k,) normal forces [force].
+        r_n : (k,) normal forces [force].
 
         Returns
         -------
-        ndarray
-            (k,) largest |r_t| [force].
+        (k,) largest |r_t| [force].
         """
         raise NotImplementedError
 
@@ -109,15 +119,13 @@ class Law:
 
         Parameters
         ----------
-        y
-            (k, dim) points, normal first [force].
-        r_n
-            (k,) normal forces that say which set K is, where it depends on them. The derivative takes them as given.
+        y : (k, dim) points, normal first [force].
+        r_n : (k,) normal forces that say which set K is, where it depends on them. The derivative
+            takes them as given.
 
         Returns
         -------
-        tuple
-            The nearest points (k, dim), and their derivatives (k, dim, dim).
+        The nearest points (k, dim), and their derivatives (k, dim, dim).
         """
         raise NotImplementedError
 
@@ -126,28 +134,25 @@ class Law:
 
         Parameters
         ----------
-        y, r_n
-            As for `nearest_derivative`.
+        y, r_n : As for `nearest_derivative`.
 
         Returns
         -------
-        ndarray
-            (k, dim) nearest points [force].
+        (k, dim) nearest points [force].
         """
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
-        """Evaluate the map P of Newton's equations r = P(r - rho u), and its generalised derivative.
+        """Evaluate the map P of Newton's equations r = P(r - rho u), and its generalised
+        derivative.
 
         Parameters
         ----------
-        y
-            (k, dim) points, normal first [force].
+        y : (k, dim) points, normal first [force].
 
         Returns
         -------
-        tuple
-            P(y) (k, dim), and its derivatives (k, dim, dim).
+        P(y) (k, dim), and its derivatives (k, dim, dim).
         """
         return self.nearest_derivative(y, y[:, 0])
 
@@ -156,35 +161,32 @@ class Law:
 
         Parameters
         ----------
-        y
-            (k, dim) points, normal first [force].
+        y : (k, dim) points, normal first [force].
 
         Returns
         -------
-        ndarray
-            (k, dim) derivatives.
+        (k, dim) derivatives.
 
         Raises
         ------
-        InputError
-            For a law that does not know it.
+        InputError : For a law that does not know it.
         """
-        raise InputError(f"the law {type(self).__name__} has no derivative by its parameter (project_by_parameter).")
+        raise InputError(
+            f"the law {type(self).__name__} has no derivative by its parameter"
+            " (project_by_parameter)."
+        )
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
         """Find the contacts whose point lies near a kink of `project`.
 
         Parameters
         ----------
-        y
-            (k, dim) points, normal first [force].
-        distance
-            How near counts [force].
+        y : (k, dim) points, normal first [force].
+        distance : How near counts [force].
 
         Returns
         -------
-        Kinks
-            Two masks (k,).
+        Two masks (k,).
         """
         normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
         slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound(y[:, 0])
@@ -195,19 +197,18 @@ class Law:
 
         Parameters
         ----------
-        y
-            (k, dim) points, normal first [force].
-        kinks
-            The masks of the points that are moved.
+        y : (k, dim) points, normal first [force].
+        kinks : The masks of the points that are moved.
 
         Returns
         -------
-        ndarray
-            (k, dim) points. The others are as before.
+        (k, dim) points. The others are as before.
         """
         out = y.copy()
         out[kinks.normal, 0] = 0.0
-        out[:, 1:] = np.where(kinks.tangential[:, None], unit(y[:, 1:]) * self.bound(out[:, 0])[:, None], y[:, 1:])
+        out[:, 1:] = np.where(
+            kinks.tangential[:, None], unit(y[:, 1:]) * self.bound(out[:, 0])[:, None], y[:, 1:]
+        )
         return out
 
     def idle(self, y: np.ndarray) -> np.ndarray:
@@ -215,13 +216,11 @@ class Law:
 
         Parameters
         ----------
-        y
-            (k, dim) points, normal first [force].
+        y : (k, dim) points, normal first [force].
 
         Returns
         -------
-        ndarray
-            (k,) mask.
+        (k,) mask.
         """
         return np.zeros(len(y), dtype=bool)
 
@@ -230,30 +229,26 @@ class Law:
 
         Parameters
         ----------
-        u_t
-            (k, dim - 1) tangential displacements [length].
+        u_t : (k, dim - 1) tangential displacements [length].
 
         Returns
         -------
-        ndarray
-            g (k,) [length].
+        g (k,) [length].
         """
         return np.zeros(len(u_t))
 
     def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float | np.ndarray) -> np.ndarray:
-        """Evaluate proj_K(r - rho (u + g n)), which is equal to r exactly where r and u obey the law.
+        """Evaluate proj_K(r - rho (u + g n)), which is equal to r exactly where r and u obey the
+        law.
 
         Parameters
         ----------
-        r, u
-            Forces [force] and displacements [length] (k, dim), normal first.
-        rho
-            Step [force / length], one number or one per contact (k,).
+        r, u : Forces [force] and displacements [length] (k, dim), normal first.
+        rho : Step [force / length], one number or one per contact (k,).
 
         Returns
         -------
-        ndarray
-            (k, dim) forces [force].
+        (k, dim) forces [force].
         """
         step = np.asarray(rho)[..., None] if np.ndim(rho) else rho
         shifted = r - step * u
@@ -265,13 +260,11 @@ class Law:
 
         Parameters
         ----------
-        r
-            (k, dim) contact forces, normal first [force].
+        r : (k, dim) contact forces, normal first [force].
 
         Returns
         -------
-        ndarray
-            (k,) mask.
+        (k,) mask.
         """
         size = np.abs(r[:, 0])
         return np.asarray((size > PRESSED * size.max(initial=0.0)) | (self.lowest < 0))
@@ -281,28 +274,26 @@ class Law:
 
         Parameters
         ----------
-        r
-            (k, dim) contact forces, normal first [force].
+        r : (k, dim) contact forces, normal first [force].
 
         Returns
         -------
-        ndarray
-            (k,) mask.
+        (k,) mask.
         """
-        return self.pressed(r) & (np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound(r[:, 0]))
+        return self.pressed(r) & (
+            np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound(r[:, 0])
+        )
 
     def slipping(self, r: np.ndarray) -> np.ndarray:
         """Tell which contacts are pressed and carry a tangential force at its bound.
 
         Parameters
         ----------
-        r
-            (k, dim) contact forces, normal first [force].
+        r : (k, dim) contact forces, normal first [force].
 
         Returns
         -------
-        ndarray
-            (k,) mask.
+        (k,) mask.
         """
         return self.pressed(r) & ~self.sticking(r)
 
@@ -311,13 +302,11 @@ class Law:
 
         Parameters
         ----------
-        force
-            The unit [force].
+        force : The unit [force].
 
         Returns
         -------
-        Law
-            The law in that unit.
+        The law in that unit.
         """
         return self
 
@@ -326,13 +315,11 @@ class Law:
 
         Parameters
         ----------
-        factor
-            What it is multiplied with.
+        factor : What it is multiplied with.
 
         Returns
         -------
-        Law
-            The law with that friction.
+        The law with that friction.
         """
         return self._mapped(lambda parameter: factor * parameter)
 
@@ -341,13 +328,11 @@ class Law:
 
         Parameters
         ----------
-        change
-            (k,) what is added.
+        change : (k,) what is added.
 
         Returns
         -------
-        Law
-            The law with that parameter.
+        The law with that parameter.
         """
         return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
@@ -356,13 +341,11 @@ class Law:
 
         Parameters
         ----------
-        contacts
-            Their numbers, with repetitions if wanted, or a mask (k,).
+        contacts : Their numbers, with repetitions if wanted, or a mask (k,).
 
         Returns
         -------
-        Law
-            The law of these contacts.
+        The law of these contacts.
         """
         return self._mapped(lambda parameter: parameter[contacts])
 
@@ -371,15 +354,12 @@ class Law:
 
         Parameters
         ----------
-        first
-            The first contact of each group.
-        count
-            Number of contacts of a group.
+        first : The first contact of each group.
+        count : Number of contacts of a group.
 
         Returns
         -------
-        Law
-            The law, with one contact for each group.
+        The law, with one contact for each group.
         """
         return self.select(first)
 
@@ -388,22 +368,21 @@ class Law:
 
         Parameters
         ----------
-        k
-            Number of contacts.
+        k : Number of contacts.
 
         Returns
         -------
-        Law
-            The law with arrays.
+        The law with arrays.
 
         Raises
         ------
-        InputError
-            On arrays of another length.
+        InputError : On arrays of another length.
         """
         for name in self.parameters:
             if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
-                raise InputError(f"{name} must have shape {(k,)}; got {np.shape(getattr(self, name))}.")
+                raise InputError(
+                    f"{name} must have shape {(k,)}; got {np.shape(getattr(self, name))}."
+                )
         return self._mapped(lambda parameter: np.broadcast_to(parameter, (k,)))
 
     @classmethod
@@ -412,15 +391,12 @@ class Law:
 
         Parameters
         ----------
-        values
-            (k,) friction coefficients, unless the law says otherwise.
-        areas
-            (k,) nodal areas [length^2].
+        values : (k,) friction coefficients, unless the law says otherwise.
+        areas : (k,) nodal areas [length^2].
 
         Returns
         -------
-        Law
-            The law of the k contacts.
+        The law of the k contacts.
         """
         return cls(values)  # type: ignore[call-arg]
 
@@ -428,7 +404,9 @@ class Law:
     def digest(self) -> bytes:
         """The law's name and parameters as bytes, for a problem's fingerprint."""
         name = type(self).__name__.encode()
-        return name + b"".join(np.ascontiguousarray(getattr(self, p)).tobytes() for p in self.parameters)
+        return name + b"".join(
+            np.ascontiguousarray(getattr(self, p)).tobytes() for p in self.parameters
+        )
 
     def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
         return replace(self, **{name: change(getattr(self, name)) for name in self.parameters})  # type: ignore[type-var]

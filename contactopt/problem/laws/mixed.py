@@ -13,19 +13,35 @@ from contactopt.problem.laws.law import Kinks, Law, Projected
 
 @dataclass(frozen=True, eq=False)
 class Mixed(Law):
-    """parts: laws of disjoint contacts; members: for each part the contacts (k_i,) that it rules, together 0 ... k - 1."""
+    """parts: laws of disjoint contacts; members: for each part the contacts (k_i,) that it rules,
+    together 0 ... k - 1.
+    """
 
     parts: tuple[Law, ...]
     members: tuple[np.ndarray, ...]
 
     def __post_init__(self) -> None:
-        together = np.concatenate([np.asarray(m, dtype=int) for m in self.members]) if self.members else np.zeros(0)
+        together = (
+            np.concatenate([np.asarray(m, dtype=int) for m in self.members])
+            if self.members
+            else np.zeros(0)
+        )
         if not np.array_equal(np.sort(together), np.arange(len(together))):
-            raise InputError("every contact needs exactly one law; the contacts of the laws overlap or leave some out.")
+            raise InputError(
+                "every contact needs exactly one law; the contacts of the laws overlap or leave"
+                " some out."
+            )
         for law, own in zip(self.parts, self.members, strict=True):
             if law.contacts != len(own):
-                raise InputError(f"a law of {law.contacts} contacts was given for {len(own)} of them.")
-        for flag, together_ in (("convex", all), ("proportional", all), ("dilatant", any), ("bounded", all)):
+                raise InputError(
+                    f"a law of {law.contacts} contacts was given for {len(own)} of them."
+                )
+        for flag, together_ in (
+            ("convex", all),
+            ("proportional", all),
+            ("dilatant", any),
+            ("bounded", all),
+        ):
             object.__setattr__(self, flag, together_(getattr(law, flag) for law in self.parts))
 
     @property
@@ -61,13 +77,20 @@ class Mixed(Law):
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
         normal = self._gathered(lambda law, own: law.kinks(y[own], distance).normal)
-        return Kinks(normal, self._gathered(lambda law, own: law.kinks(y[own], distance).tangential))
+        return Kinks(
+            normal, self._gathered(lambda law, own: law.kinks(y[own], distance).tangential)
+        )
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
-        return self._gathered(lambda law, own: law.on_kinks(y[own], Kinks(*(mask[own] for mask in kinks))))
+        return self._gathered(
+            lambda law, own: law.on_kinks(y[own], Kinks(*(mask[own] for mask in kinks)))
+        )
 
     def shifted(self, change: np.ndarray) -> Mixed:
-        return replace(self, parts=tuple(law.shifted(change[own]) for law, own in zip(self.parts, self.members)))
+        return replace(
+            self,
+            parts=tuple(law.shifted(change[own]) for law, own in zip(self.parts, self.members)),
+        )
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
         return self._gathered(lambda law, own: law.opening(u_t[own]))
@@ -120,23 +143,24 @@ def join(parts: Sequence[tuple[Law, np.ndarray]]) -> Law:
 
     Parameters
     ----------
-    parts
-        For each part its law and the numbers (k_i,) of its contacts, together 0 ... k - 1.
+    parts : For each part its law and the numbers (k_i,) of its contacts, together 0 ... k - 1.
 
     Returns
     -------
-    Law
-        The law of the k contacts; a Mixed law where the parts are of several kinds.
+    The law of the k contacts; a Mixed law where the parts are of several kinds.
 
     Raises
     ------
-    InputError
-        If a contact has no law or two.
+    InputError : If a contact has no law or two.
     """
     kinds: dict[type[Law], list[tuple[Law, np.ndarray]]] = {}
     for law, own in parts:
         contacts = np.asarray(own, dtype=int)
-        pieces = zip(law.parts, law.members) if isinstance(law, Mixed) else [(law, np.arange(len(contacts)))]
+        pieces = (
+            zip(law.parts, law.members)
+            if isinstance(law, Mixed)
+            else [(law, np.arange(len(contacts)))]
+        )
         for piece, inner in pieces:
             kinds.setdefault(type(piece), []).append((piece, contacts[inner]))
     merged = [_merged(group) for group in kinds.values()]
@@ -150,5 +174,7 @@ def join(parts: Sequence[tuple[Law, np.ndarray]]) -> Law:
 def _merged(group: list[tuple[Law, np.ndarray]]) -> tuple[Law, np.ndarray]:
     """Laws of one kind as one law, and its contacts."""
     first = group[0][0]
-    together = {name: np.concatenate([getattr(law, name) for law, _ in group]) for name in first.parameters}
+    together = {
+        name: np.concatenate([getattr(law, name) for law, _ in group]) for name in first.parameters
+    }
     return replace(first, **together), np.concatenate([own for _, own in group])  # type: ignore[type-var]

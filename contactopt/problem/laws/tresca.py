@@ -1,4 +1,6 @@
-"""Tresca friction at contacts that may open: the friction bound is given and does not ask for the normal force."""
+"""Tresca friction at contacts that may open: the friction bound is given and does not ask for the
+normal force.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,11 @@ from contactopt.problem.laws.law import Law, Projected
 
 @dataclass(frozen=True, eq=False)
 class Tresca(Law):
-    """u_n >= 0, r_n >= 0, u_n r_n = 0;  |r_t| <= limit, and where u_t != 0: r_t = -limit u_t / |u_t|.
+    """u_n >= 0, r_n >= 0, u_n r_n = 0;  |r_t| <= limit, and where u_t != 0: r_t = -limit u_t /
+    |u_t|.
 
-    limit  (k,) friction bounds [force], the same whether a contact is open or closed; in a scene a bound of the
-           tangential traction [stress], which is multiplied by the nodal areas
+    limit  (k,) friction bounds [force], the same whether a contact is open or closed; in a scene a
+           bound of the tangential traction [stress], which is multiplied by the nodal areas
     """
 
     limit: np.ndarray

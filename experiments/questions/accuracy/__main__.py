@@ -30,11 +30,20 @@ STYLES = (("o-", BLUE), ("o--", GREY), ("s-", ORANGE), ("s--", GREEN))
 def draw_parsimony(curves: dict[str, dict[str, list[dict[str, float]]]]) -> Figure:
     figure = Figure(figsize=(11, 7.4), layout="constrained")
     for row, quantity in zip(figure.subplots(2, 3), ("pressure", "width")):
-        panels: list[tuple[str, str]] = [("point", "unknowns"), ("line", "unknowns"), ("point", "seconds")]
+        panels: list[tuple[str, str]] = [
+            ("point", "unknowns"),
+            ("line", "unknowns"),
+            ("point", "seconds"),
+        ]
         for ax, (name, x) in zip(row, panels):
             for (label, rows), (style, colour) in zip(curves[name].items(), STYLES):
                 ax.loglog(
-                    [r[x] for r in rows], [r[quantity] for r in rows], style, color=colour, label=label, mfc="white"
+                    [r[x] for r in rows],
+                    [r[quantity] for r in rows],
+                    style,
+                    color=colour,
+                    label=label,
+                    mfc="white",
                 )
             ax.set(title=f"Hertz, {name}", ylabel=f"relative error of the {quantity} [-]")
             ax.set_xlabel("displacement unknowns [-]" if x == "unknowns" else "time [s]")
@@ -46,9 +55,16 @@ def draw_orders(errors: dict[str, dict[str, np.ndarray]]) -> Figure:
     figure = Figure(figsize=(7.2, 4.4), layout="constrained")
     ax = figure.subplots()
     for (name, found), colour in zip(errors.items(), (BLUE, ORANGE, GREEN)):
-        ax.loglog(UNIFORM, found["uniform"], "o-", color=colour, mfc="white", label=f"{name}, uniform")
-        ax.loglog(GRADED[:-1], found["graded"], "s--", color=colour, mfc="white", label=f"{name}, graded")
-    ax.set(xlabel="elements across the half-width n [-]", ylabel="error of the approach [length, unit force]")
+        ax.loglog(
+            UNIFORM, found["uniform"], "o-", color=colour, mfc="white", label=f"{name}, uniform"
+        )
+        ax.loglog(
+            GRADED[:-1], found["graded"], "s--", color=colour, mfc="white", label=f"{name}, graded"
+        )
+    ax.set(
+        xlabel="elements across the half-width n [-]",
+        ylabel="error of the approach [length, unit force]",
+    )
     ax.legend(frameon=False, fontsize=8)
     return figure
 
@@ -60,9 +76,18 @@ def draw_effectivity(rows: list[dict[str, object]]) -> Figure:
     for (quantity, marker), colour in zip(styles.items(), (BLUE, ORANGE, GREEN, GREY, "black")):
         chosen = [row for row in rows if row["quantity"] == quantity]
         true = [abs(float(row["true error"])) for row in chosen]  # type: ignore[arg-type]
-        ax.loglog(true, [row["estimate"] for row in chosen], marker, color=colour, mfc="white", label=quantity)
+        ax.loglog(
+            true,
+            [row["estimate"] for row in chosen],
+            marker,
+            color=colour,
+            mfc="white",
+            label=quantity,
+        )
     ends = np.array([5e-5, 2e-2])
-    ax.fill_between(ends, ends / 2, 4 * ends, color=GREY, alpha=0.15, lw=0, label="effectivity .5 to 4")
+    ax.fill_between(
+        ends, ends / 2, 4 * ends, color=GREY, alpha=0.15, lw=0, label="effectivity .5 to 4"
+    )
     ax.loglog(ends, ends, color=GREY, lw=1)
     ax.set(xlabel="true relative error [-]", ylabel="estimated relative error [-]")
     ax.legend(frameon=False, fontsize=8)
@@ -73,60 +98,70 @@ def judged(rows: list[dict[str, object]]) -> str:
     values = [float(row["effectivity"]) for row in rows]  # type: ignore[arg-type]
     inside = sum(0.5 <= value <= 4 for value in values)
     return (
-        f"{inside} of {len(values)} lie between .5 and 4, the least is {min(values):.2f}, the largest {max(values):.2f}"
+        f"{inside} of {len(values)} lie between .5 and 4, the least is {min(values):.2f}, the"
+        f" largest {max(values):.2f}"
     )
 
 
 TEXT = """How accurate are the answers, and are the estimated errors honest? Errors are relative to exact solutions (`contactopt.analytic`), unless a unit is
-given. `a` is the half-width or radius of the contact, `c` is that of the stick zone, and `p` is the pressure.
+given. `a` is the half-width or radius of the contact, `c` is that of the stick zone, and `p` is the
+pressure.
 
 ## Accuracy asked for: `run(scene, accuracy=..., quantity=...)`
 
-contactopt solves on finer and finer meshes, and starts each solve from the last answer. It ends when the estimated error is below the target. The
-*effectivity* is the estimated error over the true error: {judged}.
-`extrapolated` is the error that is left if the estimated error is taken off.
+contactopt solves on finer and finer meshes, and starts each solve from the last answer. It ends
+when the estimated error is below the target. The *effectivity* is the estimated error over the true
+error: {judged}. `extrapolated` is the error that is left if the estimated error is taken off.
 
-The rigid indenters (`hertz-*`) and punches (`flat-*`) press on blocks that are 10,000 half-widths large, so that only errors of the mesh
-remain. `rigid-punch-*` are the named scenes. A row is the run to which a target led. If a stricter target was met by the same run, it is
-named instead. If a target was not reached, the next mesh would have had more than 400,000 unknowns.
+The rigid indenters (`hertz-*`) and punches (`flat-*`) press on blocks that are 10,000 half-widths
+large, so that only errors of the mesh remain. `rigid-punch-*` are the named scenes. A row is the
+run to which a target led. If a stricter target was met by the same run, it is named instead. If a
+target was not reached, the next mesh would have had more than 400,000 unknowns.
 
-The edge of the stick zone lies between nodes. If it is read from the nodes next to it, it jumps by a fraction of an element from mesh to
-mesh, and the estimates were up to twenty times the error. Therefore it is read from the slack and the slip one element further away, on both sides of
-it. Then its error falls smoothly enough. The estimate is at least the difference of the two readings. If the stick zone is only a few nodes
-wide (mu = .1 in the plane), the estimate is this difference alone.
+The edge of the stick zone lies between nodes. If it is read from the nodes next to it, it jumps by
+a fraction of an element from mesh to mesh, and the estimates were up to twenty times the error.
+Therefore it is read from the slack and the slip one element further away, on both sides of it. Then
+its error falls smoothly enough. The estimate is at least the difference of the two readings. If the
+stick zone is only a few nodes wide (mu = .1 in the plane), the estimate is this difference alone.
 
 {{effectivity}}
 
-The pressure of a flat punch is infinite at its edge. If it is asked for, contactopt refuses it after one solve, in these words: "the largest
-pressure is at the edge of the contact surface, a corner, where no mesh bounds it". Every other quantity of a corner converges. A quantity
-that does not converge is given up when two refinements in a row change it by as much as the one before.
+The pressure of a flat punch is infinite at its edge. If it is asked for, contactopt refuses it
+after one solve, in these words: "the largest pressure is at the edge of the contact surface, a
+corner, where no mesh bounds it". Every other quantity of a corner converges. A quantity that does
+not converge is given up when two refinements in a row change it by as much as the one before.
 
 ## Hertz within .1 % on less than 5,000 unknowns
 
-The half-space is 100 half-widths large. Its mesh grows by h_next / h = exp((2.8 / n) min(1 + r/a, 100)^.3), and the zone loop, which puts a node
-on the edge of the contact, is on. The peak is that of a polynomial in the coordinates, fitted to p^2 over half of the contact with the areas as
-weights. The pressure at the node on the axis is too low, because the hoop strain u_r / r is poorly resolved in the first ring. This error is that of one ring
-alone. Its area is next to nothing, and so is its weight.
+The half-space is 100 half-widths large. Its mesh grows by h_next / h = exp((2.8 / n) min(1 + r/a,
+100)^.3), and the zone loop, which puts a node on the edge of the contact, is on. The peak is that
+of a polynomial in the coordinates, fitted to p^2 over half of the contact with the areas as
+weights. The pressure at the node on the axis is too low, because the hoop strain u_r / r is poorly
+resolved in the first ring. This error is that of one ring alone. Its area is next to nothing, and
+so is its weight.
 
 {{hertz}}
 
-The next table has the named scene `sphere` (finite bodies, 400 mm, a / R = .055), and its peak pressure to 1 %. All solves, with meshing and
-assembly, took {sphere:.2f} s together.
+The next table has the named scene `sphere` (finite bodies, 400 mm, a / R = .055), and its peak
+pressure to 1 %. All solves, with meshing and assembly, took {sphere:.2f} s together.
 
 {{sphere}}
 
-The figure `parsimony` shows what grading and the zone loop are worth, each switched on and off. Times are the fastest of three runs. Uniform blocks are
-12 half-widths large, because larger ones would have too many elements. The error that stays is that of their size. Without the loop, a zone that is 1.25 times too wide is
-meshed.
+The figure `parsimony` shows what grading and the zone loop are worth, each switched on and off.
+Times are the fastest of three runs. Uniform blocks are 12 half-widths large, because larger ones
+would have too many elements. The error that stays is that of their size. Without the loop, a zone
+that is 1.25 times too wide is meshed.
 
 ## Rigid punch with Coulomb friction
 
-The named scenes at their defaults are compared with the exact values of the coupled problem. The error of c / a is absolute.
+The named scenes at their defaults are compared with the exact values of the coupled problem. The
+error of c / a is absolute.
 
 {{stick}}
 
-If nu comes near .5, linear elements lock. Friction then depends on what is left of the compressibility (Dundurs' beta). The next table has the same punch
-with linear displacements, and all elements halved.
+If nu comes near .5, linear elements lock. Friction then depends on what is left of the
+compressibility (Dundurs' beta). The next table has the same punch with linear displacements, and
+all elements halved.
 
 {{locking}}
 
@@ -138,27 +173,34 @@ These rows come from `python -m experiments.questions.cattaneo` (nu = 0 in 3D).
 
 ## Orders of convergence
 
-An elastic square punch is pressed on a body of its own material. The exponents of the stress at its corner come from `contactopt.analytic.corner`. The orders
-are means over the two finest halvings of uniform meshes, or over the finest halving of graded ones (nodes at (i/n)^{grading} from the corner).
+An elastic square punch is pressed on a body of its own material. The exponents of the stress at its
+corner come from `contactopt.analytic.corner`. The orders are means over the two finest halvings of
+uniform meshes, or over the finest halving of graded ones (nodes at (i/n)^{grading} from the
+corner).
 
-On symmetric problems the error of the approach under a given force is the square of the error in the energy norm. The norm on graded meshes is read in
-this way. With friction the problem is not symmetric, because the dual problem slips the other way. Once the meshes are fine enough, the force should
-converge with the sum of the exponents of mu and of -mu. The column of the theory has twice the exponent of mu.
+On symmetric problems the error of the approach under a given force is the square of the error in
+the energy norm. The norm on graded meshes is read in this way. With friction the problem is not
+symmetric, because the dual problem slips the other way. Once the meshes are fine enough, the force
+should converge with the sum of the exponents of mu and of -mu. The column of the theory has twice
+the exponent of mu.
 
 {{orders}}
 
 ## A block for a half-space
 
-How large must a block be to stand for a half-space? The table has the deviation from a block of 10,000 half-widths with a similar mesh ({size_elements} elements
-across the half-width). For a flat strip it has the absolute deviation of c / a, with mu = .3.
+How large must a block be to stand for a half-space? The table has the deviation from a block of
+10,000 half-widths with a similar mesh ({size_elements} elements across the half-width). For a flat
+strip it has the absolute deviation of c / a, with mu = .3.
 
-The pressure and the width of round contacts need 100 half-widths for 1e-4. The ratio c / a of a strip needs 10,000, because a clamped block holds back
-the sideways displacement by a strain of order a / size. If the elements grow outwards, ten times the size costs a few more rows of
-elements.
+The pressure and the width of round contacts need 100 half-widths for 1e-4. The ratio c / a of a
+strip needs 10,000, because a clamped block holds back the sideways displacement by a strain of
+order a / size. If the elements grow outwards, ten times the size costs a few more rows of elements.
 
-The approach of a point contact is too small by C force / (E* size). For a clamped square block with nu = .3 this constant is C = {factor:.3f}, whatever presses
-on it. (It was found from the size of 100 and applied to the other sizes. The last column but one has the error against Hertz that remains.) In plane strain
-the approach has no limit. The rule is to take 10,000 half-widths, or 100 if only pressure and width are asked for.
+The approach of a point contact is too small by C force / (E* size). For a clamped square block with
+nu = .3 this constant is C = {factor:.3f}, whatever presses on it. (It was found from the size of
+100 and applied to the other sizes. The last column but one has the error against Hertz that
+remains.) In plane strain the approach has no limit. The rule is to take 10,000 half-widths, or 100
+if only pressure and width are asked for.
 
 {{finite}}
 """
@@ -186,7 +228,9 @@ def main() -> None:
         "stick": [stick(kind, mu) for kind in KINDS.values() for mu in FRICTION],
         "locking": [locking(nu, mu) for nu, mu in LOCKING],
         "cattaneo": cattaneo(),
-        "orders": [{key: row[key] for key in columns} for rows, _ in found.values() for row in rows],
+        "orders": [
+            {key: row[key] for key in columns} for rows, _ in found.values() for row in rows
+        ],
         "finite": sizes,
     }
     figures = {

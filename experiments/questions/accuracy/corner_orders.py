@@ -1,4 +1,5 @@
-"""An elastic 90-degree punch on a body of its own material: at which rates do errors fall on uniform and on graded meshes?
+"""An elastic 90-degree punch on a body of its own material: at which rates do errors fall on
+uniform and on graded meshes?
 
 The punch's edge is the only singular point: plates and supports let the sides slide.
 """
@@ -16,7 +17,11 @@ from contactopt.coupling.back_to_bodies import recover
 from contactopt.meshes.structured import patch, rename, tensor_mesh
 
 MATERIAL = Material(5.0, 0.3)
-CASES = {"frictionless": (0.0, False, 0.0), "mu = .3": (0.3, False, 0.3), "bonded": (1e6, True, None)}
+CASES = {
+    "frictionless": (0.0, False, 0.0),
+    "mu = .3": (0.3, False, 0.3),
+    "bonded": (1e6, True, None),
+}
 UNIFORM, GRADED, REFERENCE = (4, 8, 16, 32), (8, 16, 32, 64), 64
 GRADING = 2.5  # exponent: above 1 / exponent of the stress, 1.84 for the bonded punch
 NEAR = 10  # halvings of the element at the edge of the reference mesh
@@ -33,13 +38,17 @@ def graded(n: int) -> np.ndarray:
 
 
 def reference(n: int) -> np.ndarray:
-    """The uniform grid with its first element halved again and again: holds all functions of coarser uniform grids."""
+    """The uniform grid with its first element halved again and again: holds all functions of
+    coarser uniform grids.
+    """
     grid = uniform(n)
     return np.concatenate([[0.0], grid[1] / 2.0 ** np.arange(NEAR, 0, -1), grid[1:]])
 
 
 def scene(lines: Lines, mu: float, bilateral: bool) -> Scene:
-    """Half model of a punch of half-width and height 1 on a body of half-width 3 and height 2, unit force."""
+    """Half model of a punch of half-width and height 1 on a body of half-width 3 and height 2, unit
+    force.
+    """
 
     def punch(n: int, zone: float | None):  # type: ignore[no-untyped-def]
         return rename(tensor_mesh(1 - lines(n)[::-1], lines(n)), contact="y-", top="y+", axis="x-")
@@ -63,7 +72,9 @@ def solved(lines: Lines, n: int, mu: float, bilateral: bool):  # type: ignore[no
 
 
 def energy_norm(fine, coarse) -> float:  # type: ignore[no-untyped-def]
-    """Of the difference of two solved scenes, the coarse one interpolated to the nodes of the fine mesh."""
+    """Of the difference of two solved scenes, the coarse one interpolated to the nodes of the fine
+    mesh.
+    """
     total = 0.0
     for body, field, other in zip(fine[0].bodies, recover(*fine), recover(*coarse)):
         p = other.mesh.p
@@ -72,14 +83,18 @@ def energy_norm(fine, coarse) -> float:  # type: ignore[no-untyped-def]
         U = np.zeros(body.body.basis.N)
         for i in range(2):
             values = other.displacement[i][order].reshape(shape)
-            coarse_part = RegularGridInterpolator(grid, values, bounds_error=False, fill_value=None)(field.mesh.p.T)
+            coarse_part = RegularGridInterpolator(
+                grid, values, bounds_error=False, fill_value=None
+            )(field.mesh.p.T)
             U[body.body.basis.nodal_dofs[i]] = field.displacement[i] - coarse_part
         total += float(U @ (body.body.A @ U))
     return float(np.sqrt(total))
 
 
 def orders(name: str) -> tuple[list[dict[str, object]], dict[str, np.ndarray]]:
-    """Rows of the table, and for the figure the errors of the approach on uniform and graded meshes."""
+    """Rows of the table, and for the figure the errors of the approach on uniform and graded
+    meshes.
+    """
     mu, bilateral, ratio = CASES[name]
     exponent = corner(MATERIAL, MATERIAL, ratio).exponent
     dual = corner(MATERIAL, MATERIAL, None if ratio is None else -ratio).exponent
@@ -97,7 +112,13 @@ def orders(name: str) -> tuple[list[dict[str, object]], dict[str, np.ndarray]]:
         return float(np.log2(errors[-1 - halvings] / errors[-1]) / halvings)
 
     rows = [
-        {"contact": name, "mesh": "uniform", "error": "energy norm", "order": rate(norms), "theory": exponent},
+        {
+            "contact": name,
+            "mesh": "uniform",
+            "error": "energy norm",
+            "order": rate(norms),
+            "theory": exponent,
+        },
         {
             "contact": name,
             "mesh": "uniform",
@@ -112,7 +133,13 @@ def orders(name: str) -> tuple[list[dict[str, object]], dict[str, np.ndarray]]:
             "order": rate(np.sqrt(np.abs(graded_error)), 1),
             "theory": 1.0,
         },
-        {"contact": name, "mesh": "graded", "error": "approach (force)", "order": rate(graded_error, 1), "theory": 2.0},
+        {
+            "contact": name,
+            "mesh": "graded",
+            "error": "approach (force)",
+            "order": rate(graded_error, 1),
+            "theory": 2.0,
+        },
     ]
     for row in rows:
         row["difference"] = float(row["order"]) - float(row["theory"])  # type: ignore[arg-type]

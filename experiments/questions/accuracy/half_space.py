@@ -1,8 +1,10 @@
-"""Rigid indenters on a half-space, on families of meshes all of whose elements shrink as `elements` grows.
+"""Rigid indenters on a half-space, on families of meshes all of whose elements shrink as `elements`
+grows.
 
-Elements of a / n next to the contact grow outwards by the ratio exp(SLOPE / n min(1 + r / a, FAR)^POWER) of neighbours: slowly
-where the field of the contact still varies, faster where it has faded. The number of elements across a body of size L
-then hardly depends on L, and doubling n halves every element, so that no part of the error stays behind.
+Elements of a / n next to the contact grow outwards by the ratio exp(SLOPE / n min(1 + r / a,
+FAR)^POWER) of neighbours: slowly where the field of the contact still varies, faster where it has
+faded. The number of elements across a body of size L then hardly depends on L, and doubling n
+halves every element, so that no part of the error stays behind.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ CORNER = 2.0  # exponent of the grading towards the edge of a flat punch
 
 
 def outwards(start: float, first: float, slope: float, size: float) -> np.ndarray:
-    """Grid from `start` to `size`, lengths in units of a: elements from `first` on, growing as in the head of this module."""
+    """Grid from `start` to `size`, lengths in units of a: elements from `first` on, growing as in
+    the head of this module.
+    """
     grid, h = [start], first
     while grid[-1] < size:
         grid.append(grid[-1] + h)
@@ -37,11 +41,15 @@ def outwards(start: float, first: float, slope: float, size: float) -> np.ndarra
     return np.asarray(start + offsets * ((size - start) / offsets[-1]))
 
 
-def indenter(kind: str, size: float = 100.0, elements: int = 32, uniform: bool = False, loop: bool = True) -> Scene:
-    """A rigid paraboloid or parabolic cylinder without friction: Hertz's contact exactly, but for the size of the block.
+def indenter(
+    kind: str, size: float = 100.0, elements: int = 32, uniform: bool = False, loop: bool = True
+) -> Scene:
+    """A rigid paraboloid or parabolic cylinder without friction: Hertz's contact exactly, but for
+    the size of the block.
 
     size     height and half-width of the block over the half-width of contact
-    uniform  no grading;  loop  remeshing to the contact zone, else a zone 1.25 times as wide as it is
+    uniform  no grading;  loop  remeshing to the contact zone, else a zone 1.25 times as wide as it
+             is
     """
     plane = kind == "plane-strain"
     modulus, radius, force = contact_modulus(MATERIAL), 400.0, 0.5 if plane else 20.0
@@ -58,7 +66,12 @@ def indenter(kind: str, size: float = 100.0, elements: int = 32, uniform: bool =
 
     return Scene(
         f"hertz-{'line' if plane else 'point'}",
-        Rigid("indenter", normal=(0.0, 1.0), gap=lambda x: x[0] ** 2 / (2 * radius), force={up: -force}),
+        Rigid(
+            "indenter",
+            normal=(0.0, 1.0),
+            gap=lambda x: x[0] ** 2 / (2 * radius),
+            force={up: -force},
+        ),
         Part("half-space", mesh, MATERIAL, (Support("axis", {across: 0.0}), Support("bottom"))),
         0.0,
         kind=kind,
@@ -71,7 +84,9 @@ def indenter(kind: str, size: float = 100.0, elements: int = 32, uniform: bool =
 
 
 def flat(kind: str, mu: float, size: float = 1e4, elements: int = 32) -> Scene:
-    """A rigid flat punch of half-width 1 under a unit force; elements shrink quadratically towards its edge."""
+    """A rigid flat punch of half-width 1 under a unit force; elements shrink quadratically towards
+    its edge.
+    """
     plane = kind == "plane-strain"
     across, up = ("x", "y") if plane else ("r", "z")
     beta, modulus = dundurs(None, MATERIAL)[1], contact_modulus(MATERIAL)
@@ -85,7 +100,9 @@ def flat(kind: str, mu: float, size: float = 1e4, elements: int = 32) -> Scene:
         near = np.linspace(0, 1, n + 1) ** CORNER
         far = outwards(1.0, near[-1] - near[-2], CORNER / n, size)
         beyond = np.concatenate([1 + near, 1 + far[1:]])
-        return _block(np.concatenate([1 - near[:0:-1], beyond]), np.concatenate([near, far[1:]]), 1.0)
+        return _block(
+            np.concatenate([1 - near[:0:-1], beyond]), np.concatenate([near, far[1:]]), 1.0
+        )
 
     return Scene(
         f"flat-{'line' if plane else 'disc'}, mu = {mu:g}",

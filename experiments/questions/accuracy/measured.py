@@ -1,4 +1,6 @@
-"""What the report on accuracy measures: errors against exact solutions, and error estimates against true errors."""
+"""What the report on accuracy measures: errors against exact solutions, and error estimates against
+true errors.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,10 @@ Exact = dict[str, float]
 
 
 def exact(scene: Scene) -> Exact:
-    """Quantities of the scene on a half-space. The strain energy of Hertz's point contact is 2/5 of force times approach."""
+    """Quantities of the scene on a half-space.
+
+    The strain energy of Hertz's point contact is 2/5 of force times approach.
+    """
     reference = scene.reference
     values = {"width": reference.half_width}
     if reference.peak is not None:
@@ -69,7 +74,13 @@ def cases() -> list[tuple[Scene, str]]:
     smooth = flat("axisymmetric", 0.0)
     spence = [scenes.rigid_punch(kind, mu=mu) for kind in KINDS.values() for mu in FRICTION]
     pairs = [(point, q) for q in ("pressure", "width", "approach", "energy")]
-    pairs += [(line, "pressure"), (line, "width"), (smooth, "approach"), (disc, "approach"), (disc, "stick")]
+    pairs += [
+        (line, "pressure"),
+        (line, "width"),
+        (smooth, "approach"),
+        (disc, "approach"),
+        (disc, "stick"),
+    ]
     return [*pairs, (strip, "stick"), *((scene, "stick") for scene in spence)]
 
 
@@ -109,11 +120,17 @@ def effectivities(case: int) -> list[dict[str, object]]:
 def all_effectivities() -> list[dict[str, object]]:
     """All cases, each in a process of its own, which gives all of its memory back."""
     with get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
-        return [row for rows in pool.map(effectivities, range(len(cases())), chunksize=1) for row in rows]
+        return [
+            row
+            for rows in pool.map(effectivities, range(len(cases())), chunksize=1)
+            for row in rows
+        ]
 
 
 def finite(size: float) -> dict[str, object]:
-    """Errors of a block `size` half-widths high and wide for a half-space, less those of the largest block."""
+    """Errors of a block `size` half-widths high and wide for a half-space, less those of the
+    largest block.
+    """
     row: dict[str, object] = {"size / a": size}
     begin = time.perf_counter()
     for name, scene in (
@@ -123,7 +140,9 @@ def finite(size: float) -> dict[str, object]:
     ):
         solved = solve_zone(scene, 32)
         reduction, solution = solved.reduction, solved.solution
-        for quantity in ("pressure", "width", "approach") if name == "point" else ("pressure", "width"):
+        for quantity in (
+            ("pressure", "width", "approach") if name == "point" else ("pressure", "width")
+        ):
             if name != "strip":
                 row[f"{name}, {quantity}"] = value_of(quantity, reduction, solution)
         if name == "strip":
@@ -143,9 +162,19 @@ def finite_sizes() -> tuple[list[dict[str, object]], float]:
     scene = indenter(KINDS["point"])
     factor = lacking / (force / (modulus * SIZES[2] * scene.reference.half_width))
     for row in rows:
-        correction = factor * force / (modulus * float(row["size / a"]) * scene.reference.half_width)  # type: ignore[arg-type]
-        row["point, approach corrected"] = (float(row["point, approach"]) + correction) / scene.reference.approach - 1  # type: ignore[arg-type]
-        for key in ("point, pressure", "point, width", "point, approach", "line, pressure", "line, width"):
+        correction = (
+            factor * force / (modulus * float(row["size / a"]) * scene.reference.half_width)
+        )  # type: ignore[arg-type]
+        row["point, approach corrected"] = (
+            float(row["point, approach"]) + correction
+        ) / scene.reference.approach - 1  # type: ignore[arg-type]
+        for key in (
+            "point, pressure",
+            "point, width",
+            "point, approach",
+            "line, pressure",
+            "line, width",
+        ):
             row[key] = float(row[key]) / float(last[key]) - 1  # type: ignore[arg-type]
         row["strip, c / a"] = float(row["strip, c / a"]) - float(last["strip, c / a"])  # type: ignore[arg-type]
     return rows, factor
@@ -186,13 +215,23 @@ def cattaneo() -> list[dict[str, object]]:
     """Rows of the report on sheared contacts, made by experiments.questions.cattaneo."""
     with open(REPORTS / "cattaneo" / "loads.csv") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    keys = ("scene", "T / (mu P)", "unknowns", "c / a, rel. error", "p in L2", "q in L2", "loss, rel. error")
+    keys = (
+        "scene",
+        "T / (mu P)",
+        "unknowns",
+        "c / a, rel. error",
+        "p in L2",
+        "q in L2",
+        "loss, rel. error",
+    )
     kinds = {"scene": str, "unknowns": int}
     return [{key: kinds.get(key, float)(row[key]) for key in keys} for row in rows]
 
 
 def sphere() -> list[dict[str, object]]:
-    """The named scene, peak pressure to 1 %; the fastest of five runs, which is the least disturbed."""
+    """The named scene, peak pressure to 1 %; the fastest of five runs, which is the least
+    disturbed.
+    """
     scene, best = scenes.sphere(), None
     for _ in range(5):
         _, estimate = refine([scene], "pressure", 1e-2)
@@ -215,7 +254,9 @@ def sphere() -> list[dict[str, object]]:
 
 
 def parsimony(kind: str) -> dict[str, list[dict[str, float]]]:
-    """Errors of the peak and the width against unknowns and time, with grading and zone loop on and off."""
+    """Errors of the peak and the width against unknowns and time, with grading and zone loop on and
+    off.
+    """
     curves: dict[str, list[dict[str, float]]] = {}
     for grading in (True, False):
         for loop in (True, False):
@@ -229,7 +270,12 @@ def parsimony(kind: str) -> dict[str, list[dict[str, float]]]:
                     solved = solve_zone(scene, elements)
                     reduction, solution = solved.reduction, solved.solution
                     seconds = min(seconds, time.perf_counter() - begin)
-                errors = [abs(value_of(q, reduction, solution) / truth[q] - 1) for q in ("pressure", "width")]
+                errors = [
+                    abs(value_of(q, reduction, solution) / truth[q] - 1)
+                    for q in ("pressure", "width")
+                ]
                 row = {"elements": elements, "unknowns": reduction.dofs, "seconds": seconds}
-                curves.setdefault(name, []).append(row | {"pressure": errors[0], "width": errors[1]})
+                curves.setdefault(name, []).append(
+                    row | {"pressure": errors[0], "width": errors[1]}
+                )
     return curves

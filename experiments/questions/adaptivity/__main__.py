@@ -1,10 +1,14 @@
-"""How many unknowns does an accuracy need, if meshes are refined only where the quantity asked for needs it?
+"""How many unknowns does an accuracy need, if meshes are refined only where the quantity asked for
+needs it?
 
-    orders         the flat punch with its singular corners: energy and approach against the number of unknowns
-    hertz          a cylinder on a block, meshed by Gmsh without knowledge of the contact: unknowns for 1 % and .1 % of the
-                   exact peak pressure, refined locally and everywhere
-    hertz3d        a ball on a block, tetrahedra by Gmsh without knowledge of the contact: the peak pressure
-    stress         the largest stress of parts meshed by Gmsh: unknowns and time for 1 %, refined locally and everywhere
+    orders         the flat punch with its singular corners: energy and approach against the number
+                   of unknowns
+    hertz          a cylinder on a block, meshed by Gmsh without knowledge of the contact: unknowns
+                   for 1 % and .1 % of the exact peak pressure, refined locally and everywhere
+    hertz3d        a ball on a block, tetrahedra by Gmsh without knowledge of the contact: the peak
+                   pressure
+    stress         the largest stress of parts meshed by Gmsh: unknowns and time for 1 %, refined
+                   locally and everywhere
 
 Run all, or the parts that are named: python -m experiments.questions.adaptivity [PART ...]
 """
@@ -45,19 +49,30 @@ def slope(x: list[float], y: list[float]) -> float:
 
 
 def orders() -> list[dict[str, Any]]:
-    """Error in the energy norm of the flat punch, as the square root of the missing energy over the whole energy."""
+    """Error in the energy norm of the flat punch, as the square root of the missing energy over the
+    whole energy.
+    """
     rows = []
-    truth = refine([make_scene("punch-2d", degree=2)], "energy", 2e-7, limits=Limits(60_000), adaptive=True)[
-        1
-    ].extrapolated
+    truth = refine(
+        [make_scene("punch-2d", degree=2)], "energy", 2e-7, limits=Limits(60_000), adaptive=True
+    )[1].extrapolated
     for degree, goal in ((1, 4e-4), (2, 3e-6)):
         estimate = refine(
-            [make_scene("punch-2d", degree=degree)], "energy", goal, limits=Limits(100_000), adaptive=True
+            [make_scene("punch-2d", degree=degree)],
+            "energy",
+            goal,
+            limits=Limits(100_000),
+            adaptive=True,
         )[1]
         kept = [level for level in estimate.levels if 1_000 <= level.unknowns <= 100_000]
         errors = [np.sqrt(abs(1 - level.value / truth)) for level in kept]
         rows += [
-            {"mesh": "adaptive", "degree": degree, "unknowns": level.unknowns, "error in the energy norm": error}
+            {
+                "mesh": "adaptive",
+                "degree": degree,
+                "unknowns": level.unknowns,
+                "error in the energy norm": error,
+            }
             for level, error in zip(kept, errors)
         ]
         for elements in (4, 8, 16, 32, 64)[: 5 if degree == 1 else 4]:
@@ -87,8 +102,13 @@ def _even(scene: Scene, count: int) -> Scene:
     from contactopt.meshes.structured import rename, tensor_mesh
 
     def even(part: Any) -> Any:
-        low, high = (np.array(limit) for limit in zip(*((row.min(), row.max()) for row in part.build_mesh(4, None).p)))
-        ticks = [np.linspace(a, b, max(2, round((b - a) / 20.0 * count) + 1)) for a, b in zip(low, high)]
+        low, high = (
+            np.array(limit)
+            for limit in zip(*((row.min(), row.max()) for row in part.build_mesh(4, None).p))
+        )
+        ticks = [
+            np.linspace(a, b, max(2, round((b - a) / 20.0 * count) + 1)) for a, b in zip(low, high)
+        ]
         names = part.build_mesh(4, None)
         mesh = tensor_mesh(*ticks)
         return replace(part, mesh=_named_like(names, mesh, rename))
@@ -102,12 +122,16 @@ def _named_like(old: Any, new: Any, rename: Callable[..., Any]) -> Any:
     for name, facets in old.boundaries.items():
         points = old.p[:, np.unique(old.facets[:, facets])]
         low, high = points.min(axis=1) - 1e-9, points.max(axis=1) + 1e-9
-        found[name] = lambda x, low=low, high=high: np.all((x >= low[:, None]) & (x <= high[:, None]), axis=0)
+        found[name] = lambda x, low=low, high=high: np.all(
+            (x >= low[:, None]) & (x <= high[:, None]), axis=0
+        )
     return new.with_boundaries(found)
 
 
 def cylinder_files(folder: Path, size: float) -> tuple[Path, Path]:
-    """A half cylinder of radius 20 on a block 60 x 30, each in a file, with triangles of one size everywhere."""
+    """A half cylinder of radius 20 on a block 60 x 30, each in a file, with triangles of one size
+    everywhere.
+    """
     import gmsh
 
     gmsh.initialize(interruptible=False)
@@ -119,7 +143,10 @@ def cylinder_files(folder: Path, size: float) -> tuple[Path, Path]:
         gmsh.clear()
         occ = gmsh.model.occ
         if name == "cylinder":
-            whole, half = [(2, occ.addDisk(0, 20, 0, 20, 20))], [(2, occ.addRectangle(-20, 0, 0, 40, 20))]
+            whole, half = (
+                [(2, occ.addDisk(0, 20, 0, 20, 20))],
+                [(2, occ.addRectangle(-20, 0, 0, 40, 20))],
+            )
             body, _ = occ.intersect(whole, half)
         else:
             body = [(2, occ.addRectangle(-30, -30, 0, 60, 30))]
@@ -165,26 +192,42 @@ def hertz() -> list[dict[str, Any]]:
         scene, exact = cylinder(6.0, 1000.0)
         scene = replace(scene, degree=degree)
         local, _ = locally(scene, "pressure", 3e-4, 20_000)
-        found = [(unknowns, value / exact.peak - 1, seconds) for unknowns, value, _, seconds in local]
-        rows += [row for bound in (1e-2, 1e-3) for row in _reached("adaptive", degree, bound, found)]
+        found = [
+            (unknowns, value / exact.peak - 1, seconds) for unknowns, value, _, seconds in local
+        ]
+        rows += [
+            row for bound in (1e-2, 1e-3) for row in _reached("adaptive", degree, bound, found)
+        ]
         everywhere = []
         for size in (6.0, 3.0, 1.5, 0.75, 0.375, 0.1875)[: 6 if degree == 1 else 5]:
             begin = time.process_time()
             solved = solve_scene(replace(cylinder(size, 1000.0)[0], degree=degree))
             value = peak_pressure(solved.reduction, solved.solution)
-            everywhere.append((solved.reduction.dofs, value / exact.peak - 1, time.process_time() - begin))
-        rows += [row for bound in (1e-2, 1e-3) for row in _reached("everywhere", degree, bound, everywhere)]
+            everywhere.append(
+                (solved.reduction.dofs, value / exact.peak - 1, time.process_time() - begin)
+            )
+        rows += [
+            row
+            for bound in (1e-2, 1e-3)
+            for row in _reached("everywhere", degree, bound, everywhere)
+        ]
     return rows
 
 
-def _reached(how: str, degree: int, bound: float, found: list[tuple[int, float, float]]) -> Iterator[dict[str, Any]]:
+def _reached(
+    how: str, degree: int, bound: float, found: list[tuple[int, float, float]]
+) -> Iterator[dict[str, Any]]:
     """The first mesh from which on all errors are within the bound."""
     inside = [abs(error) <= bound for _, error, _ in found]
     first = len(inside) - (inside[::-1].index(False) if False in inside else len(inside))
     row = {"refined": how, "degree": degree, "error of the peak at most": bound}
     if first < len(found):
         unknowns, error, seconds = found[first]
-        yield row | {"unknowns": unknowns, "its error": error, "processor seconds with all levels": seconds}
+        yield row | {
+            "unknowns": unknowns,
+            "its error": error,
+            "processor seconds with all levels": seconds,
+        }
     else:
         yield row | {
             "unknowns": f"> {found[-1][0]}",
@@ -206,14 +249,17 @@ def report(tables: dict[str, list[dict[str, Any]]]) -> None:
     fits = []
     for degree in (1, 2):
         for mesh in ("adaptive", "uniform"):
-            rows = [row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh]
+            rows = [
+                row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh
+            ]
             fits.append(
                 {
                     "mesh": mesh,
                     "degree": degree,
                     "unknowns": f"{rows[0]['unknowns']} to {rows[-1]['unknowns']}",
                     "order in the number of unknowns": slope(
-                        [row["unknowns"] for row in rows], [row["error in the energy norm"] for row in rows]
+                        [row["unknowns"] for row in rows],
+                        [row["error in the energy norm"] for row in rows],
                     ),
                 }
             )
@@ -221,39 +267,50 @@ def report(tables: dict[str, list[dict[str, Any]]]) -> None:
 
 ## The flat punch and its corners
 
-The stress is infinite at the edge of the punch. On even meshes that spoils the order of convergence; local refinement restores
-it: -1/2 in the number of unknowns for linear elements, and -1 for quadratic ones. The error is measured in the energy norm.
+The stress is infinite at the edge of the punch. On even meshes that spoils the order of
+convergence; local refinement restores it: -1/2 in the number of unknowns for linear elements, and
+-1 for quadratic ones. The error is measured in the energy norm.
 
 {{fits}}
 
 ## Hertz from meshes that know nothing of the contact
 
-A steel cylinder of radius 20 mm on a block, both meshed by Gmsh with triangles of 6 mm; the contact is 1 mm wide or less. The
-table names the first mesh from which on the error of the peak pressure stays within the bound.
+A steel cylinder of radius 20 mm on a block, both meshed by Gmsh with triangles of 6 mm; the contact
+is 1 mm wide or less. The table names the first mesh from which on the error of the peak pressure
+stays within the bound.
 
 {{hertz}}
 
 ## A ball on a block
 
-A steel ball of radius 20 mm on a steel block, a quarter of both, meshed by Gmsh with tetrahedra of 7 mm; the contact has a radius
-of 1 mm, so that on the first mesh one node carries all of the force.
+A steel ball of radius 20 mm on a steel block, a quarter of both, meshed by Gmsh with tetrahedra of
+7 mm; the contact has a radius of 1 mm, so that on the first mesh one node carries all of the force.
 
 {{hertz3d}}
 
 ## Stress at a fillet and under a pin
 
-A bracket with a fillet of 4 mm held on a block by a bolt, a pin in a bush, and a bearing on the ground with its pin from a scene
-file with three mesh files; all meshes are made by Gmsh with elements of one size. The table names the first mesh from which on the
-error stays within 1 %. Refined everywhere, Gmsh halves the size of all elements; its own time is not counted. The reference
-is the extrapolated value of local refinement with quadratic elements to an estimated error of 1e-4. Times are processor seconds.
+A bracket with a fillet of 4 mm held on a block by a bolt, a pin in a bush, and a bearing on the
+ground with its pin from a scene file with three mesh files; all meshes are made by Gmsh with
+elements of one size. The table names the first mesh from which on the error stays within 1 %.
+Refined everywhere, Gmsh halves the size of all elements; its own time is not counted. The reference
+is the extrapolated value of local refinement with quadratic elements to an estimated error of 1e-4.
+Times are processor seconds.
 
 {{stress}}
 
 Whether the estimates are true is measured by `python -m experiments.questions.first_meshes`.
 
-Error against time, of adaptive meshes and of other models of one scene, is measured by `python -m experiments.questions.simplest`.
+Error against time, of adaptive meshes and of other models of one scene, is measured by
+`python -m experiments.questions.simplest`.
 """
-    write("adaptivity", "Fewest unknowns for an accuracy", text, tables | {"fits": fits}, {"error": picture(tables)})
+    write(
+        "adaptivity",
+        "Fewest unknowns for an accuracy",
+        text,
+        tables | {"fits": fits},
+        {"error": picture(tables)},
+    )
 
 
 def picture(tables: dict[str, list[dict[str, Any]]]) -> Any:
@@ -261,8 +318,13 @@ def picture(tables: dict[str, list[dict[str, Any]]]) -> Any:
     figure, ax = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
     for degree, color in ((1, "C0"), (2, "C1")):
         for mesh, style in (("adaptive", "o-"), ("uniform", "s--")):
-            rows = [row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh]
-            x, y = [row["unknowns"] for row in rows], [row["error in the energy norm"] for row in rows]
+            rows = [
+                row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh
+            ]
+            x, y = (
+                [row["unknowns"] for row in rows],
+                [row["error in the energy norm"] for row in rows],
+            )
             ax.loglog(x, y, style, color=color, mfc="none", label=f"{mesh}, degree {degree}")
     ax.set(xlabel="unknowns [-]", ylabel="error in the energy norm [-]", title="flat punch")
     ax.legend(frameon=False)

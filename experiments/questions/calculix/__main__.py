@@ -1,4 +1,6 @@
-"""Does CalculiX, an independent finite-element code, find the same contact forces on the same mesh, and at what cost?"""
+"""Does CalculiX, an independent finite-element code, find the same contact forces on the same mesh,
+and at what cost?
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,8 @@ from experiments.questions.calculix.run import (  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 ABSENT = (
-    "CalculiX is not installed, so nothing was compared: on Debian or Ubuntu `apt-get install calculix-ccx` provides "
-    "its solver, ccx."
+    "CalculiX is not installed, so nothing was compared: on Debian or Ubuntu `apt-get install"
+    " calculix-ccx` provides its solver, ccx."
 )
 DECADES = {"node-to-surface": range(-1, 10), "surface-to-surface": range(-1, 7)}
 STRAINS = (5.0, 500.0, 5e4)  # MPa
@@ -46,9 +48,14 @@ REPEATS = 3
 
 
 def strain(program: str, modulus: float) -> dict[str, Any]:
-    """How much of a difference comes with the displacement of the surfaces, which contactopt leaves out."""
+    """How much of a difference comes with the displacement of the surfaces, which contactopt leaves
+    out.
+    """
     bench = Bench(program, punch(modulus=modulus))
-    row: dict[str, Any] = {"E [MPa]": modulus, "approach / height": -float(bench.exact.multipliers[0]) / 40.0}
+    row: dict[str, Any] = {
+        "E [MPa]": modulus,
+        "approach / height": -float(bench.exact.multipliers[0]) / 40.0,
+    }
     for law, factor in (("node-to-surface", 1e3), ("surface-to-surface", 1e3), ("mortar", RIGID)):
         measured = bench.row(law, factor)
         failed = measured["end"] != "converged"
@@ -73,9 +80,25 @@ def costs(program: str, elements: int, sweep: list[dict[str, Any]]) -> list[dict
         own.append(time.perf_counter() - start)
         for law, runs in answers.items():
             runs.append(bench.run(law, factors[law]))
-    row = {"contacts": bench.problem.contacts, "solver": "contactopt", "factor": "none", "normal, L2": "reference"}
-    row |= {"tangential, L2": "reference", "iterations": solution.iterations, "seconds": median(own)}
-    rows = [row | {"over contactopt": 1.0, "memory [MB]": own_memory(elements), "end": solution.status.label}]
+    row = {
+        "contacts": bench.problem.contacts,
+        "solver": "contactopt",
+        "factor": "none",
+        "normal, L2": "reference",
+    }
+    row |= {
+        "tangential, L2": "reference",
+        "iterations": solution.iterations,
+        "seconds": median(own),
+    }
+    rows = [
+        row
+        | {
+            "over contactopt": 1.0,
+            "memory [MB]": own_memory(elements),
+            "end": solution.status.label,
+        }
+    ]
     for law, runs in answers.items():
         errors = bench.errors(runs[-1])
         row = {"contacts": bench.problem.contacts, "solver": f"ccx, {law}"}
@@ -83,7 +106,10 @@ def costs(program: str, elements: int, sweep: list[dict[str, Any]]) -> list[dict
         row |= {key: errors[key] for key in ("normal, L2", "tangential, L2")}
         row |= {"iterations": runs[-1].iterations, "seconds": median(run.seconds for run in runs)}
         row |= {"over contactopt": median(run.seconds / t for run, t in zip(runs, own))}
-        row |= {"memory [MB]": median(run.memory for run in runs), "end": runs[-1].failure or "converged"}
+        row |= {
+            "memory [MB]": median(run.memory for run in runs),
+            "end": runs[-1].failure or "converged",
+        }
         rows.append(row)
     return rows
 
@@ -114,7 +140,9 @@ def own_memory(elements: int) -> float:
     """Peak memory of a fresh process of contactopt, Python and its packages included [MB]."""
     arguments = [sys.executable, "-c", MEMORY, str(elements)]
     folder = Path(__file__).parents[3]
-    return float(subprocess.run(arguments, capture_output=True, text=True, check=True, cwd=folder).stdout)
+    return float(
+        subprocess.run(arguments, capture_output=True, text=True, check=True, cwd=folder).stdout
+    )
 
 
 def version(program: str) -> str:
@@ -129,10 +157,21 @@ def decay(sweep: list[dict[str, Any]], law: str) -> str:
     slope = np.polyfit(*np.log([[row["factor"], row["normal, L2"]] for row in straight]).T, 1)[0]
     best = min(good, key=lambda row: row["normal, L2"])
     cut = [f"{row['factor']:.0e}" for row in good if row["attempts"] > 1]
-    lost = [f"{row['factor']:.0e}" for row in sweep if row["contact"] == law and row["end"] != "converged"]
-    text = f"With {law} contact it falls like factor^{slope:.2f} from 10 to 1e5, and is least at {best['factor']:.0e}, {best['normal, L2']:.0e}."
+    lost = [
+        f"{row['factor']:.0e}"
+        for row in sweep
+        if row["contact"] == law and row["end"] != "converged"
+    ]
+    text = (
+        f"With {law} contact it falls like factor^{slope:.2f} from 10 to 1e5, and is least at"
+        f" {best['factor']:.0e}, {best['normal, L2']:.0e}."
+    )
     text += f" ccx needed more than one attempt at {' and '.join(cut)}." if cut else ""
-    return text + (f" It did not converge at {' and '.join(lost)}." if lost else " It converged at every factor.")
+    return text + (
+        f" It did not converge at {' and '.join(lost)}."
+        if lost
+        else " It converged at every factor."
+    )
 
 
 def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict[str, Any]]) -> str:
@@ -140,15 +179,15 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
     agreement = f"there was no answer ({mortar['end']})"
     if mortar["end"] == "converged":
         agreement = (
-            f"the nodal forces differ from contactopt's by {mortar['normal, largest']:.1e} (normal) and "
-            f"{mortar['tangential, largest']:.1e} (tangential) of their peak"
+            f"the nodal forces differ from contactopt's by {mortar['normal, largest']:.1e} (normal)"
+            f" and {mortar['tangential, largest']:.1e} (tangential) of their peak"
         )
     same = max(row["same law"] for row in converged(sweep, "node-to-surface"))
     size = max(row["contacts"] for row in cost)
     own, *others = (row for row in cost if row["contacts"] == size)
     prices = " ".join(
-        f"ccx with {row['solver'].removeprefix('ccx, ')} contact takes {row['over contactopt']:.0f} times as long, {row['iterations']} "
-        f"iterations and {row['memory [MB]']:.0f} MB."
+        f"ccx with {row['solver'].removeprefix('ccx, ')} contact takes {row['over contactopt']:.0f}"
+        f" times as long, {row['iterations']} iterations and {row['memory [MB]']:.0f} MB."
         for row in others
     )
     return f"""1. **Two independent codes agree.** For bonded bodies all displacements differ by {check["displacements, largest difference"]:.0e} of the largest: mesh,
@@ -163,24 +202,29 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
 
 TEXT = """{findings}
 
-**The scene.** It is the 2D punch: half a model in plane strain, with a rigid plate that is glued to its top and pressed with 100 N. The foundation
-is clamped below. mu = {mu}, and there are {contacts} contacts. CalculiX {version} (called ccx below) has the very same nodes and elements, by a deck that is written from
-the meshes. It expands its element CPE4 into one layer of bricks C3D8 that is as thick as the section. With full integration and no
-incompatible modes, this is our bilinear element. Mortar contact needs these bricks written out in the deck.
+**The scene.** It is the 2D punch: half a model in plane strain, with a rigid plate that is glued to
+its top and pressed with 100 N. The foundation is clamped below. mu = {mu}, and there are {contacts}
+contacts. CalculiX {version} (called ccx below) has the very same nodes and elements, by a deck that
+is written from the meshes. It expands its element CPE4 into one layer of bricks C3D8 that is as
+thick as the section. With full integration and no incompatible modes, this is our bilinear element.
+Mortar contact needs these bricks written out in the deck.
 
-The material is stiff (E = {modulus:g} MPa). The forces of contactopt do not depend on E. With strains of 1e-7 the comparison does not depend
-on what ccx does to displaced surfaces, which the third table shows. There is one static step with the full load in one increment. ccx may cut
-it down to {least:g} of the load, by its default criteria. The upper body is the slave. The master is the whole top of the foundation, because
-nodes would slide over the edge of a master that is as wide as the punch. For every contact law the nodal forces are integrated from
-the stresses that ccx prints with seven digits. contactopt solves to a certificate of 1e-11.
+The material is stiff (E = {modulus:g} MPa). The forces of contactopt do not depend on E. With
+strains of 1e-7 the comparison does not depend on what ccx does to displaced surfaces, which the
+third table shows. There is one static step with the full load in one increment. ccx may cut it down
+to {least:g} of the load, by its default criteria. The upper body is the slave. The master is the
+whole top of the foundation, because nodes would slide over the edge of a master that is as wide as
+the punch. For every contact law the nodal forces are integrated from the stresses that ccx prints
+with seven digits. contactopt solves to a certificate of 1e-11.
 
 **Bonded, without contact.** The differences are relative to the largest value:
 
 {{linear}}
 
-**With contact.** The penalty stiffness is K = factor E / h, and the stick slope is K / 10, which the manual advises. Mortar contact has no normal
-factor, and its stick slope is {rigid:.0e} E / h. The table has the differences of the nodal forces from those of contactopt: the largest one over
-the peak, and the one in L2. The other columns are:
+**With contact.** The penalty stiffness is K = factor E / h, and the stick slope is K / 10, which
+the manual advises. Mortar contact has no normal factor, and its stick slope is {rigid:.0e} E / h.
+The table has the differences of the nodal forces from those of contactopt: the largest one over the
+peak, and the one in L2. The other columns are:
 
 - `force`: the relative error of the total normal force, which is an error of equilibrium;
 - `approach`: the relative error of the plate's displacement;
@@ -191,22 +235,25 @@ the peak, and the one in L2. The other columns are:
 
 {{rows}}
 
-**Softer bodies.** The table has the same L2 differences at the factor 1e3. Those of node-to-surface contact grow with the displacements, even
-without NLGEOM. This suggests that its normals turn with the surfaces. Surface-to-surface contact, mortar contact and contactopt do
-not depend on the displacements.
+**Softer bodies.** The table has the same L2 differences at the factor 1e3. Those of node-to-surface
+contact grow with the displacements, even without NLGEOM. This suggests that its normals turn with
+the surfaces. Surface-to-surface contact, mortar contact and contactopt do not depend on the
+displacements.
 
 {{strain}}
 
-**Time and memory.** The table has medians of {repeats} runs in turn on one thread. The ratio is the median of the ratios. ccx runs at the
-most accurate factor of the second table at which one attempt was enough. Its time is the one that it states. It leaves out the start
-of the process, and includes reading the deck and writing the results. The time of contactopt covers meshes, assembly, reduction,
-solution and stresses. It leaves out the import of Python packages. The memory is the peak of the process: of ccx, or of Python with all
-packages that contactopt loads.
+**Time and memory.** The table has medians of {repeats} runs in turn on one thread. The ratio is the
+median of the ratios. ccx runs at the most accurate factor of the second table at which one attempt
+was enough. Its time is the one that it states. It leaves out the start of the process, and includes
+reading the deck and writing the results. The time of contactopt covers meshes, assembly, reduction,
+solution and stresses. It leaves out the import of Python packages. The memory is the peak of the
+process: of ccx, or of Python with all packages that contactopt loads.
 
 {{costs}}
 
-**What was left out.** Massless contact of ccx is for explicit dynamics only, so it has no row. ccx {version} does not return from mortar
-contact if a slave node is held in two directions. Therefore a stiff spring holds one of them.
+**What was left out.** Massless contact of ccx is for explicit dynamics only, so it has no row. ccx
+{version} does not return from mortar contact if a slave node is held in two directions. Therefore a
+stiff spring holds one of them.
 """
 
 
@@ -222,11 +269,21 @@ def figure(bench: Bench, sweep: list[dict[str, Any]]) -> Any:
     own = [softened(bench.problem, bench.scene, f) for f in factors]
     for i, (component, line) in enumerate((("normal", "-"), ("tangential", "--"))):
         error = [difference(r[:, i], bench.exact.reactions[:, i])[1] for r in own]
-        axes[0].loglog(factors, error, line, color="0.6", label=f"{component}, same law in contactopt", zorder=0)
+        axes[0].loglog(
+            factors,
+            error,
+            line,
+            color="0.6",
+            label=f"{component}, same law in contactopt",
+            zorder=0,
+        )
     for law, colour in zip(DECADES, (BLUE, ORANGE)):
         good = converged(sweep, law)
         lost = [row for row in sweep if row["contact"] == law and row["end"] != "converged"]
-        for component, style in (("normal", {"marker": "o"}), ("tangential", {"marker": "s", "mfc": "none"})):
+        for component, style in (
+            ("normal", {"marker": "o"}),
+            ("tangential", {"marker": "s", "mfc": "none"}),
+        ):
             points = [(row["factor"], row[f"{component}, L2"]) for row in good]
             axes[0].loglog(*zip(*points), ls="", color=colour, label=f"{component}, {law}", **style)
         for axis, key in zip(axes[1:], ("iterations", "seconds")):
@@ -236,10 +293,22 @@ def figure(bench: Bench, sweep: list[dict[str, Any]]) -> Any:
                     axis.loglog(*zip(*points), ls="", marker=marker, color=colour, label=label)
     for row in converged(sweep, "mortar"):
         for axis, key in zip(axes, ("normal, L2", "iterations", "seconds")):
-            axis.axhline(row[key], color=GREEN, ls=":", label="normal, mortar" if axis is axes[0] else "mortar")
-    for axis, title in zip(axes, ("L2 error of nodal forces [-]", "iterations of ccx", "time of ccx [s]")):
+            axis.axhline(
+                row[key],
+                color=GREEN,
+                ls=":",
+                label="normal, mortar" if axis is axes[0] else "mortar",
+            )
+    for axis, title in zip(
+        axes, ("L2 error of nodal forces [-]", "iterations of ccx", "time of ccx [s]")
+    ):
         axis.set(xlabel="penalty factor K h / E [-]", ylabel=title)
-        axis.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncol=2 if axis is axes[0] else 1)
+        axis.legend(
+            fontsize=8,
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            ncol=2 if axis is axes[0] else 1,
+        )
         axis.grid(alpha=0.3)
     return drawing
 

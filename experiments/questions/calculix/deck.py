@@ -1,10 +1,12 @@
-"""Input decks of CalculiX (ccx) from scenes in plane strain: the same nodes, elements, supports and plate.
+"""Input decks of CalculiX (ccx) from scenes in plane strain: the same nodes, elements, supports and
+plate.
 
-Nodes and elements are numbered from 1, upper body first. Elements are CPE4, which ccx expands into one layer of bricks
-C3D8 as thick as the section, displacements across the layer held: 2 x 2 x 2 points, no incompatible modes (those are
-C3D8I), hence our bilinear element. Mortar contact refuses the expansion's constraints on its surfaces; there we write
-the layer of bricks ourselves. A half model carries half of the force: ccx knows nothing of `copies`.
-Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL.
+Nodes and elements are numbered from 1, upper body first. Elements are CPE4, which ccx expands into
+one layer of bricks C3D8 as thick as the section, displacements across the layer held: 2 x 2 x 2
+points, no incompatible modes (those are C3D8I), hence our bilinear element. Mortar contact refuses
+the expansion's constraints on its surfaces; there we write the layer of bricks ourselves. A half
+model carries half of the force: ccx knows nothing of `copies`. Source: G. Dhondt, CalculiX CrunchiX
+USER'S MANUAL.
 """
 
 from __future__ import annotations
@@ -18,18 +20,22 @@ import numpy as np
 from contactopt import InputError, Part, Plate, Scene
 
 LAWS = ("bonded", "node-to-surface", "surface-to-surface", "mortar")
-TENSION = 1e-9  # of ccx's smoothed law at large gaps, over the mean pressure; it shifts the pressure by as much
+# of ccx's smoothed law at large gaps, over the mean pressure; it shifts the pressure by as much
+TENSION = 1e-9
 LEAST = 0.05  # increment of the load at which ccx gives up; the first is the whole load
-SPRING = 1e6  # stiffness that stands for a support where mortar contact allows none, over E thickness
+# stiffness that stands for a support where mortar contact allows none, over E thickness
+SPRING = 1e6
 
 
 @dataclass(frozen=True)
 class Contact:
-    """law, one of LAWS; pressure per penetration and traction per slip before sliding [stress / length], both for penalty.
+    """law, one of LAWS; pressure per penetration and traction per slip before sliding [stress /
+    length], both for penalty.
 
-    Mortar contact is hard in the normal direction and takes the `stick` slope only. `master` is the boundary of the lower
-    body on which the contact boundary of the upper one rests; '' for the contact boundary of its own. With friction it must
-    reach further: a node that slides over its edge is lost.
+    Mortar contact is hard in the normal direction and takes the `stick` slope only. `master` is the
+    boundary of the lower body on which the contact boundary of the upper one rests; '' for the
+    contact boundary of its own. With friction it must reach further: a node that slides over its
+    edge is lost.
     """
 
     law: str
@@ -40,7 +46,9 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Both bodies as one mesh: points (2, N), quads (4, M) anticlockwise, and the first node and element of each body."""
+    """Both bodies as one mesh: points (2, N), quads (4, M) anticlockwise, and the first node and
+    element of each body.
+    """
 
     scene: Scene
     meshes: tuple[Any, Any]
@@ -52,7 +60,9 @@ class Model:
     def nodes(self, body: int, boundary: str) -> np.ndarray:
         """Indices into `points` of a body's named boundary."""
         mesh = self.meshes[body]
-        return np.unique(mesh.facets[:, np.asarray(mesh.boundaries[boundary])]) + self.first_node[body]
+        return (
+            np.unique(mesh.facets[:, np.asarray(mesh.boundaries[boundary])]) + self.first_node[body]
+        )
 
     def faces(self, body: int, boundary: str) -> list[tuple[int, int]]:
         """Elements (indices into `quads`) and their sides, 0 to 3, on a body's named boundary."""
@@ -66,10 +76,14 @@ class Model:
 
 
 def model(scene: Scene, elements: int | None = None) -> Model:
-    """Number a scene of two elastic bodies in plane strain; InputError for what the deck cannot say."""
+    """Number a scene of two elastic bodies in plane strain; InputError for what the deck cannot
+    say.
+    """
     parts = scene.upper, scene.lower
     if scene.kind != "plane-strain" or scene.degree != 1 or scene.law != "coulomb":
-        raise InputError("the deck is written for unilateral contact in plane strain at degree 1 only.")
+        raise InputError(
+            "the deck is written for unilateral contact in plane strain at degree 1 only."
+        )
     if not all(isinstance(part, Part) for part in parts):
         raise InputError("the deck needs two elastic bodies; make the rigid one elastic.")
     count = scene.elements if elements is None else elements
@@ -98,14 +112,19 @@ def deck(bodies: Model, contact: Contact) -> str:
         *(_equation([(node, component, 1.0), (driven[0], component, -1.0)]) for node in driven[1:]),
         *(_bond(bodies, held) if contact.law == "bonded" else _contact(bodies, contact)),
         f"*STEP\n*STATIC\n1., 1., {LEAST}",
-        f"*CLOAD\n{driven[0] + 1}, {component + 1}, {_number(_force(bodies.scene) / bodies.scene.copies)}",
+        (
+            f"*CLOAD\n{driven[0] + 1}, {component + 1},"
+            f" {_number(_force(bodies.scene) / bodies.scene.copies)}"
+        ),
         "*NODE PRINT, NSET=PLANE\nU\n*EL PRINT, ELSET=BODIES\nS\n*END STEP",
     ]
     return "\n".join(blocks) + "\n"
 
 
 def _number(value: float) -> str:
-    """At most 20 characters, as ccx reads them, and with a decimal point, without which *SPRING takes it for a component."""
+    """At most 20 characters, as ccx reads them, and with a decimal point, without which *SPRING
+    takes it for a component.
+    """
     return f"{value:.12e}"
 
 
@@ -119,7 +138,9 @@ def _both_layers(bodies: Model, nodes: np.ndarray, layered: bool) -> np.ndarray:
 
 
 def _mesh(bodies: Model, layered: bool) -> str:
-    """Nodes, elements, materials, and the sets PLANE (the nodes of the plane) and BODIES (all elements)."""
+    """Nodes, elements, materials, and the sets PLANE (the nodes of the plane) and BODIES (all
+    elements).
+    """
     count, thickness = bodies.points.shape[1], bodies.scene.thickness
     lines = ["*NODE, NSET=PLANE"]
     lines += [f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(bodies.points.T, 1)]
@@ -131,25 +152,39 @@ def _mesh(bodies: Model, layered: bool) -> str:
         ]
     corners = np.vstack([bodies.quads, bodies.quads + count]) if layered else bodies.quads
     ends = (*bodies.first_element[1:], bodies.quads.shape[1])
-    for name, start, end, part in zip("UL", bodies.first_element, ends, (bodies.scene.upper, bodies.scene.lower)):
+    for name, start, end, part in zip(
+        "UL", bodies.first_element, ends, (bodies.scene.upper, bodies.scene.lower)
+    ):
         assert isinstance(part, Part)
         lines.append(f"*ELEMENT, TYPE={'C3D8' if layered else 'CPE4'}, ELSET={name}")
         lines += [f"{i + 1}, {_list(corners[:, i] + 1)}" for i in range(start, end)]
-        lines.append(f"*MATERIAL, NAME={name}\n*ELASTIC\n{_number(part.material.E)}, {_number(part.material.nu)}")
+        lines.append(
+            f"*MATERIAL, NAME={name}\n*ELASTIC\n{_number(part.material.E)},"
+            f" {_number(part.material.nu)}"
+        )
         lines.append(f"*SOLID SECTION, ELSET={name}, MATERIAL={name}\n{_number(thickness)}")
     return "\n".join([*lines, "*ELSET, ELSET=BODIES\nU, L"])
 
 
 def _held(bodies: Model) -> dict[tuple[int, int], float]:
-    """(node, component) -> prescribed displacement, of supports and of the plate's directions that do not move."""
+    """(node, component) -> prescribed displacement, of supports and of the plate's directions that
+    do not move.
+    """
     held = {}
     components = bodies.scene.components
     for body, part in enumerate((bodies.scene.upper, bodies.scene.lower)):
         assert isinstance(part, Part)
         for support in part.supports:
-            values = dict.fromkeys(components, 0.0) if support.displacement is None else support.displacement
+            values = (
+                dict.fromkeys(components, 0.0)
+                if support.displacement is None
+                else support.displacement
+            )
             for name, value in values.items():
-                held |= {(int(n), components.index(name)): value for n in bodies.nodes(body, support.boundary)}
+                held |= {
+                    (int(n), components.index(name)): value
+                    for n in bodies.nodes(body, support.boundary)
+                }
     plate, component = _plate(bodies.scene)
     return held | {(int(n), 1 - component): 0.0 for n in bodies.nodes(0, plate.boundary)}
 
@@ -158,8 +193,15 @@ def _plate(scene: Scene) -> tuple[Plate, int]:
     """The plate on the upper body and the component in which it moves."""
     assert isinstance(scene.upper, Part)
     loads = scene.upper.loads + (scene.lower.loads if isinstance(scene.lower, Part) else ())
-    if len(loads) != 1 or not isinstance(loads[0], Plate) or not scene.upper.loads or len(loads[0].force) != 1:
-        raise InputError("the deck needs one load: a plate on the upper body, with a force in one component.")
+    if (
+        len(loads) != 1
+        or not isinstance(loads[0], Plate)
+        or not scene.upper.loads
+        or len(loads[0].force) != 1
+    ):
+        raise InputError(
+            "the deck needs one load: a plate on the upper body, with a force in one component."
+        )
     if not loads[0].glued:
         raise InputError("the deck is written for a plate that is glued to the body.")
     return loads[0], scene.components.index(next(iter(loads[0].force)))
@@ -172,7 +214,8 @@ def _force(scene: Scene) -> float:
 def _boundaries(bodies: Model, held: dict[tuple[int, int], float], layered: bool) -> list[str]:
     """Supports in the plane and, of bricks, across it.
 
-    ccx 2.20 never returns from mortar contact if a slave node is held in two directions: a stiff spring holds the second.
+    ccx 2.20 never returns from mortar contact if a slave node is held in two directions: a stiff
+    spring holds the second.
     """
     count = bodies.points.shape[1]
     lines = ["*BOUNDARY"]
@@ -182,14 +225,19 @@ def _boundaries(bodies: Model, held: dict[tuple[int, int], float], layered: bool
     if not layered:
         return ["\n".join(lines)]
     slaves = bodies.nodes(0, _part(bodies, 0).contact)
-    sprung = _both_layers(bodies, np.array([n for n in slaves if (n, 0) in held or (n, 1) in held], dtype=int), True)
+    sprung = _both_layers(
+        bodies, np.array([n for n in slaves if (n, 0) in held or (n, 1) in held], dtype=int), True
+    )
     lines += [f"{n + 1}, 3, 3" for n in np.setdiff1d(np.arange(2 * count), sprung)]
     if not len(sprung):
         return ["\n".join(lines)]
     springs = ["*ELEMENT, TYPE=SPRING1, ELSET=ACROSS"]
     springs += [f"{i}, {n + 1}" for i, n in enumerate(sprung, bodies.quads.shape[1] + 1)]
     stiffness = SPRING * _part(bodies, 0).material.E * bodies.scene.thickness
-    return ["\n".join(lines), "\n".join([*springs, f"*SPRING, ELSET=ACROSS\n3\n{_number(stiffness)}"])]
+    return [
+        "\n".join(lines),
+        "\n".join([*springs, f"*SPRING, ELSET=ACROSS\n3\n{_number(stiffness)}"]),
+    ]
 
 
 def _part(bodies: Model, body: int) -> Part:
@@ -200,7 +248,9 @@ def _part(bodies: Model, body: int) -> Part:
 
 def _equation(terms: list[tuple[int, int, float]]) -> str:
     """sum factor * displacement = 0; the first unknown is eliminated."""
-    return f"*EQUATION\n{len(terms)}\n" + _list(f"{n + 1}, {c + 1}, {factor}" for n, c, factor in terms)
+    return f"*EQUATION\n{len(terms)}\n" + _list(
+        f"{n + 1}, {c + 1}, {factor}" for n, c, factor in terms
+    )
 
 
 def _bond(bodies: Model, held: dict[tuple[int, int], float]) -> list[str]:
@@ -221,7 +271,9 @@ def _contact(bodies: Model, contact: Contact) -> list[str]:
     blocks = []
     for body, name in enumerate(("UPPER", "LOWER")):
         faces = bodies.faces(body, (contact.master if body else "") or _part(bodies, body).contact)
-        blocks.append(f"*SURFACE, NAME={name}\n" + "\n".join(f"{e + 1}, S{s + side}" for e, s in faces))
+        blocks.append(
+            f"*SURFACE, NAME={name}\n" + "\n".join(f"{e + 1}, S{s + side}" for e, s in faces)
+        )
     scene, slaves = bodies.scene, bodies.points[0, bodies.nodes(0, _part(bodies, 0).contact)]
     blocks.append("*SURFACE INTERACTION, NAME=LAW")
     if contact.law != "mortar":
@@ -230,5 +282,7 @@ def _contact(bodies: Model, contact: Contact) -> list[str]:
         blocks.append(f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{line}")
     if scene.mu > 0:
         blocks.append(f"*FRICTION\n{_number(scene.mu)}, {_number(contact.stick)}")
-    kind = contact.law.replace("-", " ").upper() + (", SMALL SLIDING" if contact.law == "node-to-surface" else "")
+    kind = contact.law.replace("-", " ").upper() + (
+        ", SMALL SLIDING" if contact.law == "node-to-surface" else ""
+    )
     return [*blocks, f"*CONTACT PAIR, INTERACTION=LAW, TYPE={kind}\nUPPER, LOWER"]

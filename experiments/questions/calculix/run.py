@@ -1,4 +1,6 @@
-"""One run of CalculiX (ccx) beside contactopt: start it with limits, read what it printed, compare nodal forces."""
+"""One run of CalculiX (ccx) beside contactopt: start it with limits, read what it printed, compare
+nodal forces.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +33,10 @@ GAUSS = (1 - 1 / np.sqrt(3)) / 2
 class Run:
     """One run of ccx. failure is '' if it reached the whole load, and then:
 
-    displacement (2, N) [mm], nodal forces (n,) on each body [N], reactions on the upper and minus those on the lower body,
-    each (k, 2) [N] as in contactopt.Solution where nodes match. Iterations and seconds are known in any case: seconds as ccx says (its start excluded, reading the
-    deck and writing results included), wall with its start, memory [MB] at the peak.
+    displacement (2, N) [mm], nodal forces (n,) on each body [N], reactions on the upper and minus
+    those on the lower body, each (k, 2) [N] as in contactopt.Solution where nodes match. Iterations
+    and seconds are known in any case: seconds as ccx says (its start excluded, reading the deck and
+    writing results included), wall with its start, memory [MB] at the peak.
     """
 
     failure: str
@@ -53,9 +56,13 @@ def punch(elements: int = ELEMENTS, modulus: float = STIFF, mu: float = MU) -> S
 
 
 def penalty(scene: Scene, law: str, factor: float) -> Contact:
-    """The law of a dimensionless factor: stiffness = factor E / h, h the length of an element on the contact."""
+    """The law of a dimensionless factor: stiffness = factor E / h, h the length of an element on
+    the contact.
+    """
     stiffness = factor * scene.upper.material.E * scene.elements / 20.0
-    return Contact(law, stiffness, stiffness if law == "mortar" else STICK * stiffness, master="top")
+    return Contact(
+        law, stiffness, stiffness if law == "mortar" else STICK * stiffness, master="top"
+    )
 
 
 def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> Run:
@@ -80,12 +87,18 @@ def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> 
         cycles = _rows(folder / "job.cvg", 4)
         attempts = _rows(folder / "job.sta", 2)
         failure = _failure(process.returncode, log_text, wall >= LIMIT)
-        displacement, forces, reactions = np.zeros((2, 0)), (np.zeros(0),) * 2, (np.zeros((0, 2)),) * 2
+        displacement, forces, reactions = (
+            np.zeros((2, 0)),
+            (np.zeros(0),) * 2,
+            (np.zeros((0, 2)),) * 2,
+        )
         if not failure:
             tables = printed(folder / "job.dat")
             displacement = tables["displacements"][:, 1:3].T
             forces = tuple(_forces(bodies, reduction, tables["stresses"]))
-            reactions = tuple((B @ force).reshape(-1, 2) for B, force in zip(reduction.maps, forces))
+            reactions = tuple(
+                (B @ force).reshape(-1, 2) for B, force in zip(reduction.maps, forces)
+            )
     seconds = re.search(r"Total CalculiX Time:\s*([\d.]+)", log_text)
     spent = float(seconds[1]) if seconds else wall
     return Run(failure, cycles, attempts, spent, wall, memory, displacement, forces, reactions)
@@ -131,27 +144,38 @@ def printed(path: Path) -> dict[str, np.ndarray]:
 
 
 def _forces(bodies: Model, reduction: Reduction, stresses: np.ndarray) -> list[np.ndarray]:
-    """Nodal forces (n,) on each body from the stresses in the integration points, f_i = int sigma : grad phi_i.
+    """Nodal forces (n,) on each body from the stresses in the integration points, f_i = int sigma :
+    grad phi_i.
 
-    They need neither our stiffness nor ccx's contact law, and keep the seven digits that differences of printed
-    displacements would lose. Both layers of points of a brick count half. Held components carry the support's force and
-    are left out.
+    They need neither our stiffness nor ccx's contact law, and keep the seven digits that
+    differences of printed displacements would lose. Both layers of points of a brick count half.
+    Held components carry the support's force and are left out.
     """
     scene = bodies.scene
     mesh = skfem.MeshQuad(bodies.points, bodies.quads)
     points = np.array([[GAUSS, 1 - GAUSS, GAUSS, 1 - GAUSS], [GAUSS, GAUSS, 1 - GAUSS, 1 - GAUSS]])
-    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementQuad1()), quadrature=(points, np.full(4, 0.25)))
-    layers = stresses[: 8 * bodies.quads.shape[1], 2:].reshape(-1, 2, 4, 6)  # xx, yy, zz, xy, xz, yz
+    basis = skfem.Basis(
+        mesh, skfem.ElementVector(skfem.ElementQuad1()), quadrature=(points, np.full(4, 0.25))
+    )
+    # xx, yy, zz, xy, xz, yz
+    layers = stresses[: 8 * bodies.quads.shape[1], 2:].reshape(-1, 2, 4, 6)
     xx, yy, _, xy, _, _ = np.moveaxis(layers.mean(axis=1), 2, 0)
     form = skfem.LinearForm(
-        lambda v, w: w.xx * v.grad[0, 0] + w.yy * v.grad[1, 1] + w.xy * (v.grad[0, 1] + v.grad[1, 0])
+        lambda v, w: (
+            w.xx * v.grad[0, 0] + w.yy * v.grad[1, 1] + w.xy * (v.grad[0, 1] + v.grad[1, 0])
+        )
     )
-    force = form.assemble(basis, xx=xx, yy=yy, xy=xy)[basis.nodal_dofs] * scene.thickness * scene.copies
+    force = (
+        form.assemble(basis, xx=xx, yy=yy, xy=xy)[basis.nodal_dofs] * scene.thickness * scene.copies
+    )
     return _by_body(bodies, reduction, force)
 
 
-def _by_body(bodies: Model, reduction: Reduction, values: np.ndarray, free: bool = True) -> list[np.ndarray]:
-    """Values (2, points) of all nodes of the model as vectors (n,) of each body, zero on its unknowns that are held.
+def _by_body(
+    bodies: Model, reduction: Reduction, values: np.ndarray, free: bool = True
+) -> list[np.ndarray]:
+    """Values (2, points) of all nodes of the model as vectors (n,) of each body, zero on its
+    unknowns that are held.
 
     The latter only where `free`; otherwise the values on all unknowns are kept.
     """
@@ -168,11 +192,15 @@ def _by_body(bodies: Model, reduction: Reduction, values: np.ndarray, free: bool
 def difference(values: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
     """Largest, over the peak, and in L2, over the norm."""
     gap = values - exact
-    return float(np.abs(gap).max() / np.abs(exact).max()), float(np.linalg.norm(gap) / np.linalg.norm(exact))
+    return float(np.abs(gap).max() / np.abs(exact).max()), float(
+        np.linalg.norm(gap) / np.linalg.norm(exact)
+    )
 
 
 def linear(program: str) -> dict[str, Any]:
-    """The bodies bonded at the contact nodes, in both codes: all displacements and the forces that hold them together."""
+    """The bodies bonded at the contact nodes, in both codes: all displacements and the forces that
+    hold them together.
+    """
     scene = punch()
     bodies, reduction = model(scene), reduce_bodies(scene)
     answer = run(program, bodies, reduction, Contact("bonded"))
@@ -181,8 +209,11 @@ def linear(program: str) -> dict[str, Any]:
     problem = reduction.problem.explicit()
     plates = len(problem.s)
     matrix = np.block([[problem.Q, problem.V], [problem.V.T, np.zeros((plates, plates))]])
-    # the component held by symmetry in both bodies has no compliance: least squares give it no force
-    unknowns = np.linalg.lstsq(matrix, -np.concatenate([problem.q.ravel(), problem.s]), rcond=None)[0]
+    # the component held by symmetry in both bodies has no compliance: least squares give it no
+    # force
+    unknowns = np.linalg.lstsq(matrix, -np.concatenate([problem.q.ravel(), problem.s]), rcond=None)[
+        0
+    ]
     solution = replace(solve(problem), reactions=unknowns[:-plates].reshape(problem.q.shape))
     solution = replace(solution, multipliers=unknowns[-plates:])
     fields = recover(reduction, solution)
@@ -191,13 +222,19 @@ def linear(program: str) -> dict[str, Any]:
         "nodes": bodies.points.shape[1],
         "elements": bodies.quads.shape[1],
         "displacements, largest difference": difference(answer.displacement, displacement)[0],
-        "normal forces, largest difference": difference(answer.reactions[0][:, 0], solution.reactions[:, 0])[0],
-        "tangential forces, largest difference": difference(answer.reactions[0][:, 1], solution.reactions[:, 1])[0],
+        "normal forces, largest difference": difference(
+            answer.reactions[0][:, 0], solution.reactions[:, 0]
+        )[0],
+        "tangential forces, largest difference": difference(
+            answer.reactions[0][:, 1], solution.reactions[:, 1]
+        )[0],
     }
 
 
 def softened(problem: InterfaceProblem, scene: Scene, factor: float) -> np.ndarray:
-    """Reactions of contactopt under the law of node-to-surface penalty: compliances 1 / (stiffness area) added to Q."""
+    """Reactions of contactopt under the law of node-to-surface penalty: compliances 1 / (stiffness
+    area) added to Q.
+    """
     law = penalty(scene, "node-to-surface", factor)
     added = 1 / np.outer(problem.areas, [law.stiffness, law.stick])
     return solve(replace(problem, Q=problem.Q + np.diag(added.ravel())), tol=1e-11).reactions
@@ -244,10 +281,18 @@ class Bench:
 
     def row(self, law: str, factor: float) -> dict[str, Any]:
         answer = self.run(law, factor)
-        row = {"contact": law, "factor": "none" if law == "mortar" else factor, **self.errors(answer)}
+        row = {
+            "contact": law,
+            "factor": "none" if law == "mortar" else factor,
+            **self.errors(answer),
+        }
         same = ""
         if law == "node-to-surface" and not answer.failure:
             own = softened(self.problem, self.scene, factor)
             same = max(difference(answer.reactions[0][:, i], own[:, i])[0] for i in (0, 1))
-        counts = {"attempts": answer.attempts, "iterations": answer.iterations, "seconds": answer.seconds}
+        counts = {
+            "attempts": answer.attempts,
+            "iterations": answer.iterations,
+            "seconds": answer.seconds,
+        }
         return row | {"same law": same} | counts | {"end": answer.failure or "converged"}

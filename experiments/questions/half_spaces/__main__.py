@@ -1,8 +1,10 @@
-"""What does a half-space cost, and how exact is it: Hertz, Cattaneo-Mindlin, rough surfaces, against Tamaas?
+"""What does a half-space cost, and how exact is it: Hertz, Cattaneo-Mindlin, rough surfaces,
+against Tamaas?
 
-`TAMAAS=/path/to/python python -m experiments.questions.half_spaces` makes every table and the report; names of tables, as in
-`python -m experiments.questions.half_spaces hertz rough`, make these alone and the report from all that are there. Tamaas may live
-in an environment of its own; without TAMAAS this Python is used if it has Tamaas. Set OMP_NUM_THREADS=1.
+`TAMAAS=/path/to/python python -m experiments.questions.half_spaces` makes every table and the
+report; names of tables, as in `python -m experiments.questions.half_spaces hertz rough`, make these
+alone and the report from all that are there. Tamaas may live in an environment of its own; without
+TAMAAS this Python is used if it has Tamaas. Set OMP_NUM_THREADS=1.
 """
 
 from __future__ import annotations
@@ -13,7 +15,12 @@ import sys
 from experiments.questions.half_spaces.exact import cattaneo_rows, hertz_rows, kernel_rows
 from experiments.questions.half_spaces.measured import Row
 from experiments.questions.half_spaces.models import chart_rows, draw_limits, draw_speed, limit_rows
-from experiments.questions.half_spaces.rough import friction_rows, rough_rows, tamaas_rows, wavy_rows
+from experiments.questions.half_spaces.rough import (
+    friction_rows,
+    rough_rows,
+    tamaas_rows,
+    wavy_rows,
+)
 from experiments.report import REPORTS, write
 
 TABLES = {
@@ -30,47 +37,53 @@ TABLES = {
 MISSING: list[Row] = [{"not measured": "run the command below with the name of this table"}]
 
 TEXT = """How accurate and how fast are half-spaces? Every transform has one thread. Times are CPU seconds of the process, on a machine on which other
-programs ran as well. "CPU s, problem" is the time to make the interface problem. "solve" is the time of `contactopt.solve`, with its
-certificate. The tables were made one by one, while other programs ran. Therefore compare times within a table only.
+programs ran as well. "CPU s, problem" is the time to make the interface problem. "solve" is the
+time of `contactopt.solve`, with its certificate. The tables were made one by one, while other
+programs ran. Therefore compare times within a table only.
 
 ## Influence coefficients
 
-An influence coefficient says how far a force on one cell moves another cell. The coefficients of cells of 1 x .7 are compared with adaptive
-quadrature of the point forces. The table has the largest error of all six coefficients, over the largest coefficient there.
+An influence coefficient says how far a force on one cell moves another cell. The coefficients of
+cells of 1 x .7 are compared with adaptive quadrature of the point forces. The table has the largest
+error of all six coefficients, over the largest coefficient there.
 
 {kernels}
 
 ## Hertz: a rigid sphere on a half-space
 
-The square of points is 2.5 contact radii wide. The peak is that of a parabola in r^2, fitted to p^2 within half a contact radius. The width is the
-zero of a line that is fitted to p^2 beyond. For nu = .3 the largest von Mises stress on the axis is .620 p0, at the depth .481 a. It is
-computed from a parabola through nine depths, at the points next to the axis.
+The square of points is 2.5 contact radii wide. The peak is that of a parabola in r^2, fitted to p^2
+within half a contact radius. The width is the zero of a line that is fitted to p^2 beyond. For nu =
+.3 the largest von Mises stress on the axis is .620 p0, at the depth .481 a. It is computed from a
+parabola through nine depths, at the points next to the axis.
 
 {hertz}
 
 ## Cattaneo and Mindlin: two spheres, sheared to half of mu P
 
-The exact formulas hold for nu = 0. For nu = .3 they neglect the friction across the shear. The table then has the deviation from them,
-which converges to a limit of its own, and the distance of both tractions to those with 128 points a radius. The loss is that of a cycle
-of 16 steps.
+The exact formulas hold for nu = 0. For nu = .3 they neglect the friction across the shear. The
+table then has the deviation from them, which converges to a limit of its own, and the distance of
+both tractions to those with 128 points a radius. The loss is that of a cycle of 16 steps.
 
 {cattaneo}
 
 ## Rough surfaces
 
-A rigid rough surface is pressed with a mean pressure of .005 E*. It has at most 16 waves along a side, the Hurst exponent .8, and the rms
-slope .1. It is not periodic. With friction it is sheared to half of mu P, with mu = .3, and all components are coupled. The numbers of products, of Newton
-steps and of their iterations are those on the finest grid. Every row is made by a process of its own. "kB a point" is the growth of its memory, per
-point.
+A rigid rough surface is pressed with a mean pressure of .005 E*. It has at most 16 waves along a
+side, the Hurst exponent .8, and the rms slope .1. It is not periodic. With friction it is sheared
+to half of mu P, with mu = .3, and all components are coupled. The numbers of products, of Newton
+steps and of their iterations are those on the finest grid. Every row is made by a process of its
+own. "kB a point" is the growth of its memory, per point.
 
 {wavy}
 
-The number of Newton's steps hardly grows. Their iterations and the products grow slowly. But without friction they grow by more than 30 %
-from 64 x 64 to 1024 x 1024 points. On the coarsest of these grids a wave has four points only. A likely cause of the growth is that the inverse of the
+The number of Newton's steps hardly grows. Their iterations and the products grow slowly. But
+without friction they grow by more than 30 % from 64 x 64 to 1024 x 1024 points. On the coarsest of
+these grids a wave has four points only. A likely cause of the growth is that the inverse of the
 symbol is cut off at the edges of the contacts.
 
-The next two tables have at most 64 waves along a side, without friction and with it. Friction on 1024 x 1024 points of this surface was
-not measured to its end, because the residual of its Newton steps fell slowly.
+The next two tables have at most 64 waves along a side, without friction and with it. Friction on
+1024 x 1024 points of this surface was not measured to its end, because the residual of its Newton
+steps fell slowly.
 
 {rough}
 
@@ -78,9 +91,10 @@ not measured to its end, because the residual of its Newton steps fell slowly.
 
 ## Tamaas
 
-Tamaas is another code. Its solver of Polonsky, Keer and Rey gets the same gap, load and tolerance, and has its own stopping rule. Both codes
-run one after the other. The certificate of contactopt judges both answers. The time to make the model of Tamaas is not counted. The time
-to make the problem here stands beside the time of the solve.
+Tamaas is another code. Its solver of Polonsky, Keer and Rey gets the same gap, load and tolerance,
+and has its own stopping rule. Both codes run one after the other. The certificate of contactopt
+judges both answers. The time to make the model of Tamaas is not counted. The time to make the
+problem here stands beside the time of the solve.
 
 {tamaas}
 
@@ -90,9 +104,10 @@ to make the problem here stands beside the time of the solve.
 
 ## Where a half-space is wrong
 
-The table has the results of finite elements over those of the half-space. One body is a block of 40 contact radii around the axis, on
-a rigid floor and under a rigid sphere. The other is an elastic half ball under a rigid plate, on rigid ground. All have small
-displacements. For a / R beyond .3 this is an assumption of its own.
+The table has the results of finite elements over those of the half-space. One body is a block of 40
+contact radii around the axis, on a rigid floor and under a rigid sphere. The other is an elastic
+half ball under a rigid plate, on rigid ground. All have small displacements. For a / R beyond .3
+this is an assumption of its own.
 
 {limits}
 """

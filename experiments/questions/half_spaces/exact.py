@@ -15,7 +15,8 @@ from contactopt.coupling.reduction import reduce_bodies
 from contactopt.readings.half_space_readings import subsurface_stress, surface_contact
 from experiments.questions.half_spaces.measured import Row, cpu, solved
 
-PLACES = ((0, 0), (1, 0), (1, 1), (5, 3), (12, 12), (13, 4), (64, 64), (65, 10), (500, 300))  # in cells
+# in cells
+PLACES = ((0, 0), (1, 0), (1, 1), (5, 3), (12, 12), (13, 4), (64, 64), (65, 10), (500, 300))
 CELL = (1.0, 0.7)
 STEPS = 4  # of the path from zero to the largest shear
 
@@ -41,7 +42,9 @@ def kernel_rows() -> list[Row]:
             if place == (0, 0) and pair[0] != pair[1]:
                 continue  # zero because it is odd
             total = 0.0
-            for a, b in ((x, y) for x in (place[0] - 0.5, place[0]) for y in (place[1] - 0.5, place[1])):
+            for a, b in (
+                (x, y) for x in (place[0] - 0.5, place[0]) for y in (place[1] - 0.5, place[1])
+            ):
 
                 def at(y: float, x: float, value: Any = value) -> float:
                     return float(value(x, y, np.hypot(x, y)))
@@ -50,7 +53,9 @@ def kernel_rows() -> list[Row]:
                     at, hx * a, hx * (a + 0.5), hy * b, hy * (b + 0.5), epsabs=1e-15, epsrel=1e-12
                 )[0]  # fmt: skip
             errors.append(abs(made[pair][0, 0] - total / (hx * hy) / (2 * np.pi)) / largest)
-        rows.append({"cells apart": f"{place[0]}, {place[1]}", "largest error, relative": max(errors)})
+        rows.append(
+            {"cells apart": f"{place[0]}, {place[1]}", "largest error, relative": max(errors)}
+        )
     return rows
 
 
@@ -66,7 +71,9 @@ def hertz_rows() -> list[Row]:
     rows: list[Row] = []
     for points in (16, 32, 64, 128, 256):
         scene = scenes.hertz_half_space()
-        row, reduction, solution = solved(replace(scene, lower=replace(scene.lower, points=_box(points))), 1e-10)
+        row, reduction, solution = solved(
+            replace(scene, lower=replace(scene.lower, points=_box(points))), 1e-10
+        )
         exact, problem = scene.reference, reduction.problem
         pressure = solution.reactions[:, 0] / problem.areas
         distance = np.linalg.norm(problem.chart.places, axis=0)
@@ -80,7 +87,9 @@ def hertz_rows() -> list[Row]:
             "peak, rel. error": np.sqrt(fit[-1]) / exact.peak - 1,
             "width, rel. error": np.sqrt(-top / slope) / exact.half_width - 1,
             "approach, rel. error": approach,
-            "order of the approach": np.log2(abs(rows[-1]["approach, rel. error"] / approach)) if rows else np.nan,
+            "order of the approach": np.log2(abs(rows[-1]["approach, rel. error"] / approach))
+            if rows
+            else np.nan,
             "pressure in L2": np.linalg.norm(pressure - exact.pressure(distance))
             / np.linalg.norm(exact.pressure(distance)),
             "von Mises / p0": np.nan,
@@ -92,7 +101,10 @@ def hertz_rows() -> list[Row]:
             below = mises[:, np.argmin(distance)]
             place, curve = _summit(depths, below)
             made |= {"von Mises / p0": curve / exact.peak, "at depth / a": place / exact.half_width}
-        rows.append(made | {"products": row["products"], "CPU s": row["CPU s, problem"] + row["CPU s, solve"]})
+        rows.append(
+            made
+            | {"products": row["products"], "CPU s": row["CPU s, problem"] + row["CPU s, solve"]}
+        )
     return rows
 
 
@@ -103,7 +115,9 @@ def _summit(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 
 def cattaneo_rows() -> list[Row]:
-    """Cattaneo and Mindlin, sheared to half of mu P at nu = 0, where they are exact, and at nu = .3."""
+    """Cattaneo and Mindlin, sheared to half of mu P at nu = 0, where they are exact, and at nu =
+    .3.
+    """
     rows, tractions = [], {}
     for nu, elements in ((0.0, 32), (0.0, 64), (0.0, 128), (0.3, 32), (0.3, 64), (0.3, 128)):
         material = Material(5.0, nu)
@@ -123,12 +137,16 @@ def cattaneo_rows() -> list[Row]:
                 "nu": nu,
                 "points a radius": elements,
                 "c / a": np.sqrt(numbers.stick_area / numbers.area),
-                "c / a, rel. to exact": np.sqrt(numbers.stick_area / numbers.area) / 0.5 ** (1 / 3) - 1,
-                "q in L2, rel. to exact": np.linalg.norm(-r[:, 1] / problem.areas - shear) / np.linalg.norm(shear),
+                "c / a, rel. to exact": np.sqrt(numbers.stick_area / numbers.area) / 0.5 ** (1 / 3)
+                - 1,
+                "q in L2, rel. to exact": np.linalg.norm(-r[:, 1] / problem.areas - shear)
+                / np.linalg.norm(shear),
                 "across / along": np.abs(r[:, 2]).sum() / np.abs(r[:, 1]).sum(),
                 "shift": float(solution.multipliers[0]),
                 "shift, rel. to exact": solution.multipliers[0] / exact.shift - 1,
-                "loss, rel. to exact": np.nan if work is None else (work[-1] - work[STEPS]) / loss - 1,
+                "loss, rel. to exact": np.nan
+                if work is None
+                else (work[-1] - work[STEPS]) / loss - 1,
                 "CPU s": seconds + spent,
             }
         )
@@ -136,7 +154,9 @@ def cattaneo_rows() -> list[Row]:
         own, finest = tractions[row["nu"], row["points a radius"]], tractions[row["nu"], 128]
         ratio = len(finest) // len(own)
         means = finest.reshape(len(own), ratio, len(own), ratio, 2).mean(axis=(1, 3))
-        row["q in L2, rel. to finest"] = np.linalg.norm(own - means) / np.linalg.norm(means) if ratio > 1 else np.nan
+        row["q in L2, rel. to finest"] = (
+            np.linalg.norm(own - means) / np.linalg.norm(means) if ratio > 1 else np.nan
+        )
     return rows
 
 
@@ -144,5 +164,11 @@ def _cycle(scene: Any) -> Any:
     upper = scene.upper
     assert isinstance(upper, HalfSpace)
     rising = np.linspace(0, 1, STEPS + 1)
-    shares = [*rising, *np.linspace(1, -1, 2 * STEPS + 1)[1:], *np.linspace(-1, 1, 2 * STEPS + 1)[1:]]
-    return follow([replace(scene, upper=replace(upper, force={"x": 25.0 * s, "z": -100.0})) for s in shares])
+    shares = [
+        *rising,
+        *np.linspace(1, -1, 2 * STEPS + 1)[1:],
+        *np.linspace(-1, 1, 2 * STEPS + 1)[1:],
+    ]
+    return follow(
+        [replace(scene, upper=replace(upper, force={"x": 25.0 * s, "z": -100.0})) for s in shares]
+    )

@@ -1,4 +1,6 @@
-"""The same Hertz contact by finite elements and by half-spaces: error over time, and where the half-space is wrong."""
+"""The same Hertz contact by finite elements and by half-spaces: error over time, and where the
+half-space is wrong.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,15 @@ WIDE = 40.0  # radius of the block, over the contact radius
 
 def chart_rows() -> list[Row]:
     """Hertz's pressure by finite elements and by half-spaces: error in L2 over CPU seconds."""
-    cases = [("finite elements, axisymmetric", scenes.sphere(rigid="sphere", mu=0.0, elements=n)) for n in (8, 16, 32)]
+    cases = [
+        ("finite elements, axisymmetric", scenes.sphere(rigid="sphere", mu=0.0, elements=n))
+        for n in (8, 16, 32)
+    ]
     cases += [("half-space, 3D", scenes.hertz_half_space(elements=n)) for n in (8, 16, 32, 64, 128)]
     cases += [("half-plane, 2D", _line(n)) for n in (8, 16, 32, 64, 128)]
-    cases += [("finite elements, 3D", scenes.cattaneo(3, shear=0.0, mu=0.1, elements=n)) for n in (3, 4)]
+    cases += [
+        ("finite elements, 3D", scenes.cattaneo(3, shear=0.0, mu=0.1, elements=n)) for n in (3, 4)
+    ]
     return [_pressure_error(*case) for case in cases]
 
 
@@ -35,7 +42,13 @@ def _line(elements: int) -> Scene:
     x = (np.arange(-half, half) + 0.5) * exact.half_width / elements
     rigid = Rigid("cylinder", gap=lambda p: p[0] ** 2 / (2 * RADIUS), force={"y": -1.0})
     return Scene(
-        "line", rigid, HalfSpace("half-plane", MATERIAL, x), 0.0, law="frictionless", elements=elements, reference=exact
+        "line",
+        rigid,
+        HalfSpace("half-plane", MATERIAL, x),
+        0.0,
+        law="frictionless",
+        elements=elements,
+        reference=exact,
     )
 
 
@@ -57,17 +70,23 @@ def _answer(scene: Scene) -> tuple[Any, Solution]:
 
 
 def limit_rows() -> list[Row]:
-    """Approach and peak pressure of bodies that are no half-spaces, over those of Hertz, by axisymmetric finite elements.
+    """Approach and peak pressure of bodies that are no half-spaces, over those of Hertz, by
+    axisymmetric finite elements.
 
-    A block glued to a rigid floor under a rigid sphere gets thinner; a half ball under a rigid plate, on rigid ground, is
-    pressed harder and harder.
+    A block glued to a rigid floor under a rigid sphere gets thinner; a half ball under a rigid
+    plate, on rigid ground, is pressed harder and harder.
     """
     rows = []
     exact = hertz_point(100.0, RADIUS, contact_modulus(MATERIAL))
     for ratio in THICKNESSES:
         a = exact.half_width
         scene = scenes.sphere(
-            rigid="sphere", mu=0.0, lower=MATERIAL, elements=16, foundation_height=ratio * a, foundation_radius=WIDE * a
+            rigid="sphere",
+            mu=0.0,
+            lower=MATERIAL,
+            elements=16,
+            foundation_height=ratio * a,
+            foundation_radius=WIDE * a,
         )
         rows.append(_over_hertz("block", "H / a", ratio, scene))
     for ratio in SLENDER:
@@ -80,8 +99,14 @@ def limit_rows() -> list[Row]:
 def _over_hertz(body: str, size: str, ratio: float, scene: Scene) -> Row:
     result = run(scene)
     exact, summary = scene.reference, result.summary
-    return {"body": body, "size": f"{size} = {ratio:g}", "ratio": ratio, "approach": summary["approach"] / exact.approach,
-            "peak pressure": summary["max_pressure"] / exact.peak, "contact radius": summary["contact_half_width"] / exact.half_width}  # fmt: skip
+    return {
+        "body": body,
+        "size": f"{size} = {ratio:g}",
+        "ratio": ratio,
+        "approach": summary["approach"] / exact.approach,
+        "peak pressure": summary["max_pressure"] / exact.peak,
+        "contact radius": summary["contact_half_width"] / exact.half_width,
+    }
 
 
 def draw_limits(rows: list[Row]) -> Figure:
@@ -90,7 +115,10 @@ def draw_limits(rows: list[Row]) -> Figure:
     for ax, body, label in zip(
         made.subplots(1, 2, sharey=True),
         ("block", "ball"),
-        ("thickness of the block over contact radius, H / a", "contact radius over radius of the ball, a / R"),
+        (
+            "thickness of the block over contact radius, H / a",
+            "contact radius over radius of the ball, a / R",
+        ),
     ):
         own = [row for row in rows if row["body"] == body]
         x = [row["ratio"] for row in own]
@@ -114,20 +142,37 @@ def draw_speed(charts: list[Row], growth: list[Row]) -> Figure:
     """Error over time of all models, and products over the size of the grid."""
     made = Figure(figsize=(11, 4.2), layout="constrained")
     left, right = made.subplots(1, 2)
-    for name, colour in zip(dict.fromkeys(row["model"] for row in charts), (GREY, ORANGE, BLUE, GREEN)):
+    for name, colour in zip(
+        dict.fromkeys(row["model"] for row in charts), (GREY, ORANGE, BLUE, GREEN)
+    ):
         own = [row for row in charts if row["model"] == name]
         left.loglog(
-            [row["CPU s"] for row in own], [row["pressure in L2"] for row in own], "o-", color=colour, label=name
+            [row["CPU s"] for row in own],
+            [row["pressure in L2"] for row in own],
+            "o-",
+            color=colour,
+            label=name,
         )
     left.set(xlabel="CPU seconds", ylabel="error of the pressure in L2 [-]", title="Hertz contact")
     left.legend(frameon=False)
     for law, colour in (("frictionless", BLUE), ("coulomb", ORANGE)):
         own = [row for row in growth if row["law"] == law]
         points = [row["points"] for row in own]
-        right.semilogx(points, [row["products"] for row in own], "o-", color=colour, label=f"{law}: products")
         right.semilogx(
-            points, [row["iterations a step"] for row in own], "o--", color=colour, label=f"{law}: iterations a step"
+            points, [row["products"] for row in own], "o-", color=colour, label=f"{law}: products"
         )
-    right.set(xlabel="points", ylabel="on the finest grid", title="rough surface, 16 waves", ylim=(0, None))
+        right.semilogx(
+            points,
+            [row["iterations a step"] for row in own],
+            "o--",
+            color=colour,
+            label=f"{law}: iterations a step",
+        )
+    right.set(
+        xlabel="points",
+        ylabel="on the finest grid",
+        title="rough surface, 16 waves",
+        ylim=(0, None),
+    )
     right.legend(frameon=False)
     return made

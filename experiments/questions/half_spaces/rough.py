@@ -1,4 +1,6 @@
-"""Spheres and rough surfaces pressed on half-spaces: products, CPU seconds and memory as the grid grows; Tamaas beside it."""
+"""Spheres and rough surfaces pressed on half-spaces: products, CPU seconds and memory as the grid
+grows; Tamaas beside it.
+"""
 
 from __future__ import annotations
 
@@ -40,11 +42,17 @@ def ticks(n: int) -> np.ndarray:
 
 
 def gap_of(kind: str, n: int) -> np.ndarray:
-    """Gap (n, n) of a paraboloid of radius 10, or of a rough surface with 64 waves along a side at most, or 16 ('wavy')."""
+    """Gap (n, n) of a paraboloid of radius 10, or of a rough surface with 64 waves along a side at
+    most, or 16 ('wavy').
+    """
     if kind == "sphere":
         return np.asarray(np.add.outer(ticks(n) ** 2, ticks(n) ** 2) / 20)
     heights = self_affine(
-        (n, n), (LENGTH, LENGTH), longest=LENGTH / 4, shortest=LENGTH / (16 if kind == "wavy" else 64), slope=0.1
+        (n, n),
+        (LENGTH, LENGTH),
+        longest=LENGTH / 4,
+        shortest=LENGTH / (16 if kind == "wavy" else 64),
+        slope=0.1,
     )
     return np.asarray(heights.max() - heights)
 
@@ -54,7 +62,9 @@ def pressed(kind: str, n: int, law: str, shear: float = 0.0, periodic: bool = Fa
     force = 3.0 if kind == "sphere" else 0.005 * contact_modulus(MATERIAL) * LENGTH**2
     load = {"z": -force} | ({"x": shear * MU * force} if shear else {})
     lower = HalfSpace("half-space", MATERIAL, (ticks(n), ticks(n)), periodic=periodic)
-    return Scene(kind, Rigid("body", gap=gap_of(kind, n), force=load), lower, MU, kind="solid", law=law)
+    return Scene(
+        kind, Rigid("body", gap=gap_of(kind, n), force=load), lower, MU, kind="solid", law=law
+    )
 
 
 def one(kind: str, n: int, law: str) -> Row:
@@ -97,7 +107,9 @@ def beside(python: str, kind: str, periodic: bool, tol: float, n: int) -> Row:
         given, answer = Path(folder) / "given.npz", Path(folder) / "answer.npz"
         np.savez(given, gap=gap_of(kind, n), length=LENGTH, pressure=force / LENGTH**2, tol=tol,
                  modulus=contact_modulus(MATERIAL), periodic=periodic)  # fmt: skip
-        subprocess.run([python, "-c", TAMAAS, str(given), str(answer)], check=True, capture_output=True)
+        subprocess.run(
+            [python, "-c", TAMAAS, str(given), str(answer)], check=True, capture_output=True
+        )
         theirs = np.load(answer)
         seconds, pressure = float(theirs["seconds"]), theirs["pressure"]
     r = np.zeros(problem.q.shape)

@@ -15,19 +15,22 @@ from experiments.questions.nonmatching import accuracy, beside, cost, exact  # n
 from experiments.report import merged, write  # noqa: E402
 
 TEXT = """How accurate is contact between meshes whose nodes do not match? contactopt chooses a mortar coupling with dual multipliers for them
-(`contactopt/coupling/mortar.py`). In the tables `a:b` are the numbers of elements of the upper and of the lower body across the contact
-half-width. The finer side carries the contacts, unless a column says otherwise.
+(`contactopt/coupling/mortar.py`). In the tables `a:b` are the numbers of elements of the upper and
+of the lower body across the contact half-width. The finer side carries the contacts, unless a
+column says otherwise.
 
 ## Exact to rounding
 
-A uniform pressure crosses the interface between blocks of quadrilaterals or bricks. The last three columns are ratios of the spacings. The table has
-the largest relative error of the pressure at any contact, whichever side carries the contacts:
+A uniform pressure crosses the interface between blocks of quadrilaterals or bricks. The last three
+columns are ratios of the spacings. The table has the largest relative error of the pressure at any
+contact, whichever side carries the contacts:
 
 {patch}
 
-The next table has the sum of all nodal forces on both bodies, and of their moments. Both are relative to the sum of the sizes of the
-contact forces and to the extent of the bodies. The columns `solved` are for the solution. The columns `random forces` are for random
-contact forces on the same curved surfaces, with none on planes of symmetry:
+The next table has the sum of all nodal forces on both bodies, and of their moments. Both are
+relative to the sum of the sizes of the contact forces and to the extent of the bodies. The columns
+`solved` are for the solution. The columns `random forces` are for random contact forces on the same
+curved surfaces, with none on planes of symmetry:
 
 {equilibrium}
 
@@ -37,54 +40,62 @@ The elastic punch (mu = .2, 32:48) in other units:
 
 ## Against exact solutions
 
-The first table has Hertz contact, of a line and of a point. `p in L2` is the error of the pressure at the contacts, weighted with their areas, over the norm
-of the pressure:
+The first table has Hertz contact, of a line and of a point. `p in L2` is the error of the pressure
+at the contacts, weighted with their areas, over the norm of the pressure:
 
 {hertz}
 
-The second table has Lame's press fit: a quarter of it, with an interference of 1/200 of the radius. Quadratic elements are isoparametric, and the
-true circles are known. There is no friction in the exact solution, whatever mu is. `friction, largest` is the largest friction of any contact, over the
+The second table has Lame's press fit: a quarter of it, with an interference of 1/200 of the radius.
+Quadratic elements are isoparametric, and the true circles are known. There is no friction in the
+exact solution, whatever mu is. `friction, largest` is the largest friction of any contact, over the
 pressure:
 
 {press_fits}
 
-The third table has the rigid punch on a half-space (Spence), with 64 quadratic elements across. It compares the named scene, whose punch
-needs no mesh, with an elastic punch that is 1e7 times as stiff and has a mesh that does not match:
+The third table has the rigid punch on a half-space (Spence), with 64 quadratic elements across. It
+compares the named scene, whose punch needs no mesh, with an elastic punch that is 1e7 times as
+stiff and has a mesh that does not match:
 
 {rigid_punch}
 
-The fourth table has Cattaneo and Mindlin: cylinders are pressed, and then sheared in one step. Errors are root mean squares over several shears, with
-their ratios to those of matching meshes of 20:20. In some rows the meshes have nodes at the edges of stick (three shears, each with its
-own meshes). Matching nodes gain from this, because both bodies have their kinks there, and a finer side does not. In the rows
-`anywhere` there are four shears, on meshes that were made for another shear.
+The fourth table has Cattaneo and Mindlin: cylinders are pressed, and then sheared in one step.
+Errors are root mean squares over several shears, with their ratios to those of matching meshes of
+20:20. In some rows the meshes have nodes at the edges of stick (three shears, each with its own
+meshes). Matching nodes gain from this, because both bodies have their kinks there, and a finer side
+does not. In the rows `anywhere` there are four shears, on meshes that were made for another shear.
 
 {cattaneo}
 
-The same in three dimensions, for a sphere of linear bricks that is pressed by 100 N and sheared by 30 N in one step:
+The same in three dimensions, for a sphere of linear bricks that is pressed by 100 N and sheared by
+30 N in one step:
 
 {solids}
 
 ## The elastic punch
 
-Here mu = .2. The error is that of the force between the axis and a place, over its largest value. The table has its root mean square. The
-reference has matching meshes of {fine} quadrilaterals of the same degree:
+Here mu = .2. The error is that of the force between the axis and a place, over its largest value.
+The table has its root mean square. The reference has matching meshes of {fine} quadrilaterals of
+the same degree:
 
 {elastic_punch}
 
 ## Cost
 
-The time from assembled bodies to certified forces (residual 1e-8) is compared with that of one direct solve of the same two bodies, tied
-together by the same mortar matrices. The solver is SuperLU. Times are medians of {repeats} runs in turn, on a machine with much other
-work. The second ratio counts the CPU seconds of both threads. Meshes, assembly and the making of the coupling come before both, and
-are counted in neither:
+The time from assembled bodies to certified forces (residual 1e-8) is compared with that of one
+direct solve of the same two bodies, tied together by the same mortar matrices. The solver is
+SuperLU. Times are medians of {repeats} runs in turn, on a machine with much other work. The second
+ratio counts the CPU seconds of both threads. Meshes, assembly and the making of the coupling come
+before both, and are counted in neither:
 
 {costs}
 
 ## CalculiX beside
 
-The elastic punch has 48:32 linear elements and E = 5e5. CalculiX (ccx) has the same meshes, with hard mortar contact and with surface-to-surface
-penalty contact (1e3 E / h). The table has the relative differences of its nodal forces from those of contactopt, in L2, on the contact nodes of each
-body. Times are those of one run. The time of contactopt includes meshes and assembly, and the time of ccx is the one that it states.
+The elastic punch has 48:32 linear elements and E = 5e5. CalculiX (ccx) has the same meshes, with
+hard mortar contact and with surface-to-surface penalty contact (1e3 E / h). The table has the
+relative differences of its nodal forces from those of contactopt, in L2, on the contact nodes of
+each body. Times are those of one run. The time of contactopt includes meshes and assembly, and the
+time of ccx is the one that it states.
 
 {beside}
 """
@@ -111,7 +122,9 @@ def main(names: list[str]) -> None:
     tables = {}
     for name, measure in TABLES.items():
         rows = measure() if name in names or not names else []
-        tables[name] = rows or merged("nonmatching", name, [], ()) or [{"CalculiX": "not installed"}]
+        tables[name] = (
+            rows or merged("nonmatching", name, [], ()) or [{"CalculiX": "not installed"}]
+        )
     text = TEXT.replace("{fine}", str(accuracy.FINE)).replace("{repeats}", str(cost.REPEATS))
     write("nonmatching", "Meshes that do not match", text, tables, {})
 

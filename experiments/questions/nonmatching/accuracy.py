@@ -23,7 +23,9 @@ OTHERS = (5.0, 15.0, 25.0, 35.0)
 
 
 def hertz() -> list[dict[str, Any]]:
-    """Line and point; quadratic elements coarse away from the contact, linear ones as in the named scenes."""
+    """Line and point; quadratic elements coarse away from the contact, linear ones as in the named
+    scenes.
+    """
     rows = []
     growth = round_bodies.GROWTH[2]
     for name, force in (("cylinder", 30.0), ("sphere", 1.0)):
@@ -64,11 +66,18 @@ def press_fits() -> list[dict[str, Any]]:
                 problem = reduce_bodies(scene).problem
                 reactions = solve(problem).reactions
                 p, q = (reactions / problem.areas[:, None]).T
-                off = error(p, np.full(len(p), exact), problem.areas), float(np.abs(p / exact - 1).max())
+                off = (
+                    error(p, np.full(len(p), exact), problem.areas),
+                    float(np.abs(p / exact - 1).max()),
+                )
                 row: dict[str, Any] = {"degree": degree, "mu": mu}
                 row |= {"contacts on": "fine side" if carrier == "lower" else "coarse side"}
                 row |= {"elements": f"{n}:{3 * n // 2}", "p in L2": off[0], "p, largest": off[1]}
-                orders = ("", "") if last is None else tuple(float(np.log2(a / b)) for a, b in zip(last, off))
+                orders = (
+                    ("", "")
+                    if last is None
+                    else tuple(float(np.log2(a / b)) for a, b in zip(last, off))
+                )
                 row |= {"order in L2": orders[0], "order of the largest": orders[1]}
                 rows.append(row | {"friction, largest": float(np.abs(q).max() / exact)})
                 last = off
@@ -76,7 +85,9 @@ def press_fits() -> list[dict[str, Any]]:
 
 
 def resultant_curve(problem: Any, reactions: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Contact forces between the axis and some places, (2, places): what converges where pressures are singular."""
+    """Contact forces between the axis and some places, (2, places): what converges where pressures
+    are singular.
+    """
     order = np.argsort(problem.coordinates[0])
     x = problem.coordinates[0][order]
     ends = np.concatenate([[0.0], (x[1:] + x[:-1]) / 2, x[-1:]])
@@ -102,17 +113,27 @@ def elastic_punch() -> list[dict[str, Any]]:
 
 
 def rigid_punch() -> list[dict[str, Any]]:
-    """Stick ratio against Spence, exact for the rigid punch; the matching row is the named scene with a body without mesh."""
+    """Stick ratio against Spence, exact for the rigid punch; the matching row is the named scene
+    with a body without mesh.
+    """
     rows = []
     for kind in ("plane-strain", "axisymmetric"):
         for mu in (0.1, 0.3, 0.5):
             for upper in (0, 48):
                 exact = scenes.rigid_punch(kind, mu=mu).reference
-                scene = scenes.rigid_punch(kind, mu=mu, elements=64) if not upper else stiff_punch(kind, upper, 64, mu)
+                scene = (
+                    scenes.rigid_punch(kind, mu=mu, elements=64)
+                    if not upper
+                    else stiff_punch(kind, upper, 64, mu)
+                )
                 reduction = reduce_bodies(scene)
                 found = {method: solve(reduction.problem, method=method) for method in METHODS}
                 ratio = stick_width(reduction, found["newton"])[0] / 20.0
-                row: dict[str, Any] = {"kind": kind, "mu": mu, "punch": "elastic, 48 cells" if upper else "rigid"}
+                row: dict[str, Any] = {
+                    "kind": kind,
+                    "mu": mu,
+                    "punch": "elastic, 48 cells" if upper else "rigid",
+                }
                 row |= {"c / a": float(ratio), "exact": exact.stick_half_width / exact.half_width}
                 row |= {"error": float(ratio - exact.stick_half_width / exact.half_width)}
                 rows.append(row | steps(found))
@@ -121,11 +142,19 @@ def rigid_punch() -> list[dict[str, Any]]:
 
 def steps(found: dict[str, Any]) -> dict[str, Any]:
     newton, auto = (found[method] for method in METHODS)
-    return {"newton: steps": newton.iterations, "newton": newton.status.label, "auto": auto.status.label}
+    return {
+        "newton: steps": newton.iterations,
+        "newton": newton.status.label,
+        "auto": auto.status.label,
+    }
 
 
 def sheared(
-    sizes: tuple[int, int], degree: int, shear: float, carrier: str | None, made: float | None = None
+    sizes: tuple[int, int],
+    degree: int,
+    shear: float,
+    carrier: str | None,
+    made: float | None = None,
 ) -> tuple[float, float, bool]:
     """Cattaneo and Mindlin's cylinders pressed, then sheared: L2 errors of pressure and traction.
 
@@ -134,7 +163,10 @@ def sheared(
     scene = scenes.cattaneo(2, shear=shear)
     if made is not None:
         other = scenes.cattaneo(2, shear=made)
-        parts = {side: replace(getattr(scene, side), mesh=getattr(other, side).mesh) for side in ("upper", "lower")}
+        parts = {
+            side: replace(getattr(scene, side), mesh=getattr(other, side).mesh)
+            for side in ("upper", "lower")
+        }
         scene = replace(scene, **parts)
     scene = apart(scene, *sizes, degree)
     states = [_sheared(scene, share) for share in (0.0, 1.0)]
@@ -146,23 +178,40 @@ def sheared(
 
 
 def cattaneo() -> list[dict[str, Any]]:
-    """Root mean squares of both errors over several shears, each on meshes made for it, and on meshes made for another one."""
+    """Root mean squares of both errors over several shears, each on meshes made for it, and on
+    meshes made for another one.
+    """
     rows = []
     for made, shears in ((None, SHEARS), (45.0, OTHERS)):
         for degree in (1, 2):
             base: np.ndarray | None = None
             for sizes in ((20, 20), (16, 24), (24, 16)):
-                carriers: tuple[str | None, ...] = (None,) if sizes[0] == sizes[1] else ("upper", "lower")
+                carriers: tuple[str | None, ...] = (
+                    (None,) if sizes[0] == sizes[1] else ("upper", "lower")
+                )
                 for carrier in carriers:
                     found = [sheared(sizes, degree, shear, carrier, made) for shear in shears]
                     rms = np.sqrt(_squares(found))
                     base = rms if base is None else base
                     own, other = sizes if carrier == "upper" else sizes[::-1]
-                    on = "matching nodes" if own == other else "fine side" if own > other else "coarse side"
+                    on = (
+                        "matching nodes"
+                        if own == other
+                        else "fine side"
+                        if own > other
+                        else "coarse side"
+                    )
                     nodes = "at the edges of stick" if made is None else "anywhere"
-                    row: dict[str, Any] = {"nodes": nodes, "degree": degree, "elements": f"{sizes[0]}:{sizes[1]}"}
+                    row: dict[str, Any] = {
+                        "nodes": nodes,
+                        "degree": degree,
+                        "elements": f"{sizes[0]}:{sizes[1]}",
+                    }
                     row |= {"contacts on": on, "p in L2": float(rms[0]), "q in L2": float(rms[1])}
-                    row |= {"p over 20:20": float(rms[0] / base[0]), "q over 20:20": float(rms[1] / base[1])}
+                    row |= {
+                        "p over 20:20": float(rms[0] / base[0]),
+                        "q over 20:20": float(rms[1] / base[1]),
+                    }
                     rows.append(row | {"solved": all(f[2] for f in found)})
     return rows
 
@@ -173,9 +222,17 @@ def _squares(found: list[tuple[float, float, bool]]) -> np.ndarray:
 
 
 def solids() -> list[dict[str, Any]]:
-    """Two bodies in space, pressed and then sheared in one step, linear bricks; the exact tractions are those of Mindlin."""
+    """Two bodies in space, pressed and then sheared in one step, linear bricks; the exact tractions
+    are those of Mindlin.
+    """
     rows = []
-    for sizes, carrier in (((6, 6), None), ((8, 8), None), ((6, 8), "lower"), ((8, 6), "upper"), ((6, 8), "upper")):
+    for sizes, carrier in (
+        ((6, 6), None),
+        ((8, 8), None),
+        ((6, 8), "lower"),
+        ((8, 6), "upper"),
+        ((6, 8), "upper"),
+    ):
         scene = apart(scenes.cattaneo(3, shear=30.0), *sizes, 1)
         states = [_sheared(scene, share) for share in (0.0, 1.0)]
         path = follow(states if carrier is None else [carried(state, carrier) for state in states])
@@ -184,9 +241,18 @@ def solids() -> list[dict[str, Any]]:
         p, q = r[:, 0] / problem.areas, np.linalg.norm(r[:, 1:], axis=1) / problem.areas
         own = sizes[0] if carrier == "upper" else sizes[1]
         row: dict[str, Any] = {"elements": f"{sizes[0]}:{sizes[1]}"}
-        row |= {"contacts on": "matching nodes" if carrier is None else "fine side" if own == 8 else "coarse side"}
+        row |= {
+            "contacts on": "matching nodes"
+            if carrier is None
+            else "fine side"
+            if own == 8
+            else "coarse side"
+        }
         row |= {"unknowns": path.reduction.dofs, "contacts": problem.contacts}
         row |= {"peak, rel. error": float(p.max() / exact.peak - 1)}
         row |= {"p in L2": error(p, exact.pressure(x), problem.areas)}
-        rows.append(row | {"q in L2": error(q, np.abs(exact.shear(x)), problem.areas), "solved": path.solved})
+        rows.append(
+            row
+            | {"q in L2": error(q, np.abs(exact.shear(x)), problem.areas), "solved": path.solved}
+        )
     return rows

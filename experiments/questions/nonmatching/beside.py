@@ -1,4 +1,6 @@
-"""The elastic punch on meshes that do not match in CalculiX (ccx): forces, time, and other systems of units."""
+"""The elastic punch on meshes that do not match in CalculiX (ccx): forces, time, and other systems
+of units.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from experiments.questions.nonmatching.bodies import apart, punch
 
 SIZES = (48, 32)  # ccx puts its multipliers on the upper body
 STIFF = 5e5  # strain of 1e-7: displaced surfaces are as good as undisplaced ones
-LAWS = {"mortar": RIGID, "surface-to-surface": 1e3}  # stick slope, and penalty stiffness, times E / h
+# stick slope, and penalty stiffness, times E / h
+LAWS = {"mortar": RIGID, "surface-to-surface": 1e3}
 UNITS = ((1.0, 1.0), (1e-6, 1.0), (1e6, 1.0), (1.0, 1e-6), (1.0, 1e6))
 REPEATS = 1
 
@@ -38,25 +41,34 @@ def beside() -> list[dict[str, Any]]:
         nodal = [(B.T @ solution.reactions.ravel()) / force for B in reduction.maps]
         last = nodal if last is None else last
         units = {"unit of length": 1 / length, "unit of force": 1 / force}
-        row = units | {"solver": "contactopt", "end": solution.status.label, "iterations": solution.iterations}
+        row = units | {
+            "solver": "contactopt",
+            "end": solution.status.label,
+            "iterations": solution.iterations,
+        }
         row |= {"seconds": median(own)}
         rows.append(row | _against(nodal, last, reduction))
         for law, factor in LAWS.items():
             stiffness = factor * STIFF * force / length**2 * SIZES[0] / (20.0 * length)
             stick = stiffness if law == "mortar" else STICK * stiffness
             found = [
-                run(program, model(scene), reduction, Contact(law, stiffness, stick, "top")) for _ in range(REPEATS)
+                run(program, model(scene), reduction, Contact(law, stiffness, stick, "top"))
+                for _ in range(REPEATS)
             ]
             rows.append(units | _row(law, found, last, reduction, force))
     return rows
 
 
-def _row(law: str, found: list[Run], exact: list[np.ndarray], reduction: Any, force: float) -> dict[str, Any]:
+def _row(
+    law: str, found: list[Run], exact: list[np.ndarray], reduction: Any, force: float
+) -> dict[str, Any]:
     answer = found[-1]
     row: dict[str, Any] = {"solver": f"ccx, {law}", "end": answer.failure or "converged"}
     row |= {"iterations": answer.iterations, "seconds": median(one.seconds for one in found)}
     if answer.failure:
-        return row | dict.fromkeys(("normal, upper", "tangential, upper", "normal, lower", "tangential, lower"), "")
+        return row | dict.fromkeys(
+            ("normal, upper", "tangential, upper", "normal, lower", "tangential, lower"), ""
+        )
     return row | _against([f / force for f in answer.forces], exact, reduction)
 
 

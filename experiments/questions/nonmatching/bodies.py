@@ -15,7 +15,9 @@ from contactopt.scenes.common import with_elements
 MATERIAL = Material(5.0, 0.3)
 
 
-def apart(scene: Scene, upper: int, lower: int, degree: int | None = None, carrier: str | None = None) -> Scene:
+def apart(
+    scene: Scene, upper: int, lower: int, degree: int | None = None, carrier: str | None = None
+) -> Scene:
     """The scene of two bodies with so many elements of each across the contact half-width."""
     top, base = scene.upper, scene.lower
     assert isinstance(top, Part) and isinstance(base, Part)
@@ -23,7 +25,9 @@ def apart(scene: Scene, upper: int, lower: int, degree: int | None = None, carri
         replace(top, mesh=lambda _, zone: top.build_mesh(upper, zone)),
         replace(base, mesh=lambda _, zone: base.build_mesh(lower, zone)),
     )
-    made = with_elements(replace(scene, upper=parts[0], lower=parts[1], elements=max(upper, lower)), degree)
+    made = with_elements(
+        replace(scene, upper=parts[0], lower=parts[1], elements=max(upper, lower)), degree
+    )
     return made if carrier is None else carried(made, carrier)
 
 
@@ -42,7 +46,9 @@ def stacked(kind: str, degree: int, cells: tuple[int, int], carrier: str) -> Sce
         grids = [np.linspace(0, 1, count + 1) ** (1.3 if name == "upper" else 1.0)] * (dim - 1)
         ends = {f"side {c}": f"{'xy'[i]}-" for i, c in enumerate(across)}
         axis = "xyz"[dim - 1]
-        mesh = rename(tensor_mesh(*grids, np.linspace(*heights, 3)), top=f"{axis}+", bottom=f"{axis}-", **ends)
+        mesh = rename(
+            tensor_mesh(*grids, np.linspace(*heights, 3)), top=f"{axis}+", bottom=f"{axis}-", **ends
+        )
         sides = tuple(Support(f"side {c}", {c: 0.0}) for c in across)
         if name == "upper":
             plate = Plate("top", {up: -3.0}, glued=False)
@@ -54,20 +60,37 @@ def stacked(kind: str, degree: int, cells: tuple[int, int], carrier: str) -> Sce
     return Scene("blocks", kind=kind, degree=degree, bodies=bodies, contacts=(pair,))
 
 
-def press_fit(sectors: tuple[int, int], degree: int, carrier: str, mu: float = 0.0) -> tuple[Scene, float]:
-    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2, and Lame's pressure; isoparametric if quadratic."""
+def press_fit(
+    sectors: tuple[int, int], degree: int, carrier: str, mu: float = 0.0
+) -> tuple[Scene, float]:
+    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2, and Lame's pressure; isoparametric
+    if quadratic.
+    """
     interference = 0.01
     sides = (Support("start", {"y": 0.0}), Support("end", {"x": 0.0}))
 
-    def part(name: str, inner: float, outer: float, count: int, contact: str, radius: float) -> Part:
-        mesh = tensor_mesh(np.linspace(inner, outer, max(2, count // 2) + 1), np.linspace(0, np.pi / 2, count + 1))
+    def part(
+        name: str, inner: float, outer: float, count: int, contact: str, radius: float
+    ) -> Part:
+        mesh = tensor_mesh(
+            np.linspace(inner, outer, max(2, count // 2) + 1), np.linspace(0, np.pi / 2, count + 1)
+        )
         names = {"inner": "x-", "outer": "x+", "start": "y-", "end": "y+"}
         boundaries = {new: mesh.boundaries[old] for new, old in names.items()}
         if degree == 2:
             mesh = skfem.MeshQuad2.from_mesh(mesh)
         r, phi = mesh.doflocs
-        mesh = type(mesh)(np.stack([r * np.cos(phi), r * np.sin(phi)]), mesh.t).with_boundaries(boundaries)
-        return Part(name, mesh, MATERIAL, sides, contact=contact, curve=lambda x: np.asarray(radius * x / np.hypot(*x)))
+        mesh = type(mesh)(np.stack([r * np.cos(phi), r * np.sin(phi)]), mesh.t).with_boundaries(
+            boundaries
+        )
+        return Part(
+            name,
+            mesh,
+            MATERIAL,
+            sides,
+            contact=contact,
+            curve=lambda x: np.asarray(radius * x / np.hypot(*x)),
+        )
 
     outer = part("outer", 2, 3, sectors[0], "inner", 2 - interference / 2)
     inner = part("inner", 1, 2, sectors[1], "outer", 2 + interference / 2)
@@ -77,22 +100,36 @@ def press_fit(sectors: tuple[int, int], degree: int, carrier: str, mu: float = 0
     return scene, interference * stiffness / 2 / (13 / 5 + 5 / 3)
 
 
-def punch(elements: int = 32, length: float = 1.0, force: float = 1.0, mu: float = 0.2, **changes: Any) -> Scene:
+def punch(
+    elements: int = 32, length: float = 1.0, force: float = 1.0, mu: float = 0.2, **changes: Any
+) -> Scene:
     """The paper's 2D punch with other units of length and force."""
-    sizes = dict(width=40.0, height=40.0, foundation_width=160.0, foundation_height=80.0, depth=40.0)
+    sizes = dict(
+        width=40.0, height=40.0, foundation_width=160.0, foundation_height=80.0, depth=40.0
+    )
     material = Material(changes.pop("modulus", 5.0) * force / length**2, 0.3)
     scaled = {name: size * length for name, size in sizes.items()}
-    loads = {"force": 100.0 * force, "mu": mu, "elements": elements, "upper": material, "lower": material}
+    loads = {
+        "force": 100.0 * force,
+        "mu": mu,
+        "elements": elements,
+        "upper": material,
+        "lower": material,
+    }
     return scenes.flat_punch(2, **scaled, **loads, **changes)  # type: ignore[arg-type]
 
 
 def stiff_punch(kind: str, upper: int, lower: int, mu: float, force: float = 100.0) -> Scene:
-    """The rigid punch on a half-space, the punch an elastic block ten million times as stiff with its own mesh."""
+    """The rigid punch on a half-space, the punch an elastic block ten million times as stiff with
+    its own mesh.
+    """
     scene = scenes.rigid_punch(kind, mu=mu, elements=lower, force=force)
     across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
     h = np.linspace(0, 1, upper + 1)
     grid = 20.0 * (1 - (1 - h) ** 3)  # finer at the edge
     mesh = rename(tensor_mesh(grid, np.linspace(0, 20.0, 5)), axis="x-", contact="y-", top="y+")
     material = Material(5e7, 0.3)
-    top = Part("punch", mesh, material, (Support("axis", {across: 0.0}),), (Plate("top", {up: -force}),))
+    top = Part(
+        "punch", mesh, material, (Support("axis", {across: 0.0}),), (Plate("top", {up: -force}),)
+    )
     return replace(scene, upper=top)

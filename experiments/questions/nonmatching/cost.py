@@ -1,4 +1,6 @@
-"""What friction on meshes that do not match costs over one direct linear solve of the same bodies, tied together."""
+"""What friction on meshes that do not match costs over one direct linear solve of the same bodies,
+tied together.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +27,11 @@ SIZES = (830, 1245)  # about 150,000 unknowns
 
 
 def tied(reduction: Reduction) -> Callable[[], np.ndarray]:
-    """The direct solve of the bodies of a mortar coupling without opening or slip, under the plate's unit motion.
+    """The direct solve of the bodies of a mortar coupling without opening or slip, under the
+    plate's unit motion.
 
-    u = 0 gives the contact nodes of the side that carries them, which are condensed out, so that the other side's nodes
-    take their place.
+    u = 0 gives the contact nodes of the side that carries them, which are condensed out, so that
+    the other side's nodes take their place.
     """
     own = 0 if reduction.coupling.carrier == "upper" else 1
     bodies, maps = [b.body for b in reduction.bodies], reduction.maps
@@ -63,7 +66,10 @@ def tied(reduction: Reduction) -> Callable[[], np.ndarray]:
     points, node, component, count = [], np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
     for body, start in zip(bodies, starts):
         for c, unknowns in enumerate(body.unknowns):
-            node[start + unknowns], component[start + unknowns] = count + np.arange(len(unknowns)), c
+            node[start + unknowns], component[start + unknowns] = (
+                count + np.arange(len(unknowns)),
+                c,
+            )
         points.append(body.locations)
         count += body.locations.shape[1]
     system = System(A, node[kept], component[kept], np.concatenate(points, axis=1))

@@ -1,6 +1,8 @@
-"""Does another way to the answer say the same? `python -m experiments.questions.search_for_wrong_answers [SCENES [FIRST]]`.
+"""Does another way to the answer say the same? `python -m
+experiments.questions.search_for_wrong_answers [SCENES [FIRST]]`.
 
-A certificate says that the interface problem is solved. Whether this is the right problem, only another way can say.
+A certificate says that the interface problem is solved. Whether this is the right problem, only
+another way can say.
 """
 
 from __future__ import annotations
@@ -22,26 +24,29 @@ from experiments.questions.search_for_wrong_answers.families import FAMILIES  # 
 
 SCENES = 300  # ten of them suffice for a first look
 TEXT = """Is an answer right whose certificate is right? This report solves random scenes (seeds {first} to {last}) in two ways that share
-neither mesh nor coupling, and compares what they say. The first way has structured meshes whose nodes match, or is an exact
-solution. The second has unstructured meshes of Gmsh, read from its files, with a mortar coupling carried by either side; or
-a model in space for one in the plane, finite elements for a half-space, the shape of a mesh for a function of the gap. The
-second way is also turned or mirrored, written in other units and with other numbers of nodes and elements, and the sides of
-its contacts are exchanged.
+neither mesh nor coupling, and compares what they say. The first way has structured meshes whose
+nodes match, or is an exact solution. The second has unstructured meshes of Gmsh, read from its
+files, with a mortar coupling carried by either side; or a model in space for one in the plane,
+finite elements for a half-space, the shape of a mesh for a function of the gap. The second way is
+also turned or mirrored, written in other units and with other numbers of nodes and elements, and
+the sides of its contacts are exchanged.
 
-Each way is solved on three meshes, each about twice as fine as the one before (1.4 times in space). The error of the finest
-is estimated by the range of the three values, or by Richardson's extrapolation where that says more. Two ways *disagree*
-if their values are further apart than the sum of both estimates. They are then refined once more, and judged by the last three
-meshes. Forces, their centre and reach, energy, a smooth measure of the area of contact, a mean and the largest pressure where it is finite, friction,
-the share of the force that sticks, displacements and stresses at points inside are compared. The second way is also compared with itself, not
-moved, on one mesh: there the two may differ by {sharp:g} of the quantity's size. A scene that stops or is not solved counts
-as a disagreement.
+Each way is solved on three meshes, each about twice as fine as the one before (1.4 times in space).
+The error of the finest is estimated by the range of the three values, or by Richardson's
+extrapolation where that says more. Two ways *disagree* if their values are further apart than the
+sum of both estimates. They are then refined once more, and judged by the last three meshes. Forces,
+their centre and reach, energy, a smooth measure of the area of contact, a mean and the largest
+pressure where it is finite, friction, the share of the force that sticks, displacements and
+stresses at points inside are compared. The second way is also compared with itself, not moved, on
+one mesh: there the two may differ by {sharp:g} of the quantity's size. A scene that stops or is not
+solved counts as a disagreement.
 
 Disagreements: {count} of {scenes} scenes.
 
 {listed}
 
-The width in the table is the median over all quantities of both estimates together, relative to the size of the quantity: a
-wrong answer that is closer than this is not seen.
+The width in the table is the median over all quantities of both estimates together, relative to the
+size of the quantity: a wrong answer that is closer than this is not seen.
 
 {table}
 """
@@ -69,15 +74,24 @@ def report(found: list[tuple[Verdict, float]]) -> None:
                 "family": family,
                 "scenes": len(mine),
                 "disagreements": sum(bool(verdict.wrong) for verdict, _ in mine),
-                "width": float(np.median([width for verdict, _ in mine for width in verdict.widths or (0.0,)])),
+                "width": float(
+                    np.median([width for verdict, _ in mine for width in verdict.widths or (0.0,)])
+                ),
                 "seconds a scene": float(np.mean([seconds for _, seconds in mine])),
             }
         )
     wrong = [verdict for verdict, _ in found if verdict.wrong]
-    listed = "\n".join(f"- seed {each.seed}, {each.family}: {'; '.join(each.wrong[:3])}" for each in wrong)
+    listed = "\n".join(
+        f"- seed {each.seed}, {each.family}: {'; '.join(each.wrong[:3])}" for each in wrong
+    )
     seeds = [verdict.seed for verdict, _ in found]
     text = TEXT.replace("{table}", "TABLE").format(
-        first=min(seeds), last=max(seeds), scenes=len(found), count=len(wrong), sharp=SHARP, listed=listed
+        first=min(seeds),
+        last=max(seeds),
+        scenes=len(found),
+        count=len(wrong),
+        sharp=SHARP,
+        listed=listed,
     )
     text = text.replace("{", "(").replace("}", ")").replace("TABLE", "{table}")
     write("search_for_wrong_answers", "A search for wrong answers", text, {"table": rows}, {})

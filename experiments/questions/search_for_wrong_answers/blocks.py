@@ -12,7 +12,13 @@ from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, 
 from contactopt.analytic import contact_modulus
 from contactopt.meshes.structured import simplices
 from experiments.questions.search_for_wrong_answers.compare import Case, Way
-from experiments.questions.search_for_wrong_answers.meshes import extruded, outlined, quads, random_move, ticks
+from experiments.questions.search_for_wrong_answers.meshes import (
+    extruded,
+    outlined,
+    quads,
+    random_move,
+    ticks,
+)
 
 Random = np.random.Generator
 Shape = Callable[[np.ndarray], np.ndarray]
@@ -70,7 +76,9 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """A scene of blocks: contacts by names, friction, what else the scene needs, and the size of its first elements."""
+    """A scene of blocks: contacts by names, friction, what else the scene needs, and the size of
+    its first elements.
+    """
 
     blocks: tuple[Block, ...]
     contacts: tuple[tuple[str, str], ...]
@@ -83,7 +91,10 @@ class Blocks:
     def scene(self, mesh: Callable[[Block], Any], **given: Any) -> Scene:
         """The scene with these meshes; `given` are settings of its contacts, and the degree."""
         degree = given.pop("degree")
-        bodies = [Part(b.name, mesh(b), b.material, b.supports, b.loads, curve=b.curve) for b in self.blocks]
+        bodies = [
+            Part(b.name, mesh(b), b.material, b.supports, b.loads, curve=b.curve)
+            for b in self.blocks
+        ]
         pairs = tuple(Contact(*pair, self.mu, law=self.law, **given) for pair in self.contacts)
         own = dict(self.settings)
         return Scene("search", bodies=(*bodies, *self.rigid), contacts=pairs, degree=degree, **own)
@@ -91,7 +102,9 @@ class Blocks:
     def matching(self, rng: Random, depth: float | None = None) -> Way:
         """The first way: quadrilaterals or triangles cut from them, or bricks, whose nodes match."""
         cut, degree = rng.random() < 0.3, int(rng.integers(1, 3 if depth is None else 2))
-        marks = [x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")]
+        marks = [
+            x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")
+        ]
 
         def build(level: int) -> Scene:
             h = self.size / (2.0 if depth is None else 1.4) ** level
@@ -106,7 +119,9 @@ class Blocks:
         return Way(build, (0, 1) if depth is None else (0, 1, 2))
 
     def unlike(self, rng: Random, depth: float | None = None, rows: int = 0) -> Way:
-        """The second way: Gmsh's triangles, or bricks and tetrahedra, by mortar, exchanged and moved."""
+        """The second way: Gmsh's triangles, or bricks and tetrahedra, by mortar, exchanged and
+        moved.
+        """
         shares = {block.name: float(rng.uniform(0.7, 1.3)) for block in self.blocks}
         cut = {block.name: rng.random() < 0.3 for block in self.blocks}
         locking = depth is not None and any(cut.values())  # linear tetrahedra are too stiff
@@ -154,11 +169,15 @@ def oblique(rng: Random, mu: float, force: float) -> dict[str, float]:
 def inside(blocks: tuple[Block, ...]) -> dict[str, list[tuple[float, ...]]]:
     """Two points in every block."""
     shares = [[0.25] * 4, [0.2, 0.3, 0.4, 0.1]]
-    return {b.name: [tuple(np.array(share) @ np.array(b.corners)) for share in shares] for b in blocks}
+    return {
+        b.name: [tuple(np.array(share) @ np.array(b.corners)) for share in shares] for b in blocks
+    }
 
 
 def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
-    """Blocks one upon another, thin ones and gaps among them: in the plane, as a slab between rollers, or in space."""
+    """Blocks one upon another, thin ones and gaps among them: in the plane, as a slab between
+    rollers, or in space.
+    """
     # Without friction nothing says where a body between two others is along them.
     mu, depth = friction(rng) or (0.3 if layers > 2 else 0.0), float(rng.uniform(0.3, 1.0))
     force = float(10 ** rng.uniform(-3, -1))
@@ -167,7 +186,9 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
         thin = layer and not solid and rng.random() < 0.4
         high = float(rng.uniform(0.05, 0.2) if thin else rng.uniform(0.5, 1.5))
         lean = rng.uniform(-0.15, 0.15, 2) * (right - left) * (layer == layers - 1)
-        corners.append([(left, y), (right, y), (right + lean[1], y + high), (left + lean[0], y + high)])
+        corners.append(
+            [(left, y), (right, y), (right + lean[1], y + high), (left + lean[0], y + high)]
+        )
         wide = (right - left) * float(1.0 if rng.random() < 0.3 else rng.uniform(0.5, 0.95))
         apart = float(rng.uniform(0.01, 0.3)) * float(rng.random() < 0.3 and layer < layers - 1)
         left += float(rng.uniform(0, 1)) * (right - left - wide)
@@ -187,27 +208,41 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     made = []
     for i, own in enumerate(corners):
         touch = {"under": ("bottom", own[0][0], own[1][0])} if i else {}
-        touch |= {"over": ("top", corners[i + 1][0][0], corners[i + 1][1][0])} if i < layers - 1 else {}
+        touch |= (
+            {"over": ("top", corners[i + 1][0][0], corners[i + 1][1][0])} if i < layers - 1 else {}
+        )
         held = (() if i else (Support("bottom"),)) + (top if i == layers - 1 else ())
         loads = carried if i == layers - 1 and kind != "moved" else ()
         made.append(Block(f"body {i}", own, material(rng), touch, held, loads))
-    law = str(rng.choice(["coulomb", "tresca", "tied"], p=[0.8, 0.1, 0.1])) if mu and not gaps else "coulomb"
+    law = (
+        str(rng.choice(["coulomb", "tresca", "tied"], p=[0.8, 0.1, 0.1]))
+        if mu and not gaps
+        else "coulomb"
+    )
     pairs = tuple((f"body {i + 1}:under", f"body {i}:over") for i in range(layers - 1))
-    size = min([2 * (c[2][1] - c[1][1]) for c in corners] + [(c[1][0] - c[0][0]) / 8 for c in corners[1:]])
+    size = min(
+        [2 * (c[2][1] - c[1][1]) for c in corners] + [(c[1][0] - c[0][0]) / 8 for c in corners[1:]]
+    )
     bound = mu * force if law == "tresca" else mu
     plane = Blocks(tuple(made), pairs, bound, size, settings=(("thickness", depth),), law=law)
     points, loose = inside(plane.blocks), 1.001 * gaps
     if not solid:
-        return Case(f"{layers} blocks", (plane.matching(rng), plane.unlike(rng)), points, loose=loose)
+        return Case(
+            f"{layers} blocks", (plane.matching(rng), plane.unlike(rng)), points, loose=loose
+        )
     ends = tuple(Support(name, {"z": 0.0}) for name in ("near", "far")) if solid == "slab" else ()
     blocks = tuple(
         replace(
             block,
             supports=tuple(
-                held if held.displacement is None else Support("top", {**shift, "z": 0.0}) for held in block.supports
+                held if held.displacement is None else Support("top", {**shift, "z": 0.0})
+                for held in block.supports
             )
             + ends,
-            loads=tuple(own if kind == "plate" else replace(own, value=own.value + third) for own in block.loads),
+            loads=tuple(
+                own if kind == "plate" else replace(own, value=own.value + third)
+                for own in block.loads
+            ),
         )
         for block in plane.blocks
     )
@@ -222,7 +257,9 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
 
 
 def crown(rng: Random, ring: bool = False) -> Case:
-    """A body with a slightly round face on a flat one: smooth pressure, a contact whose edge nobody knows."""
+    """A body with a slightly round face on a flat one: smooth pressure, a contact whose edge nobody
+    knows.
+    """
     one, two, mu, a = material(rng), material(rng), friction(rng), float(rng.uniform(0.25, 0.5))
     radius, high, low = float(rng.uniform(50, 500)), *map(float, rng.uniform(0.6, 1.5, 2))
     modulus, left, base = contact_modulus(one, two), 0.0 if ring else -1.0, float(rng.uniform(1, 2))
@@ -251,13 +288,23 @@ def crown(rng: Random, ring: bool = False) -> Case:
         (scene.matching(rng), scene.unlike(rng)),
         {"upper": [(0.3, 0.6 * high)], "lower": [(0.2, -0.5 * low)]},
     )
-    return Case(f"crown, {kind}", ways, points, not ring, True, loose=a**2 / radius, strain=a / radius)
+    return Case(
+        f"crown, {kind}", ways, points, not ring, True, loose=a**2 / radius, strain=a / radius
+    )
 
 
 def wedge(rng: Random) -> Case:
     """A wedge pressed obliquely between two flanks."""
-    angle, high, half = (np.radians(rng.uniform(15, 60)), float(rng.uniform(0.6, 1.2)), float(rng.uniform(0.15, 0.5)))
-    mu, side, out = (float(rng.uniform(0, 0.6)), high * np.tan(angle), half + high * np.tan(angle) + 1.0)
+    angle, high, half = (
+        np.radians(rng.uniform(15, 60)),
+        float(rng.uniform(0.6, 1.2)),
+        float(rng.uniform(0.15, 0.5)),
+    )
+    mu, side, out = (
+        float(rng.uniform(0, 0.6)),
+        high * np.tan(angle),
+        half + high * np.tan(angle) + 1.0,
+    )
     load = Plate("top", {"x": float(rng.uniform(-3e-3, 3e-3)), "y": -0.01})
     corners = [(-half, 0.0), (half, 0.0), (half + side, high), (-half - side, high)]
     left = [(-out, 0.0), (-half, 0.0), (-half - side, high), (-out, high)]
@@ -275,24 +322,47 @@ def wedge(rng: Random) -> Case:
 
 def bridge(rng: Random) -> Case:
     """A beam on two piers: one surface in two pairs."""
-    mu, long, (thick, high) = (friction(rng), float(rng.uniform(3, 5)), map(float, rng.uniform(0.4, 1.2, 2)))
-    feet = {"left": (0.0, float(rng.uniform(0.4, 1))), "right": (long - float(rng.uniform(0.4, 1)), long)}
+    mu, long, (thick, high) = (
+        friction(rng),
+        float(rng.uniform(3, 5)),
+        map(float, rng.uniform(0.4, 1.2, 2)),
+    )
+    feet = {
+        "left": (0.0, float(rng.uniform(0.4, 1))),
+        "right": (long - float(rng.uniform(0.4, 1)), long),
+    }
     beam = [(0.0, high), (long, high), (long, high + thick), (0.0, high + thick)]
     touch = {f"on {name}": ("bottom", *foot) for name, foot in feet.items()}
-    blocks = [Block("beam", beam, material(rng), touch, (), (Plate("top", oblique(rng, mu, 3e-3)),))]
+    blocks = [
+        Block("beam", beam, material(rng), touch, (), (Plate("top", oblique(rng, mu, 3e-3)),))
+    ]
     for name, (a, b) in feet.items():
         pier = [(a, 0.0), (b, 0.0), (b, high), (a, high)]
-        blocks.append(Block(name, pier, material(rng), {"head": ("top", a, b)}, (Support("bottom"),)))
-    scene = Blocks(tuple(blocks), tuple((f"beam:on {name}", f"{name}:head") for name in feet), mu, 0.1)
+        blocks.append(
+            Block(name, pier, material(rng), {"head": ("top", a, b)}, (Support("bottom"),))
+        )
+    scene = Blocks(
+        tuple(blocks), tuple((f"beam:on {name}", f"{name}:head") for name in feet), mu, 0.1
+    )
     return Case("beam on two piers", (scene.matching(rng), scene.unlike(rng)), inside(scene.blocks))
 
 
 def floor(rng: Random) -> Case:
-    """An uneven block on a rigid floor: its shape is a function of the gap, or the shape of its mesh."""
-    mu, own, wide, high = (friction(rng), material(rng), float(rng.uniform(1, 3)), float(rng.uniform(0.5, 2)))
+    """An uneven block on a rigid floor: its shape is a function of the gap, or the shape of its
+    mesh.
+    """
+    mu, own, wide, high = (
+        friction(rng),
+        material(rng),
+        float(rng.uniform(1, 3)),
+        float(rng.uniform(0.5, 2)),
+    )
     depth, waves = float(10 ** rng.uniform(-5, -3.5)) * wide, rng.uniform(0.5, 4, 3) * np.pi / wide
     phase, sizes, pushed = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.2, 1, 3), rng.random() < 0.3
-    force, lift = (own.E * depth * float(10 ** rng.uniform(-0.7, 0.7)), depth * float(rng.uniform(0.2, 2)))
+    force, lift = (
+        own.E * depth * float(10 ** rng.uniform(-0.7, 0.7)),
+        depth * float(rng.uniform(0.2, 2)),
+    )
 
     def shape(x: np.ndarray) -> np.ndarray:
         at = np.concatenate([np.linspace(0, wide, 1000), x[0]])
@@ -302,7 +372,10 @@ def floor(rng: Random) -> Case:
     def bend(x: np.ndarray) -> np.ndarray:
         return np.stack([x[0], x[1] + shape(x) * (1 - x[1] / high)])
 
-    corners, touch = ([(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)], {"under": ("bottom", 0.0, wide)})
+    corners, touch = (
+        [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)],
+        {"under": ("bottom", 0.0, wide)},
+    )
     block = Block("block", corners, own, touch, (), (Plate("top", oblique(rng, mu, force)),))
     ground = Rigid("floor", (0.0, 1.0), shape)
     if pushed:  # the floor is lifted in one way, the block pushed down in the other

@@ -1,4 +1,6 @@
-"""What two ways say of one scene, level by level, and where they differ by more than their own levels do."""
+"""What two ways say of one scene, level by level, and where they differ by more than their own
+levels do.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ TOL = 1e-9  # of the certificate
 ROUNDING = 1e-5  # of a quantity's scale: what the certificate leaves open
 SHARP = 1e-4  # between one mesh and the same mesh moved
 SLOWEST = 0.9  # largest ratio of the differences between levels that an estimate believes
-AROUND = {2: 20, 3: 120}  # nodes among which a value at a point is fitted, in the plane and in space
+# nodes among which a value at a point is fitted, in the plane and in space
+AROUND = {2: 20, 3: 120}
 
 Values = dict[str, float]
 
@@ -47,7 +50,8 @@ class Case:
     """Two ways to one answer, the first of which may be an exact one.
 
     points   body -> points of it where stress and displacement are read
-    whole    whether both ways model whole bodies, so that forces across planes of symmetry can be compared
+    whole    whether both ways model whole bodies, so that forces across planes of symmetry can be
+             compared
     smooth   whether the pressure is finite, so that its peak can be compared
     without  kinds of quantities that the two ways do not share
     loose    how far apart the surfaces are where they touch: places of contact are known to this
@@ -68,7 +72,8 @@ def swapped(scene: Scene) -> Scene:
     """The scene with upper and lower exchanged in every pair."""
     other = {"upper": "lower", "lower": "upper", None: None}
     pairs = tuple(
-        replace(pair, upper=pair.lower, lower=pair.upper, carrier=other[pair.carrier]) for pair in scene.contacts
+        replace(pair, upper=pair.lower, lower=pair.upper, carrier=other[pair.carrier])
+        for pair in scene.contacts
     )
     return replace(scene, contacts=pairs, bodies=tuple(_turned(part) for part in scene.bodies))
 
@@ -80,12 +85,17 @@ def _turned(part: Any) -> Any:
 
 
 def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
-    """Solve a level of a way, and read all quantities in the frame and units of the case; raises what goes wrong."""
+    """Solve a level of a way, and read all quantities in the frame and units of the case; raises
+    what goes wrong.
+    """
     scene = way.build(level)
     scene = swapped(scene) if way.swapped else scene
     move = way.move if moved and way.move is not None else Move(np.eye(scene.dim))
     result = run(
-        move.scene(scene) if way.move is not None and moved else scene, tol=TOL, figures=(), simplest=way.simplest
+        move.scene(scene) if way.move is not None and moved else scene,
+        tol=TOL,
+        figures=(),
+        simplest=way.simplest,
     )
     if result.problem.dim < scene.dim:
         move = Move(np.eye(result.problem.dim))
@@ -108,10 +118,14 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
         found[f"bearing {i}"] = float(np.sum(np.sqrt(n * area)) ** 2 / total)
         if case.smooth:
             found[f"pressure {i}"] = float(np.sum(n[area > 0] ** 2 / area[area > 0]) / total)
-        found[f"reach {i}"] = float(np.sqrt(np.sum(n * np.sum(places[:, own] ** 2, axis=0)) / total))
+        found[f"reach {i}"] = float(
+            np.sqrt(np.sum(n * np.sum(places[:, own] ** 2, axis=0)) / total)
+        )
         found[f"stick {i}"] = float(n[status.stick[own]].sum() / total)
         if case.whole:
-            found |= {f"centre {axis} {i}": float(x @ n / total) for axis, x in enumerate(places[:, own])}
+            found |= {
+                f"centre {axis} {i}": float(x @ n / total) for axis, x in enumerate(places[:, own])
+            }
         if case.smooth:
             found[f"peak {i}"] = (result.summary["pressure"] or table["max_pressure"]) / S
     for body in result.fields:
@@ -124,14 +138,17 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
             target = np.insert(point, 1, 0.0) if len(at) > len(point) else np.array(point)
             read_off = fitted(at - target[:, None], values, AROUND[len(body.mesh.p)])
             names = [f"moved {axis}" for axis in range(len(axes))] + ["von_mises", "mean_stress"]
-            found |= {f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)}
+            found |= {
+                f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)
+            }
     return found
 
 
 def fitted(offsets: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     """Values (m,) at a point of fields (n, m) at nodes, whose offsets (dim, n) from it are given.
 
-    A quadratic is fitted among `count` nodes with weights that fall smoothly to zero. It knows no axes, so that turning changes nothing.
+    A quadratic is fitted among `count` nodes with weights that fall smoothly to zero. It knows no
+    axes, so that turning changes nothing.
     """
     distance = np.linalg.norm(offsets, axis=0)
     reach = np.sort(distance)[min(count, len(distance) - 1)]
@@ -143,7 +160,9 @@ def fitted(offsets: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def scale_of(name: str, values: list[Values]) -> float:
-    """What a quantity is measured by: forces by the largest force, displacements by the largest, others by themselves."""
+    """What a quantity is measured by: forces by the largest force, displacements by the largest,
+    others by themselves.
+    """
     kind = name.split()[0]
     groups = {"force": ("force", "normal"), "friction": ("normal",), "moved": ("moved",), "mean_stress": ("von_mises",
               "mean_stress", "pressure"), "von_mises": ("von_mises", "mean_stress", "pressure"),
@@ -151,12 +170,16 @@ def scale_of(name: str, values: list[Values]) -> float:
     same = groups.get(kind, (name,))
     if kind == "stick":
         return 1.0
-    sizes = [abs(own[key]) for own in values for key in own if key in same or key.split()[0] in same]
+    sizes = [
+        abs(own[key]) for own in values for key in own if key in same or key.split()[0] in same
+    ]
     return max(sizes, default=1.0) or 1.0
 
 
 def error(row: np.ndarray) -> float:
-    """The error of the last of three levels: the range of all, or more if the differences hardly shrink (Richardson)."""
+    """The error of the last of three levels: the range of all, or more if the differences hardly
+    shrink (Richardson).
+    """
     if len(row) < 3:
         return 0.0
     first, last = np.abs(np.diff(row))[-2:]
@@ -166,7 +189,9 @@ def error(row: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came out of one seed: disagreements in words, and the width of the estimates in shares of the scales."""
+    """What came out of one seed: disagreements in words, and the width of the estimates in shares
+    of the scales.
+    """
 
     seed: int
     family: str
@@ -175,7 +200,9 @@ class Verdict:
 
 
 def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[float]]:
-    """What the two ways disagree on beyond the errors of their last three levels, and the widths of all estimates."""
+    """What the two ways disagree on beyond the errors of their last three levels, and the widths of
+    all estimates.
+    """
     wrong, widths = [], []
     everything = [own for way in levels for own in way]
     for name in levels[0][0].keys() & levels[1][0].keys():
@@ -195,17 +222,22 @@ def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[fl
 def judge(seed: int, case: Case) -> Verdict:
     """Compare the two ways of a case, and the second with itself where it is not moved.
 
-    Where they disagree, both are refined once more: then the coarsest level was too coarse for an estimate, or they disagree.
+    Where they disagree, both are refined once more: then the coarsest level was too coarse for an
+    estimate, or they disagree.
     """
     levels: list[list[Values]] = []
     try:
         for way in case.ways:
-            levels.append([way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS])
+            levels.append(
+                [way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS]
+            )
         wrong, widths = compared(case, levels)
         if wrong:
             finer = LEVELS[-1] + 1
             for i, way in enumerate(case.ways):
-                levels[i] = [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
+                levels[i] = (
+                    [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
+                )
             wrong, widths = compared(case, levels)
         way = case.ways[1]
         bent = way.swapped and any(isinstance(part, HalfSpace) for part in way.build(0).bodies)
@@ -213,15 +245,21 @@ def judge(seed: int, case: Case) -> Verdict:
             wrong += unmoved(case, way)
     except Exception as failure:  # whatever stops a scene is what is looked for
         where = traceback.extract_tb(failure.__traceback__)[-1]
-        return Verdict(seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",))
+        return Verdict(
+            seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",)
+        )
     return Verdict(seed, case.family, tuple(sorted(wrong)), tuple(widths))
 
 
 def unmoved(case: Case, way: Way) -> list[str]:
-    """What changes when a way is not moved. The peak of a pressure that is all but even lies about any of its nodes."""
+    """What changes when a way is not moved.
+
+    The peak of a pressure that is all but even lies about any of its nodes.
+    """
     still, moved = read(way, LEVELS[0], case, moved=False), read(way, LEVELS[0], case)
     return [
         f"{name} moved: {still[name]:.8g} becomes {moved[name]:.8g}"
         for name in still
-        if name.split()[0] != "peak" and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
+        if name.split()[0] != "peak"
+        and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
     ]

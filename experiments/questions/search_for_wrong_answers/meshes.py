@@ -1,4 +1,6 @@
-"""Meshes of two makers, structured and Gmsh's, and scenes moved as a whole: turned, mirrored, in other units and numbers."""
+"""Meshes of two makers, structured and Gmsh's, and scenes moved as a whole: turned, mirrored, in
+other units and numbers.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,10 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> Any:
     after = np.roll(node, -1, axis=1)
     from skfem import MeshQuad
 
-    made = MeshQuad(np.ascontiguousarray(points), np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1))
+    made = MeshQuad(
+        np.ascontiguousarray(points),
+        np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1),
+    )
     middle = radii.mean()
     sides = {"inside": lambda x: np.hypot(*x) < middle, "outside": lambda x: np.hypot(*x) > middle}
     return named(made, sides)
@@ -68,14 +73,18 @@ def extruded(mesh: Any, z: np.ndarray) -> Any:
     levels = corners // n
     flat = levels.min(axis=0) == levels.max(axis=0)
     number = {tuple(pair): i for i, pair in enumerate(np.sort(mesh.facets, axis=0).T)}
-    below = np.array([-1 if end else number[tuple(np.unique(own % n))] for end, own in zip(flat, corners.T)])
+    below = np.array(
+        [-1 if end else number[tuple(np.unique(own % n))] for end, own in zip(flat, corners.T)]
+    )
     sides = {name: facets[np.isin(below, own)] for name, own in mesh.boundaries.items()}
     ends = {"near": facets[flat & (levels[0] == 0)], "far": facets[flat & (levels[0] > 0)]}
     return made.with_boundaries(sides | ends)
 
 
 def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
-    """Triangles of Gmsh within outlines, the first outer one around holes, by a file; `arcs`: of circles about the origin."""
+    """Triangles of Gmsh within outlines, the first outer one around holes, by a file; `arcs`: of
+    circles about the origin.
+    """
     import gmsh
 
     gmsh.initialize(interruptible=False)
@@ -88,8 +97,13 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
             points = [geo.addPoint(x, y, 0, size) for x, y, size, _ in loop]
             lines = []
             for i, (*_, name) in enumerate(loop):
-                ends, bent = ((points[i], points[(i + 1) % len(loop)]), arcs and not name.startswith("straight"))
-                lines.append(geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends))
+                ends, bent = (
+                    (points[i], points[(i + 1) % len(loop)]),
+                    arcs and not name.startswith("straight"),
+                )
+                lines.append(
+                    geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends)
+                )
                 groups.setdefault(name, []).append(lines[-1])
             curves.append(geo.addCurveLoop(lines))
         geo.addPlaneSurface(curves, 1)
@@ -109,21 +123,27 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A scene as another user would write it: x -> length R x, stresses times stress, nodes and elements renumbered."""
+    """A scene as another user would write it: x -> length R x, stresses times stress, nodes and
+    elements renumbered.
+    """
 
     R: np.ndarray
     length: float = 1.0
     stress: float = 1.0
     seed: int | None = None
 
-    def vector(self, values: Mapping[str, float], names: tuple[str, ...], factor: float) -> dict[str, float]:
+    def vector(
+        self, values: Mapping[str, float], names: tuple[str, ...], factor: float
+    ) -> dict[str, float]:
         """Components by name, of which some may be missing if R exchanges axes only."""
         own = np.array([values.get(name, 0.0) for name in names])
         full = self.R @ own * factor
         if len(values) == len(names):
             return dict(zip(names, full.tolist()))
         there = np.abs(self.R) @ np.array([name in values for name in names], dtype=float)
-        return {name: value for name, value, given in zip(names, full.tolist(), there) if given > 0.5}
+        return {
+            name: value for name, value, given in zip(names, full.tolist(), there) if given > 0.5
+        }
 
     def back(self, vectors: np.ndarray) -> np.ndarray:
         """Vectors (dim, m) of the moved scene in the frame of the first, without units."""
@@ -138,7 +158,9 @@ class Move:
         place = rng.permutation(points.shape[1])
         moved = np.empty_like(points)
         moved[:, place] = points
-        made = type(mesh)(moved, np.ascontiguousarray(place[mesh.t][:, rng.permutation(mesh.nelements)]))
+        made = type(mesh)(
+            moved, np.ascontiguousarray(place[mesh.t][:, rng.permutation(mesh.nelements)])
+        )
         number = {tuple(sorted(own)): i for i, own in enumerate(made.facets.T)}
         sides = {
             name: np.array([number[tuple(sorted(place[own]))] for own in mesh.facets[:, facets].T])
@@ -152,9 +174,14 @@ class Move:
         if isinstance(part, HalfSpace):
             force = None if part.force is None else self.vector(part.force, names, S * L**2)
             height = None if part.height is None else lambda x: L * part.height(x / L)
-            points, depth = (tuple(L * row for row in part.points), None if part.depth is None else L * part.depth)
+            points, depth = (
+                tuple(L * row for row in part.points),
+                None if part.depth is None else L * part.depth,
+            )
             own = replace(part.material, E=part.material.E * S)
-            return replace(part, points=points, height=height, force=force, depth=depth, material=own)
+            return replace(
+                part, points=points, height=height, force=force, depth=depth, material=own
+            )
         if isinstance(part, Rigid):
             gap = None if part.gap is None else lambda x: L * part.gap(self.R.T @ x / L)
             normal = None if part.normal is None else tuple(self.R @ np.array(part.normal))
@@ -169,29 +196,47 @@ class Move:
                 factor = S / L if isinstance(load, BodyForce) else S
                 loads.append(replace(load, value=tuple(self.R @ np.array(load.value) * factor)))
         supports = tuple(
-            held if held.displacement is None else replace(held, displacement=self.vector(held.displacement, names, L))
+            (
+                held
+                if held.displacement is None
+                else replace(held, displacement=self.vector(held.displacement, names, L))
+            )
             for held in part.supports
         )
         curves = {name: self._curve(own) for name, own in (part.curve or {}).items()} or None
         material = replace(part.material, E=part.material.E * S)
         return replace(
-            part, mesh=self.mesh(part.mesh), material=material, supports=supports, loads=tuple(loads), curve=curves
+            part,
+            mesh=self.mesh(part.mesh),
+            material=material,
+            supports=supports,
+            loads=tuple(loads),
+            curve=curves,
         )
 
-    def _curve(self, curve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    def _curve(
+        self, curve: Callable[[np.ndarray], np.ndarray]
+    ) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: self.length * (self.R @ curve(self.R.T @ x / self.length))
 
     def scene(self, scene: Scene) -> Scene:
-        """All bodies of a scene of meshes in the long form, moved. The friction of Tresca's law is a stress."""
+        """All bodies of a scene of meshes in the long form, moved.
+
+        The friction of Tresca's law is a stress.
+        """
         bodies = tuple(self.part(part, scene.components) for part in scene.bodies)
         contacts = tuple(
-            replace(pair, mu=pair.mu * self.stress) if pair.law == "tresca" else pair for pair in scene.contacts
+            replace(pair, mu=pair.mu * self.stress) if pair.law == "tresca" else pair
+            for pair in scene.contacts
         )
-        return replace(scene, bodies=bodies, contacts=contacts, thickness=scene.thickness * self.length)
+        return replace(
+            scene, bodies=bodies, contacts=contacts, thickness=scene.thickness * self.length
+        )
 
 
 def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -> Move:
-    """Any turn if every support and load has all components, or else one that exchanges axes; none in an axisymmetric scene.
+    """Any turn if every support and load has all components, or else one that exchanges axes; none
+    in an axisymmetric scene.
 
     An upper half-space lies above: where the sides are exchanged, up is down.
     """
@@ -201,13 +246,23 @@ def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -
     elif scene.kind == "axisymmetric":
         R = np.diag([1.0, rng.choice([-1.0, 1.0])])
     else:
-        given = [support.displacement for part in scene.bodies if isinstance(part, Part) for support in part.supports]
+        given = [
+            support.displacement
+            for part in scene.bodies
+            if isinstance(part, Part)
+            for support in part.supports
+        ]
         given += [load.force for part in scene.bodies if isinstance(part, Part) for load in part.loads
                   if isinstance(load, Plate)]  # fmt: skip
         given += [
-            value for part in scene.bodies if isinstance(part, Rigid) for value in (part.force, part.displacement)
+            value
+            for part in scene.bodies
+            if isinstance(part, Rigid)
+            for value in (part.force, part.displacement)
         ]
         R = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * rng.choice([-1.0, 1.0], dim)
         if not all(values is None or len(values) == dim for values in given):
             R = np.eye(dim)[rng.permutation(dim)] * rng.choice([-1.0, 1.0], dim)
-    return Move(R, 10.0 ** rng.integers(-3, 4), 10.0 ** rng.integers(-3, 7), int(rng.integers(1000)))
+    return Move(
+        R, 10.0 ** rng.integers(-3, 4), 10.0 ** rng.integers(-3, 7), int(rng.integers(1000))
+    )

@@ -14,9 +14,20 @@ from contactopt.analytic import contact_modulus, hertz_line, hertz_point, press_
 from contactopt.meshes.discs import extrude, half_disc
 from contactopt.meshes.structured import graded, tensor_mesh
 from contactopt.scenes.round import cylinder
-from experiments.questions.search_for_wrong_answers.blocks import Random, friction, material, oblique
+from experiments.questions.search_for_wrong_answers.blocks import (
+    Random,
+    friction,
+    material,
+    oblique,
+)
 from experiments.questions.search_for_wrong_answers.compare import Case, Way
-from experiments.questions.search_for_wrong_answers.meshes import named, outlined, random_move, ring, ticks
+from experiments.questions.search_for_wrong_answers.meshes import (
+    named,
+    outlined,
+    random_move,
+    ring,
+    ticks,
+)
 
 
 def scene_of(bodies: list[Any], pair: tuple[str, str], mu: float, **settings: Any) -> Scene:
@@ -44,7 +55,9 @@ def circle(radius: float, y: float = 0.0) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def pin(rng: Random) -> Case:
-    """A pin with a hole, loaded obliquely, in a bush that is held outside; with or without clearance."""
+    """A pin with a hole, loaded obliquely, in a bush that is held outside; with or without
+    clearance.
+    """
     hole, outer, mu, turn = (
         float(rng.uniform(0.3, 0.6)),
         float(rng.uniform(1.6, 2.5)),
@@ -66,28 +79,52 @@ def pin(rng: Random) -> Case:
     def structured(level: int) -> Scene:
         count = 28 * 2**level
         around = turn + 2 * np.pi * np.arange(count) / count
-        return scene(lambda name: ring(np.geomspace(*radii[name], 4 * 2**level + 1), around), degree=1)
+        return scene(
+            lambda name: ring(np.geomspace(*radii[name], 4 * 2**level + 1), around), degree=1
+        )
 
     def free(level: int) -> Scene:
         def loop(r: float, h: float, name: str) -> Any:
-            return [(r * np.cos(t), r * np.sin(t), h, name) for t in turn + np.pi / 2 * np.arange(4)]
+            return [
+                (r * np.cos(t), r * np.sin(t), h, name) for t in turn + np.pi / 2 * np.arange(4)
+            ]
 
         def mesh(name: str) -> Any:
             (low, high), h = radii[name], 2 * np.pi / (28 * 2**level)
             inner, outward = shares * h if name == "bush" else shares[::-1] * h
-            return outlined(loop(high, outward, "outside"), loop(low, inner, "inside"), order=order, arcs=True)
+            return outlined(
+                loop(high, outward, "outside"), loop(low, inner, "inside"), order=order, arcs=True
+            )
 
         return scene(mesh, **given)
 
-    points = {"pin": [(0.0, (hole + 1) / 2), ((hole + 1) / 2, 0.0)], "bush": [(0.0, -(1 + outer) / 2)]}
-    return Case("pin in bush", (Way(structured), moved(rng, free)), points, smooth=True, loose=play, strain=1e-3)
+    points = {
+        "pin": [(0.0, (hole + 1) / 2), ((hole + 1) / 2, 0.0)],
+        "bush": [(0.0, -(1 + outer) / 2)],
+    }
+    return Case(
+        "pin in bush",
+        (Way(structured), moved(rng, free)),
+        points,
+        smooth=True,
+        loose=play,
+        strain=1e-3,
+    )
 
 
 def fit(rng: Random) -> Case:
     """A press fit: a quarter of two rings against Lame's solution."""
-    bore, outer, d = (float(rng.uniform(0.3, 0.7)), float(rng.uniform(1.4, 2.5)), float(10 ** rng.uniform(-4, -2.5)))
+    bore, outer, d = (
+        float(rng.uniform(0.3, 0.7)),
+        float(rng.uniform(1.4, 2.5)),
+        float(10 ** rng.uniform(-4, -2.5)),
+    )
     shaft, hub, share, mu = material(rng), material(rng), float(rng.uniform(0, 1)), friction(rng)
-    rims, order, sizes = ((1 + share * d, 1 - (1 - share) * d), int(rng.integers(1, 3)), rng.uniform(0.1, 0.2, 2))
+    rims, order, sizes = (
+        (1 + share * d, 1 - (1 - share) * d),
+        int(rng.integers(1, 3)),
+        rng.uniform(0.1, 0.2, 2),
+    )
     given, exact = mortar(rng, order), press_fit(d, bore, 1.0, outer, shaft, hub).peak or 0.0
     sides = (Support("straight x", {"y": 0.0}), Support("straight y", {"x": 0.0}))
 
@@ -103,27 +140,51 @@ def fit(rng: Random) -> Case:
 
         h = sizes / 2**level
         bodies = [
-            Part("shaft", quarter(bore, rims[0], h[0]), shaft, sides, curve={"outside": circle(rims[0])}),
-            Part("hub", quarter(rims[1], outer, h[1]), hub, sides, curve={"inside": circle(rims[1])}),
+            Part(
+                "shaft",
+                quarter(bore, rims[0], h[0]),
+                shaft,
+                sides,
+                curve={"outside": circle(rims[0])},
+            ),
+            Part(
+                "hub", quarter(rims[1], outer, h[1]), hub, sides, curve={"inside": circle(rims[1])}
+            ),
         ]
         return scene_of(bodies, ("shaft:outside", "hub:inside"), mu, copies=4, **given)
 
-    return Case("press fit", ({"pressure 0": exact, "peak 0": exact}, moved(rng, build)), smooth=True, strain=d)
+    return Case(
+        "press fit",
+        ({"pressure 0": exact, "peak 0": exact}, moved(rng, build)),
+        smooth=True,
+        strain=d,
+    )
 
 
 def roller(rng: Random) -> Case:
-    """A cylinder on a flat body: half of it graded around the contact, or all of it, coarse where surfaces are apart."""
+    """A cylinder on a flat body: half of it graded around the contact, or all of it, coarse where
+    surfaces are apart.
+    """
     one, two, mu = material(rng), material(rng), friction(rng)
-    a, wide, high = (float(rng.uniform(0.03, 0.1)), float(rng.uniform(1.5, 4)), float(rng.uniform(1, 3)))
+    a, wide, high = (
+        float(rng.uniform(0.03, 0.1)),
+        float(rng.uniform(1.5, 4)),
+        float(rng.uniform(1, 3)),
+    )
     force, fine, far = (
         np.pi * contact_modulus(one, two) * a**2 / 4,
         float(rng.uniform(0.8, 1.3)),
         float(rng.uniform(0.1, 0.5)),
     )
-    given, sizes = (mortar(rng), {"foundation_width": wide, "foundation_height": high, "force": force})
+    given, sizes = (
+        mortar(rng),
+        {"foundation_width": wide, "foundation_height": high, "force": force},
+    )
 
     def half(level: int) -> Scene:
-        return cylinder(radius=1.0, depth=1.0, upper=one, lower=two, mu=mu, elements=6 * 2**level, **sizes)
+        return cylinder(
+            radius=1.0, depth=1.0, upper=one, lower=two, mu=mu, elements=6 * 2**level, **sizes
+        )
 
     def build(level: int) -> Scene:
         h, c = a / (5 * 2**level) * fine, wide / 2
@@ -133,7 +194,9 @@ def roller(rng: Random) -> Case:
             (0.0, far, "straight top"),
         ]
         made = outlined([(np.cos(t), np.sin(t), s, name) for t, s, name in ends], arcs=True)
-        disc = type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(made.boundaries)
+        disc = type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(
+            made.boundaries
+        )
         flat = [(-c, -high, far, "bottom"), (c, -high, far, "right"), (c, 0.0, far, "over"), (1.3 * a, 0.0, h, "over"),
                 (-1.3 * a, 0.0, h, "over"), (-c, 0.0, far, "left")]  # fmt: skip
         load = Plate("straight top", {"y": -force})
@@ -143,7 +206,9 @@ def roller(rng: Random) -> Case:
         ]
         return scene_of(bodies, ("cylinder:arc", "foundation:over"), mu, **given)
 
-    return Case("roller", (Way(half), moved(rng, build)), whole=False, smooth=True, loose=a**2, strain=a)
+    return Case(
+        "roller", (Way(half), moved(rng, build)), whole=False, smooth=True, loose=a**2, strain=a
+    )
 
 
 def ball(rng: Random) -> Case:
@@ -162,7 +227,11 @@ def ball(rng: Random) -> Case:
             h = a / (6 * 2**level if section else 3 * 1.4**level) * (1.0 if section else share[i])
             across, rise = ticks([0.0, 0.9, 1.0], h), graded(high, h, 1.3 ** (0.5**level))
             rise = -rise[::-1] if i else rise
-            flat = tensor_mesh(across, rise) if section else extrude(*half_disc(across, max(2, len(across) // 4)), rise)
+            flat = (
+                tensor_mesh(across, rise)
+                if section
+                else extrude(*half_disc(across, max(2, len(across) // 4)), rise)
+            )
             r = np.hypot(*flat.p[:-1]) if len(flat.p) == 3 else flat.p[0]
             middle = flat.p[:, flat.facets].mean(axis=1)
             touch = (np.abs(middle[-1]) < 1e-9) & (np.linalg.norm(middle[:-1], axis=0) < 0.9)
@@ -176,7 +245,9 @@ def ball(rng: Random) -> Case:
             mesh = named(type(flat)(p, flat.t), sides)
             mesh = mesh.with_boundaries({**mesh.boundaries, "contact": np.flatnonzero(touch)})
             held = Support("axis", {"r": 0.0} if section else {"y": 0.0})
-            supports, loads = ((held, Support("far")), ()) if i else ((held,), (Plate("far", {"z": -force}),))
+            supports, loads = (
+                ((held, Support("far")), ()) if i else ((held,), (Plate("far", {"z": -force}),))
+            )
             bodies.append(Part(["upper", "lower"][i], mesh, own, supports, loads))
         kind = {"kind": "axisymmetric"} if section else {"kind": "solid", "copies": 2}
         return scene_of(bodies, ("upper", "lower"), mu, **kind)
@@ -189,9 +260,16 @@ def ball(rng: Random) -> Case:
 
 
 def exact(rng: Random) -> Case:
-    """Round bodies on half-spaces without friction, against Hertz, and a wave on a periodic half-plane, against Westergaard."""
+    """Round bodies on half-spaces without friction, against Hertz, and a wave on a periodic
+    half-plane, against Westergaard.
+    """
     solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
-    rigid, radius, a, shift = (wave or rng.random() < 0.4, float(rng.uniform(5, 50)), 1.0, rng.uniform(-0.1, 0.1, 2))
+    rigid, radius, a, shift = (
+        wave or rng.random() < 0.4,
+        float(rng.uniform(5, 50)),
+        1.0,
+        rng.uniform(-0.1, 0.1, 2),
+    )
     modulus, share, wide = (
         contact_modulus(None if rigid else one, two),
         float(rng.uniform(0.1, 0.8)),
@@ -214,8 +292,18 @@ def exact(rng: Random) -> Case:
     else:
         force = np.pi * modulus * a**2 / (4 * radius)
         peak = hertz_line(force, radius, modulus).peak or 0.0
-        mean, reach, bearing = (8 / (3 * np.pi) * peak, a / 2, 2 * (gamma(1.25) / gamma(1.75)) ** 2 * a)
-    known = {"pressure 0": mean, "reach 0": reach, "peak 0": peak, "bearing 0": bearing, "normal 0": force}
+        mean, reach, bearing = (
+            8 / (3 * np.pi) * peak,
+            a / 2,
+            2 * (gamma(1.25) / gamma(1.75)) ** 2 * a,
+        )
+    known = {
+        "pressure 0": mean,
+        "reach 0": reach,
+        "peak 0": peak,
+        "bearing 0": bearing,
+        "normal 0": force,
+    }
 
     def gap(x: np.ndarray) -> np.ndarray:
         if wave:
@@ -224,23 +312,44 @@ def exact(rng: Random) -> Case:
 
     def build(level: int) -> Scene:
         count = (10 if solid else 48) * 2**level
-        row = (np.arange(count) + 0.5) * 2 * a / share / count if wave else np.linspace(-wide, wide, count) + shift[0]
-        points = (row, np.linspace(-wide, wide, count + 1) + shift[1]) if solid else (row - a / share * wave,)
+        row = (
+            (np.arange(count) + 0.5) * 2 * a / share / count
+            if wave
+            else np.linspace(-wide, wide, count) + shift[0]
+        )
+        points = (
+            (row, np.linspace(-wide, wide, count + 1) + shift[1])
+            if solid
+            else (row - a / share * wave,)
+        )
         load = {"z" if solid else "y": -force}
         upper: Any = Rigid("upper", gap=gap, force=load)
         if not rigid:
             upper = HalfSpace("upper", one, points, height=lambda x: -gap(x), force=load)
         ground = HalfSpace("lower", two, points, periodic=bool(wave))
-        return scene_of([upper, ground], ("upper", "lower"), 0.0, kind="solid" if solid else "plane-strain")
+        return scene_of(
+            [upper, ground], ("upper", "lower"), 0.0, kind="solid" if solid else "plane-strain"
+        )
 
     second = moved(rng, build, (0, 1, 2) if solid else (0, 1))
     return Case("half-space, exact", (known, second), smooth=True)
 
 
 def heights(rng: Random) -> Case:
-    """A rigid uneven body on a half-space: as a gap, or as the height of the half-space; with friction."""
-    solid, periodic, mu, own = (rng.random() < 0.4, bool(rng.random() < 0.4), friction(rng), material(rng))
-    tall, k, phase = (float(10 ** rng.uniform(-4, -3)), rng.integers(1, 4, (4, 2)), rng.uniform(0, 2 * np.pi, 4))
+    """A rigid uneven body on a half-space: as a gap, or as the height of the half-space; with
+    friction.
+    """
+    solid, periodic, mu, own = (
+        rng.random() < 0.4,
+        bool(rng.random() < 0.4),
+        friction(rng),
+        material(rng),
+    )
+    tall, k, phase = (
+        float(10 ** rng.uniform(-4, -3)),
+        rng.integers(1, 4, (4, 2)),
+        rng.uniform(0, 2 * np.pi, 4),
+    )
     force = contact_modulus(None, own) * tall * float(10 ** rng.uniform(-1, 0.3))
     load, axes, first = oblique(rng, mu, force), (0, 1, 2) if solid else (0, 1), 10 if solid else 40
     load = {"z" if solid and name == "y" else name: value for name, value in load.items()}
@@ -257,16 +366,31 @@ def heights(rng: Random) -> Case:
         height = (lambda x: -gap(x)) if high else None
         points, depth = ((row, row), None) if solid else ((row,), 3.0)
         ground = HalfSpace("ground", own, points, height=height, periodic=periodic, depth=depth)
-        return scene_of([body, ground], ("body", "ground"), mu, kind="solid" if solid else "plane-strain")
+        return scene_of(
+            [body, ground], ("body", "ground"), mu, kind="solid" if solid else "plane-strain"
+        )
 
-    ways = (Way(lambda level: build(level, False), axes), moved(rng, lambda level: build(level, True), axes))
+    ways = (
+        Way(lambda level: build(level, False), axes),
+        moved(rng, lambda level: build(level, True), axes),
+    )
     return Case("gap or height of a half-space", ways, smooth=True, loose=20 * tall)
 
 
 def large(rng: Random) -> Case:
-    """A rigid profile on a half-plane, and on a body of finite elements that is larger from level to level."""
-    own, mu, radius, bumps = (material(rng), friction(rng), float(rng.uniform(10, 50)), float(rng.uniform(0, 0.5)))
-    phase, period, share, degree = (*map(float, rng.uniform([0, 0.5, 0.8], [6, 1.5, 1.2])), int(rng.integers(1, 3)))
+    """A rigid profile on a half-plane, and on a body of finite elements that is larger from level
+    to level.
+    """
+    own, mu, radius, bumps = (
+        material(rng),
+        friction(rng),
+        float(rng.uniform(10, 50)),
+        float(rng.uniform(0, 0.5)),
+    )
+    phase, period, share, degree = (
+        *map(float, rng.uniform([0, 0.5, 0.8], [6, 1.5, 1.2])),
+        int(rng.integers(1, 3)),
+    )
     load = oblique(rng, mu, np.pi * contact_modulus(None, own) / (4 * radius))
 
     def gap(x: np.ndarray) -> np.ndarray:
@@ -281,8 +405,13 @@ def large(rng: Random) -> Case:
         c, h = 15.0 * 2**level, share / (8 * 2**level)
         ends = [(-c, -c, "bottom"), (c, -c, "right"), (c, 0, "top"), (2, 0, "over"), (1.3, 0, "over"), (-1.3, 0, "over"),
                 (-2, 0, "top"), (-c, 0, "left")]  # fmt: skip
-        mesh = outlined([(x, y, 3.0 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends])
-        part, body = (Part("ground", mesh, own, (Support("bottom"),)), Rigid("body", (0.0, 1.0), gap, load))
+        mesh = outlined(
+            [(x, y, 3.0 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends]
+        )
+        part, body = (
+            Part("ground", mesh, own, (Support("bottom"),)),
+            Rigid("body", (0.0, 1.0), gap, load),
+        )
         return scene_of([body, part], ("body", "ground:over"), mu, degree=degree)
 
     second = Way(finite)

@@ -22,8 +22,11 @@ from contactopt.solving.solve_scene import solve_scene
 
 Row = dict[str, Any]
 
-RADIUS, FORCES = 400.0, (0.8, 0.9, 1.0, 1.1, 1.2)  # the errors of one force alone can be small by luck
-EXACT = {force: analytic.hertz_line(force, RADIUS, analytic.contact_modulus(RUBBER)) for force in FORCES}
+# the errors of one force alone can be small by luck
+RADIUS, FORCES = 400.0, (0.8, 0.9, 1.0, 1.1, 1.2)
+EXACT = {
+    force: analytic.hertz_line(force, RADIUS, analytic.contact_modulus(RUBBER)) for force in FORCES
+}
 A = EXACT[1.0].half_width
 SIZE = 60 * A  # half-width and depth of the block
 DEGREE = 2  # of the finite elements
@@ -39,7 +42,9 @@ def block(mesh: Any, force: float) -> Scene:
     """A rigid cylinder on a block that is clamped below."""
     named = rename(mesh, bottom="y-", top="y+")
     part = Part("block", named, RUBBER, (Support("bottom"),), contact="top")
-    return Scene("cylinder on a block", _cylinder(force), part, 0.0, law="frictionless", degree=DEGREE)
+    return Scene(
+        "cylinder on a block", _cylinder(force), part, 0.0, law="frictionless", degree=DEGREE
+    )
 
 
 def _cylinder(force: float) -> Rigid:
@@ -74,9 +79,13 @@ def solved(scene: Scene) -> Answer:
 
 
 def adaptive(goal: float, force: float) -> Answer:
-    """The last of the meshes that refinement makes, from a coarse one on; the time is that of all of them."""
+    """The last of the meshes that refinement makes, from a coarse one on; the time is that of all
+    of them.
+    """
     coarse = tensor_mesh(np.linspace(-SIZE, SIZE, 17), np.linspace(-SIZE, 0, 9))
-    found, estimate = refine([block(coarse, force)], "pressure", goal, limits=Limits(60_000), adaptive=True)
+    found, estimate = refine(
+        [block(coarse, force)], "pressure", goal, limits=Limits(60_000), adaptive=True
+    )
     return found.reduction.dofs, estimate.value
 
 
@@ -89,7 +98,9 @@ WAYS: dict[str, tuple[Callable[[float, float], Answer], tuple[float, ...]]] = {
 
 
 def chart_rows() -> list[Row]:
-    """One row for every setting of every way: root mean square of the errors, least of the seconds over all forces."""
+    """One row for every setting of every way: root mean square of the errors, least of the seconds
+    over all forces.
+    """
     rows = []
     for way, (run, settings) in WAYS.items():
         run(settings[0], 1.0)  # imports and caches do not count
@@ -109,12 +120,24 @@ def chart_rows() -> list[Row]:
 
 
 def bias() -> float:
-    """By how much the peak pressure of the block misses that of a half-plane, on the finest graded mesh."""
+    """By how much the peak pressure of the block misses that of a half-plane, on the finest graded
+    mesh.
+    """
     return graded_by_hand(GRADED[-1], 1.0)[1] / EXACT[1.0].peak - 1
 
 
-LABELS = {"half-plane": (0, 1.0, 1.3), "graded": (1, 1.1, 1.1), "adaptive": (0, 1.1, 1.15), "uniform": (0, 1.12, 1.15)}
-COLOURS = {"half-plane": "#0072b2", "graded": "#009e73", "adaptive": "#d55e00", "uniform": "#555555"}
+LABELS = {
+    "half-plane": (0, 1.0, 1.3),
+    "graded": (1, 1.1, 1.1),
+    "adaptive": (0, 1.1, 1.15),
+    "uniform": (0, 1.12, 1.15),
+}
+COLOURS = {
+    "half-plane": "#0072b2",
+    "graded": "#009e73",
+    "adaptive": "#d55e00",
+    "uniform": "#555555",
+}
 NAMES = {
     "half-plane": "half-plane, no mesh",
     "graded": "graded by hand",
@@ -149,9 +172,14 @@ def draw_chart(rows: list[Row], model_error: float) -> Figure:
 
 
 def size_rows() -> list[Row]:
-    """Half-planes instead of blocks of all thicknesses and cylinders of all curvatures: the error said and the error made."""
+    """Half-planes instead of blocks of all thicknesses and cylinders of all curvatures: the error
+    said and the error made.
+    """
     rows: list[Row] = []
-    ways = (("H / a", "cylinder", (1.5, 2.0, 4.0, 8.0, 16.0)), ("a / R", "foundation", (0.05, 0.1, 0.2, 0.3)))
+    ways = (
+        ("H / a", "cylinder", (1.5, 2.0, 4.0, 8.0, 16.0)),
+        ("a / R", "foundation", (0.05, 0.1, 0.2, 0.3)),
+    )
     for what, rigid, values in ways:
         hertz = scenes.cylinder(rigid=rigid).reference
         assert hertz is not None
@@ -161,7 +189,11 @@ def size_rows() -> list[Row]:
                 changes = {"force": 100.0 * (value * 400.0 / hertz.half_width) ** 2}
             scene = scenes.cylinder(mu=0.0, elements=64, rigid=rigid, **changes)
             spot = spot_of(coarse(scene))
-            row: Row = {"size": what, "value": value, "error said": spot if isinstance(spot, str) else spot.error}
+            row: Row = {
+                "size": what,
+                "value": value,
+                "error said": spot if isinstance(spot, str) else spot.error,
+            }
             if not isinstance(spot, str):
                 peaks = [
                     max(solved.solution.reactions[:, 0] / solved.reduction.problem.areas)

@@ -1,4 +1,6 @@
-"""Random scenes, symmetric or nearly so: what is called exact, beside the solution and the certificate of the whole."""
+"""Random scenes, symmetric or nearly so: what is called exact, beside the solution and the
+certificate of the whole.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,19 @@ from typing import Any
 import numpy as np
 from skfem import MeshQuad, MeshTri
 
-from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
+from contactopt import (
+    BodyForce,
+    Contact,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    scenes,
+    simplify,
+)
 from contactopt import natural_map_residual as certificate
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.meshes.polar import ring
@@ -30,15 +44,21 @@ WRONG = 1e-4  # relative difference from the whole from which on an exact answer
 
 
 def block(rng: np.random.Generator, spoil: float) -> Scene:
-    """A rigid indenter on a block: an asperity, a patch of other friction, a force, a traction or the mesh is on one side."""
+    """A rigid indenter on a block: an asperity, a patch of other friction, a force, a traction or
+    the mesh is on one side.
+    """
     count, way = int(rng.integers(6, 20)), rng.integers(5) if spoil else -1
-    ticks = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 2 * count + 1)) if rng.random() < 0.5 else None
+    ticks = (
+        np.sin(np.linspace(-np.pi / 2, np.pi / 2, 2 * count + 1)) if rng.random() < 0.5 else None
+    )
     x = 3 * (np.linspace(-1, 1, 2 * count + 1) if ticks is None else ticks) + rng.choice([0.0, 7.3])
     middle, place, wide = (x[0] + x[-1]) / 2, rng.uniform(0.1, 2.5), 10 ** rng.uniform(-2, 0)
     radius, friction = 10 ** rng.uniform(0.5, 2.5), rng.uniform(0.0, 0.6)
     mesh: Any = rename(tensor_mesh(x, np.linspace(-3, 0, count + 1)), contact="y+", bottom="y-")
     if way == 4:
-        mesh = replace(mesh, doflocs=mesh.p + spoil * np.array([[0.2], [0.0]]) * (mesh.p[0] > middle + 1))
+        mesh = replace(
+            mesh, doflocs=mesh.p + spoil * np.array([[0.2], [0.0]]) * (mesh.p[0] > middle + 1)
+        )
 
     def there(p: np.ndarray) -> np.ndarray:
         return np.exp(-(((p[0] - middle - place) / wide) ** 2))
@@ -47,13 +67,18 @@ def block(rng: np.random.Generator, spoil: float) -> Scene:
         return (p[0] - middle) ** 2 / (2 * radius) - (0.3 * spoil * there(p) if way == 0 else 0.0)
 
     def mu(p: np.ndarray) -> np.ndarray:
-        return friction * (1 + 0.1 * np.abs(p[0] - middle)) + (spoil * there(p) if way == 1 else 0.0)
+        return friction * (1 + 0.1 * np.abs(p[0] - middle)) + (
+            spoil * there(p) if way == 1 else 0.0
+        )
 
     pull = (Traction("x+", (spoil, 0.0)),) if way == 3 else ()
     weight = 10 ** rng.uniform(-2, 0.5)
     force = {"x": spoil * friction * weight if way == 2 else 0.0, "y": -weight}
     return Scene(
-        "block", Rigid("indenter", (0.0, 1.0), gap, force), Part("block", mesh, SOFT, (Support("bottom"),), pull), mu
+        "block",
+        Rigid("indenter", (0.0, 1.0), gap, force),
+        Part("block", mesh, SOFT, (Support("bottom"),), pull),
+        mu,
     )
 
 
@@ -70,10 +95,19 @@ def punch(rng: np.random.Generator, spoil: float) -> Scene:
         row = np.argmax(made[0].p[0])
         made[0].p[0, row] += spoil
     force = {"x": 0.3 * spoil if way == 0 else 0.0, "y": -10.0}
-    loads = (Plate("top", force), Traction("x+", (-0.5, 0.0)), Traction("x-", (0.5 + spoil * (way == 1), 0.0)))
+    loads = (
+        Plate("top", force),
+        Traction("x+", (-0.5, 0.0)),
+        Traction("x-", (0.5 + spoil * (way == 1), 0.0)),
+    )
     stiff = STIFF if way != 3 else Material(STIFF.E * (1 + spoil), STIFF.nu)
     top = Part("punch", made[0], SOFT, loads=loads)
-    ground = Part("ground", made[1], stiff, (Support("bottom"), *((Support("x-", {"x": 0.0}),) if way == 3 else ())))
+    ground = Part(
+        "ground",
+        made[1],
+        stiff,
+        (Support("bottom"), *((Support("x-", {"x": 0.0}),) if way == 3 else ())),
+    )
     return Scene("punch", top, ground, rng.uniform(0.1, 0.8))
 
 
@@ -82,21 +116,29 @@ def _crossed(mesh: MeshQuad) -> MeshTri:
     p = np.concatenate([mesh.p, mesh.p[:, mesh.t].mean(axis=1)], axis=1)
     middle = mesh.p.shape[1] + np.arange(mesh.t.shape[1])
     cells = [np.stack([mesh.t[i], mesh.t[(i + 1) % 4], middle]) for i in range(4)]
-    sides = {name: np.sort(mesh.facets[:, facets], axis=0) for name, facets in mesh.boundaries.items()}
+    sides = {
+        name: np.sort(mesh.facets[:, facets], axis=0) for name, facets in mesh.boundaries.items()
+    }
     made = MeshTri(p, np.concatenate(cells, axis=1))
     keys = {tuple(pair): number for number, pair in enumerate(np.sort(made.facets, axis=0).T)}
-    return made.with_boundaries({name: np.array([keys[tuple(p)] for p in pairs.T]) for name, pairs in sides.items()})
+    return made.with_boundaries(
+        {name: np.array([keys[tuple(p)] for p in pairs.T]) for name, pairs in sides.items()}
+    )
 
 
 def tube(rng: np.random.Generator, spoil: float) -> Scene:
-    """A tube under a flat plate: its bore is off the middle, or it is turned, or one spot of its rim is higher."""
+    """A tube under a flat plate: its bore is off the middle, or it is turned, or one spot of its
+    rim is higher.
+    """
     sectors, way = 4 * int(rng.integers(4, 10)), rng.integers(3) if spoil else -1
     angles = np.linspace(0, 2 * np.pi, sectors + 1) + (np.deg2rad(5) * spoil if way == 1 else 0.0)
     inner, radii = rng.uniform(0.3, 0.7), int(rng.integers(3, 6))
     made = ring(np.linspace(inner, 1, radii + 1), angles)
     straight = MeshQuad(made.p[:, : made.nvertices], made.t)
     depth = (1 - np.linalg.norm(straight.p, axis=0)) / (1 - inner)
-    off = np.array([[np.cos(rng.uniform(0, 6))], [np.sin(rng.uniform(0, 6))]]) * (0.05 * spoil if way == 0 else 0.0)
+    off = np.array([[np.cos(rng.uniform(0, 6))], [np.sin(rng.uniform(0, 6))]]) * (
+        0.05 * spoil if way == 0 else 0.0
+    )
     mesh = MeshQuad(straight.p + off * depth, straight.t).with_boundaries(
         {
             "bore": lambda x: np.linalg.norm(x - off, axis=0) < (1 + 3 * inner) / 4,
@@ -105,37 +147,60 @@ def tube(rng: np.random.Generator, spoil: float) -> Scene:
     )
 
     def gap(p: np.ndarray) -> np.ndarray:
-        return 1 - p[1] - (0.01 * spoil * np.exp(-(((p[0] - 0.07) / 0.03) ** 2)) if way == 2 else 0.0)
+        return (
+            1 - p[1] - (0.01 * spoil * np.exp(-(((p[0] - 0.07) / 0.03) ** 2)) if way == 2 else 0.0)
+        )
 
     plate = Rigid("plate", (0.0, 1.0), gap, {"x": 0.0, "y": -(10 ** rng.uniform(-2, -0.5))})
     return Scene("tube", plate, Part("tube", mesh, SOFT, (Support("bore"),)), rng.uniform(0, 0.5))
 
 
 def bridge(rng: np.random.Generator, spoil: float) -> Scene:
-    """A beam on two piers on a rigid floor: one pier is heavier, softer or more slippery, or the floor is lower there."""
+    """A beam on two piers on a rigid floor: one pier is heavier, softer or more slippery, or the
+    floor is lower there.
+    """
     way, count = rng.integers(4) if spoil else -1, int(rng.integers(1, 4))
 
-    def solid(name: str, x: tuple[float, float], y: tuple[float, float], own: float, wrong: bool) -> Part:
+    def solid(
+        name: str, x: tuple[float, float], y: tuple[float, float], own: float, wrong: bool
+    ) -> Part:
         ticks = [np.linspace(low, high, round(high - low) * 2 * count + 1) for low, high in (x, y)]
         weight = -1e-3 * (1 + spoil * (wrong and way == 0))
         material = Material(own * (1 + spoil * (wrong and way == 1)), 0.3)
-        loads = (BodyForce((0.0, weight)), *((Traction("top", (0.0, -0.2)),) if name == "beam" else ()))
-        return Part(name, rename(tensor_mesh(*ticks), contact="y-", top="y+"), material, loads=loads)
+        loads = (
+            BodyForce((0.0, weight)),
+            *((Traction("top", (0.0, -0.2)),) if name == "beam" else ()),
+        )
+        return Part(
+            name, rename(tensor_mesh(*ticks), contact="y-", top="y+"), material, loads=loads
+        )
 
-    left, right = solid("left", (-5, -3), (0, 4), 5.0, False), solid("right", (3, 5), (0, 4), 5.0, True)
+    left, right = (
+        solid("left", (-5, -3), (0, 4), 5.0, False),
+        solid("right", (3, 5), (0, 4), 5.0, True),
+    )
     beam = solid("beam", (-6, 6), (4, 6), 20.0, False)
     mu = rng.uniform(0.3, 0.7)
-    pairs = [Contact(name, "floor", mu * (1 + spoil * (way == 2 and name == "right"))) for name in ("left", "right")]
+    pairs = [
+        Contact(name, "floor", mu * (1 + spoil * (way == 2 and name == "right")))
+        for name in ("left", "right")
+    ]
     pairs += [Contact("beam", f"{name}:top", mu) for name in ("left", "right")]
     floor = Rigid("floor", gap=lambda p: 0.1 * spoil * (p[0] > 4.1) * (way == 3))
     return Scene("bridge", bodies=(floor, left, right, beam), contacts=tuple(pairs))
 
 
 def roller(rng: np.random.Generator, spoil: float) -> Scene:
-    """A rigid roller on a solid block between rollers: a ridge, a slippery band, a crown, or an end that is free."""
+    """A rigid roller on a solid block between rollers: a ridge, a slippery band, a crown, or an end
+    that is free.
+    """
     way, count = rng.integers(5) if spoil else -1, int(rng.integers(3, 6))
     depth, place, wide = rng.uniform(1, 4), rng.uniform(0, 1), rng.uniform(0.03, 0.3)
-    ticks = np.linspace(-3, 3, 2 * count + 1), np.linspace(0, depth, int(rng.integers(3, 7))), np.linspace(-3, 0, count)
+    ticks = (
+        np.linspace(-3, 3, 2 * count + 1),
+        np.linspace(0, depth, int(rng.integers(3, 7))),
+        np.linspace(-3, 0, count),
+    )
     mesh = rename(tensor_mesh(*ticks), contact="z+", bottom="z-", near="y-", far="y+")
 
     def band(p: np.ndarray) -> np.ndarray:
@@ -149,7 +214,11 @@ def roller(rng: np.random.Generator, spoil: float) -> Scene:
         return 0.3 + spoil * band(p) * (way == 1) + 0.0 * p[0]
 
     ends = [Support("near", {"y": 0.0}), Support("far", {"y": 0.0})]
-    curve = (lambda x: x + np.array([[0], [0], [1]]) * 0.01 * spoil * x[1] / depth) if way == 4 else None
+    curve = (
+        (lambda x: x + np.array([[0], [0], [1]]) * 0.01 * spoil * x[1] / depth)
+        if way == 4
+        else None
+    )
     held = (Support("bottom"), *ends[: 1 if way == 3 else 2])
     weight = 10 ** rng.uniform(-1, 0.7) * depth
     force = {"x": rng.choice([0.0, 0.1]) * weight, "z": -weight}
@@ -157,36 +226,56 @@ def roller(rng: np.random.Generator, spoil: float) -> Scene:
     return Scene("roller", Rigid("roller", (0.0, 0.0, 1.0), gap, force), block, mu, kind="solid")
 
 
-KINDS: tuple[Callable[[np.random.Generator, float], Scene], ...] = (block, punch, tube, bridge, roller)
+KINDS: tuple[Callable[[np.random.Generator, float], Scene], ...] = (
+    block,
+    punch,
+    tube,
+    bridge,
+    roller,
+)
 
 
 def numbers(solved: Solved) -> np.ndarray:
     """Energy, approach and peak pressure of the whole, whatever part of it is modelled."""
     problem, solution = solved.reduction.problem, solved.solution
     r = solution.reactions
-    energy, peak = elastic_energy(solved.reduction, solution), float((r[:, 0] / problem.areas).max())
+    energy, peak = (
+        elastic_energy(solved.reduction, solution),
+        float((r[:, 0] / problem.areas).max()),
+    )
     return np.array([energy, approach(problem, solution) or 0.0, peak])
 
 
 def scene_of(number: int) -> tuple[Scene, float]:
     """The scene of that number, and by how much it is spoilt."""
     rng = np.random.default_rng(number)
-    spoil = 10 ** rng.uniform(np.log10(SMALLEST), np.log10(LARGEST)) if rng.random() < SPOILT else 0.0
+    spoil = (
+        10 ** rng.uniform(np.log10(SMALLEST), np.log10(LARGEST)) if rng.random() < SPOILT else 0.0
+    )
     return KINDS[number % len(KINDS)](rng, spoil), spoil
 
 
 def checked(number: int) -> Row:
-    """One scene: whether something was called exact, its proof, and the same by the reduced whole and by its solution."""
+    """One scene: whether something was called exact, its proof, and the same by the reduced whole
+    and by its solution.
+    """
     scene, spoil = scene_of(number)
     found = simplify(scene)
     exact = [each for each in found.found if each.exact]
     row: Row = {"scene": number, "kind": scene.name, "spoilt by": spoil, "exact": len(exact)}
     if not exact:
-        return row | {"proof": 0.0, "certificate": 0.0, "difference": 0.0, "said": " ".join(found.notes)}
+        return row | {
+            "proof": 0.0,
+            "certificate": 0.0,
+            "difference": 0.0,
+            "said": " ".join(found.notes),
+        }
     part, whole = solve_scene(found.scene, options=TIGHT), solve_scene(scene, options=TIGHT)
     spread = Spread(part, [fold for each in exact for fold in each.folds])
     made = reduce_bodies(scene)
-    parts = [spread.reactions(pair, coupling) for pair, coupling in zip(scene.pairs, made.couplings)]
+    parts = [
+        spread.reactions(pair, coupling) for pair, coupling in zip(scene.pairs, made.couplings)
+    ]
     r = np.concatenate([own[0] for own in parts if own is not None])
     ours, theirs = numbers(part), numbers(whole)
     apart = np.abs(ours - theirs) / np.maximum(np.abs(theirs), 1e-12 * np.abs(theirs).max())
@@ -211,8 +300,13 @@ def table(checks: list[Row]) -> list[Row]:
     made = []
     for (kind, sort), own in sorted(groups.items()):
         exact = [row for row in own if row["exact"]]
-        least = min((row["spoilt by"] for row in own if row["spoilt by"] and not row["exact"]), default=0.0)
-        worst = {key: max((row[key] for row in exact), default=0.0) for key in ("proof", "certificate", "difference")}
+        least = min(
+            (row["spoilt by"] for row in own if row["spoilt by"] and not row["exact"]), default=0.0
+        )
+        worst = {
+            key: max((row[key] for row in exact), default=0.0)
+            for key in ("proof", "certificate", "difference")
+        }
         wrong = sum(row["difference"] > WRONG for row in exact)
         counts = {"kind": kind, "scenes": sort, "count": len(own), "called exact": len(exact)}
         made.append(counts | worst | {"wrong": wrong, "least spoilt of the others": least})
@@ -245,5 +339,12 @@ def prices() -> list[Row]:
             seconds.append(min(own))
         kept = proved_part(scene, Options())[0].found
         unknowns = f"{kept[0].before[0]} -> {kept[-1].after[0]}"
-        made.append({"scene": name, "unknowns": unknowns, "whole, s": seconds[0], "part and proof, s": seconds[1]})
+        made.append(
+            {
+                "scene": name,
+                "unknowns": unknowns,
+                "whole, s": seconds[0],
+                "part and proof, s": seconds[1],
+            }
+        )
     return made
