@@ -36,6 +36,8 @@ def refinement_figure(estimate: Estimate) -> Any:
     if np.any(energy > 0):
         left.loglog(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
     left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
+    if not np.any(errors > 0) and not np.any(energy > 0):  # the target stands alone
+        left.set_ylim(estimate.target / 10, estimate.target * 10)
     left.set(
         xlabel="unknowns [-]",
         ylabel="estimated relative error [-]",

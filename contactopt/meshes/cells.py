@@ -85,7 +85,7 @@ def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
     """
     if is_curved(mesh):
         return mesh
-    made = CURVED[mesh.refdom.__name__](places, mesh.t)
+    made = CURVED[mesh.refdom.__name__](np.ascontiguousarray(places), mesh.t)
     return made.with_boundaries(mesh.boundaries) if mesh.boundaries else made
 
 

@@ -23,25 +23,27 @@ from experiments.questions.search_for_wrong_answers.compare import Verdict, judg
 from experiments.questions.search_for_wrong_answers.families import FAMILIES  # noqa: E402
 
 SCENES = 300  # ten of them suffice for a first look
-TEXT = """Is an answer right whose certificate is right? This report solves random scenes (seeds {first} to {last}) in two ways that share
-neither mesh nor coupling, and compares what they say. The first way has structured meshes whose
-nodes match, or is an exact solution. The second has unstructured meshes of Gmsh, read from its
-files, with a mortar coupling carried by either side; or a model in space for one in the plane,
-finite elements for a half-space, the shape of a mesh for a function of the gap. The second way is
-also turned or mirrored, written in other units and with other numbers of nodes and elements, and
-the sides of its contacts are exchanged.
+TEXT = """Is an answer right whose certificate is right? This report solves random scenes (seeds
+{first} to {last}) in two ways that share neither mesh nor coupling, and compares what they say. The first
+way has structured meshes whose nodes match, or is an exact solution. The second has unstructured
+meshes of Gmsh, read from its files, with a mortar coupling carried by either side; or a model in
+space for one in the plane, finite elements for a half-space, the shape of a mesh for a function of
+the gap. The second way is also turned or mirrored, written in other units and with other numbers of
+nodes and elements, and the sides of its contacts are exchanged.
 
 Each way is solved on three meshes, each about twice as fine as the one before (1.4 times in space).
 The error of the finest is estimated by the range of the three values, or by Richardson's
 extrapolation where that says more. Two ways *disagree* if their values are further apart than the
-sum of both estimates. They are then refined once more, and judged by the last three meshes. Forces,
-their centre and reach, energy, a smooth measure of the area of contact, a mean and the largest
-pressure where it is finite, friction, the share of the force that sticks, displacements and
+sum of both estimates. They are then compared once more, on three finer meshes with quadratic
+displacements: linear elements lock in thin lips, and their levels may differ less than they err.
+Forces, their centre and reach, energy, a smooth measure of the area of contact, a mean and the
+largest pressure where it is finite, friction, the share of the force that sticks, displacements and
 stresses at points inside are compared. The second way is also compared with itself, not moved, on
 one mesh: there the two may differ by {sharp:g} of the quantity's size. A scene that stops or is not
-solved counts as a disagreement.
+solved counts as a disagreement. Coulomb friction may leave several solutions. Where methods find
+two of them, each certified, two ways that say two things are both right.
 
-Disagreements: {count} of {scenes} scenes.
+Disagreements: {count} of {scenes} scenes. Several solutions, of which the ways found two: {many}.
 
 {listed}
 
@@ -73,7 +75,7 @@ def report(found: list[tuple[Verdict, float]]) -> None:
             {
                 "family": family,
                 "scenes": len(mine),
-                "disagreements": sum(bool(verdict.wrong) for verdict, _ in mine),
+                "disagreements": sum(verdict.disagrees for verdict, _ in mine),
                 "width": float(
                     np.median([width for verdict, _ in mine for width in verdict.widths or (0.0,)])
                 ),
@@ -82,14 +84,17 @@ def report(found: list[tuple[Verdict, float]]) -> None:
         )
     wrong = [verdict for verdict, _ in found if verdict.wrong]
     listed = "\n".join(
-        f"- seed {each.seed}, {each.family}: {'; '.join(each.wrong[:3])}" for each in wrong
+        f"- seed {each.seed}, {each.family}{', several solutions' * each.several}: "
+        + "; ".join(each.wrong[:3])
+        for each in wrong
     )
     seeds = [verdict.seed for verdict, _ in found]
     text = TEXT.replace("{table}", "TABLE").format(
         first=min(seeds),
         last=max(seeds),
         scenes=len(found),
-        count=len(wrong),
+        count=sum(each.disagrees for each in wrong),
+        many=sum(each.several for each in wrong),
         sharp=SHARP,
         listed=listed,
     )
@@ -103,10 +108,11 @@ def main(scenes: int = SCENES, first: int = 0) -> int:
     found = []
     for verdict, seconds in verdicts(first, first + scenes):
         found.append((verdict, seconds))
-        outcome = "\n   ".join(["disagrees", *verdict.wrong]) if verdict.wrong else "agrees"
+        word = "disagrees" if verdict.disagrees else "several solutions"
+        outcome = "\n   ".join([word, *verdict.wrong]) if verdict.wrong else "agrees"
         print(f"{verdict.seed} {verdict.family}, {seconds:.1f} s: {outcome}", flush=True)
     report(found)
-    return int(any(verdict.wrong for verdict, _ in found))
+    return int(any(verdict.disagrees for verdict, _ in found))
 
 
 if __name__ == "__main__":

@@ -11,17 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from contactopt import HalfSpace, Rigid, Scene, run
+from contactopt import HalfSpace, Rigid, Scene, reduce_bodies, run, solve
+from contactopt.methods import solvers_of
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.quantities import elastic_energy
 from experiments.questions.search_for_wrong_answers.meshes import Move
 
 LEVELS = (0, 1, 2)  # each about twice as fine as the one before
+FINER = (1, 2, 3)  # with quadratic displacements, where the others disagree
+OTHERS = ("nsgs", "lemke", "tresca")  # methods that may find other solutions than the default one
 TOL = 1e-9  # of the certificate
 ROUNDING = 1e-5  # of a quantity's scale: what the certificate leaves open
 SHARP = 1e-4  # between one mesh and the same mesh moved
 SLOWEST = 0.9  # largest ratio of the differences between levels that an estimate believes
 # nodes among which a value at a point is fitted, in the plane and in space
+SLOW = 20.0  # [s] for a method that may find another solution
 AROUND = {2: 20, 3: 120}
 
 Values = dict[str, float]
@@ -84,11 +88,12 @@ def _turned(part: Any) -> Any:
     return part
 
 
-def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
+def read(way: Way, level: int, case: Case, moved: bool = True, degree: int | None = None) -> Values:
     """Solve a level of a way, and read all quantities in the frame and units of the case; raises
     what goes wrong.
     """
     scene = way.build(level)
+    scene = scene if degree is None else replace(scene, degree=degree)
     scene = swapped(scene) if way.swapped else scene
     move = way.move if moved and way.move is not None else Move(np.eye(scene.dim))
     result = run(
@@ -189,14 +194,21 @@ def error(row: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came out of one seed: disagreements in words, and the width of the estimates in shares
-    of the scales.
+    """What came out of one seed.
+
+    Disagreements in words, the width of the estimates in shares of the scales, and whether the
+    problem has several solutions.
     """
 
     seed: int
     family: str
     wrong: tuple[str, ...]
     widths: tuple[float, ...] = ()
+    several: bool = False
+
+    @property
+    def disagrees(self) -> bool:
+        return bool(self.wrong) and not self.several
 
 
 def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[float]]:
@@ -222,33 +234,49 @@ def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[fl
 def judge(seed: int, case: Case) -> Verdict:
     """Compare the two ways of a case, and the second with itself where it is not moved.
 
-    Where they disagree, both are refined once more: then the coarsest level was too coarse for an
-    estimate, or they disagree.
+    Where they disagree, both are compared once more on finer meshes with quadratic displacements:
+    linear elements lock in thin lips, and three of their levels may then differ less than the last
+    one errs. Where friction leaves several solutions, two ways may find two of them, and both are
+    right.
     """
-    levels: list[list[Values]] = []
     try:
-        for way in case.ways:
-            levels.append(
-                [way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS]
-            )
-        wrong, widths = compared(case, levels)
+        wrong, widths = compared(case, read_levels(case, LEVELS))
         if wrong:
-            finer = LEVELS[-1] + 1
-            for i, way in enumerate(case.ways):
-                levels[i] = (
-                    [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
-                )
-            wrong, widths = compared(case, levels)
+            wrong, widths = compared(case, read_levels(case, FINER, 2))
         way = case.ways[1]
         bent = way.swapped and any(isinstance(part, HalfSpace) for part in way.build(0).bodies)
         if way.move is not None and not bent:
             wrong += unmoved(case, way)
+        many = bool(wrong) and any(has_several(own) for own in case.ways if isinstance(own, Way))
     except Exception as failure:  # whatever stops a scene is what is looked for
         where = traceback.extract_tb(failure.__traceback__)[-1]
         return Verdict(
             seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",)
         )
-    return Verdict(seed, case.family, tuple(sorted(wrong)), tuple(widths))
+    return Verdict(seed, case.family, tuple(sorted(wrong)), tuple(widths), many)
+
+
+def read_levels(
+    case: Case, levels: tuple[int, ...], degree: int | None = None
+) -> list[list[Values]]:
+    """What each way says on each level; an exact solution says it once."""
+    return [
+        [way]
+        if isinstance(way, dict)
+        else [read(way, level, case, degree=degree) for level in levels]
+        for way in case.ways
+    ]
+
+
+def has_several(way: Way) -> bool:
+    """Whether methods find two certified solutions of the coarsest problem that differ in force."""
+    problem = reduce_bodies(way.build(LEVELS[0])).problem
+    found = [solve(problem, tol=TOL).reactions]
+    for method in OTHERS:
+        if method in solvers_of(problem.law):
+            other = solve(problem, method, tol=TOL, time_limit=SLOW)
+            found += [other.reactions] if other.status.label == "solved" else []
+    return any(np.linalg.norm(r - found[0]) > SHARP * np.linalg.norm(found[0]) for r in found)
 
 
 def unmoved(case: Case, way: Way) -> list[str]:
