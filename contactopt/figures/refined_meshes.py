@@ -32,12 +32,11 @@ def refinement_figure(estimate: Estimate) -> Any:
     unknowns = np.array([level.unknowns for level in estimate.levels])
     errors = np.array([np.nan if level.error is None else level.error for level in estimate.levels])
     energy = np.array([level.energy_error for level in estimate.levels])
-    left.loglog(unknowns, errors, "o-", color=BLUE, label=f"of {estimate.quantity}")
+    known = np.isfinite(errors)
+    left.loglog(unknowns[known], errors[known], "o-", color=BLUE, label=f"of {estimate.quantity}")
     if np.any(energy > 0):
         left.loglog(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
     left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
-    if not np.any(errors > 0) and not np.any(energy > 0):  # the target stands alone
-        left.set_ylim(estimate.target / 10, estimate.target * 10)
     left.set(
         xlabel="unknowns [-]",
         ylabel="estimated relative error [-]",
