@@ -33,11 +33,14 @@ def refinement_figure(estimate: Estimate) -> Any:
     errors = np.array([np.nan if level.error is None else level.error for level in estimate.levels])
     energy = np.array([level.energy_error for level in estimate.levels])
     known = np.isfinite(errors)
-    left.loglog(unknowns[known], errors[known], "o-", color=BLUE, label=f"of {estimate.quantity}")
+    if known.any():
+        left.plot(unknowns[known], errors[known], "o-", color=BLUE, label=f"of {estimate.quantity}")
     if np.any(energy > 0):
-        left.loglog(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
+        left.plot(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
     left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
     left.set(
+        xscale="log",
+        yscale="log",
         xlabel="unknowns [-]",
         ylabel="estimated relative error [-]",
         title=f"{len(unknowns)} meshes",
