@@ -34,8 +34,9 @@ nodes and elements, and the sides of its contacts are exchanged.
 Each way is solved on three meshes, each about twice as fine as the one before (1.4 times in space).
 The error of the finest is estimated by the range of the three values, or by Richardson's
 extrapolation where that says more. Two ways *disagree* if their values are further apart than the
-sum of both estimates. They are then compared once more, on three finer meshes with quadratic
-displacements: linear elements lock in thin lips, and their levels may differ less than they err.
+sum of both estimates. They are then compared once more on finer meshes, and at last on these with
+quadratic displacements: linear elements lock in thin lips, and their levels may differ less than
+they err.
 Forces, their centre and reach, energy, a smooth measure of the area of contact, a mean and the
 largest pressure where it is finite, friction, the share of the force that sticks, displacements and
 stresses at points inside are compared. The second way is also compared with itself, not moved, on
