@@ -3,15 +3,14 @@ reports.
 
     >>> from contactopt import benchmark
     >>> folder = benchmark.run_campaign("friction.toml", jobs=2)
-    >>> table = benchmark.load(folder)          # pandas.DataFrame, one row per run; columns:
-                                                benchmark.COLUMNS
+    >>> table = benchmark.load(folder)  # pandas.DataFrame, one row per run: benchmark.COLUMNS
 
 An experiment file names problems, methods and settings; lists and ranges are multiplied out:
 
     name = "friction"
     plugins = ["mine.py"]                       # files beside this one
     settings = ["low", "mid", "high", 1e-7]     # bounds on the certificate: 1e-3, 1e-6, 1e-9;
-                                                "default": the method's own
+                                                # "default": the method's own
     repeats = 3
     time_limit = 10.0                           # s per run, enforced
     [[problems]]
@@ -30,9 +29,8 @@ A method of your own is a function in `mine.py`; nothing in this package changes
     from contactopt.benchmark import method
 
     @method
-    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start are
-                                                passed if asked for
-        r = np.zeros(problem.q.shape)
+    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start
+        r = np.zeros(problem.q.shape)           # are passed if asked for
         ...
         return r                                # or (r, multipliers), or a contactopt.Solution
 

@@ -9,6 +9,7 @@ import errno
 import inspect
 import random
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +27,7 @@ from contactopt.problem import InterfaceProblem, Solution, Status
 
 POINTS = 100  # of a history
 MB = 1e6
+FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,69 +44,41 @@ class Outcome:
     history: tuple[dict[str, float], ...] = ()
 
 
-def no_answer(status: str, error: object, measured: dict[str, float] | None = None) -> Answer:
-    """What is said of a run that ended without an answer: a word of the column `status`, and a text
-    or an exception.
-    """
-    return Answer(status, one_line(error), measured or {})
-
-
 def measure(
     task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
 ) -> Answer:
-    """Run a method on a problem, and measure time and memory.
-
-    Parameters
-    ----------
-    task : The run and its limits.
-    problem : The interface problem.
-    start : The solution to start from, if there is one.
-    plugins : The methods of the user.
-
-    Returns
-    -------
-    Its answer, or how it failed.
+    """Run a method on a problem, from `start` if there is one, and measure time and memory: its
+    answer, or how it failed.
     """
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
     measured = {"base_mb": _reset_peak()}
     wall, cpu = time.perf_counter(), time.process_time()
+    error: BaseException | None = None
     try:
-        outcome: Outcome | Exception = call(task, problem, start, plugins)
-    except (Exception, SystemExit, KeyboardInterrupt) as error:
-        outcome = (
-            error
-            if isinstance(error, Exception)
-            else RuntimeError(f"it raised {type(error).__name__}({error})")
-        )
-    measured |= {
-        "call_seconds": time.perf_counter() - wall,
-        "cpu_seconds": time.process_time() - cpu,
-    }
-    measured["peak_mb"] = _peak()
-    if not isinstance(outcome, Outcome):
-        kinds = {
-            MemoryError: "out_of_memory",
-            InputError: "refused",
-            BackendError: "backend_failed",
-        }
-        word = next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error")
-        full = isinstance(outcome, OSError) and outcome.errno == errno.ENOMEM
-        return no_answer("out_of_memory" if full else word, outcome, measured)
+        outcome = call(task, problem, start, plugins)
+    except (Exception, SystemExit, KeyboardInterrupt) as raised:
+        error = raised
+    measured["call_seconds"] = time.perf_counter() - wall
+    measured["cpu_seconds"] = time.process_time() - cpu
+    measured["peak_mb"] = _memory("VmHWM")
+    if error is not None:
+        word = next((word for kind, word in FAILURES.items() if isinstance(error, kind)), "error")
+        if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+            word = "out_of_memory"
+        return Answer(word, one_line(error), measured)
     try:
         return _read_outcome(outcome, problem, measured)
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        return no_answer("error", f"its answer has the wrong form: {error}", measured)
+    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
+        return Answer("error", one_line(f"its answer has the wrong form: {wrong}"), measured)
 
 
 def _read_outcome(
     outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]
 ) -> Answer:
     """The answer in its one form; TypeError or ValueError if it has another."""
-    r, lam = (
-        _real(outcome.reactions),
-        None if outcome.multipliers is None else _real(outcome.multipliers),
-    )
+    r = _real(outcome.reactions)
+    lam = None if outcome.multipliers is None else _real(outcome.multipliers)
     if r.size != problem.q.size:
         raise ValueError(
             f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}"
@@ -113,7 +87,6 @@ def _read_outcome(
         raise ValueError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}")
     if outcome.status not in STATUSES:
         raise ValueError(f"{outcome.status!r} is no status")
-    seconds = measured["call_seconds"] if np.isnan(outcome.seconds) else float(outcome.seconds)
     return Answer(
         outcome.status,
         one_line(outcome.message),
@@ -122,15 +95,13 @@ def _read_outcome(
         lam,
         str(outcome.label),
         float(outcome.iterations),
-        seconds,
+        measured["call_seconds"] if np.isnan(outcome.seconds) else float(outcome.seconds),
         _thinned(outcome.history),
     )
 
 
 def _real(values: Any) -> np.ndarray:
-    """The values as an array of floats of its own; TypeError or ValueError if they are not real
-    numbers.
-    """
+    """An array of floats of its own; TypeError or ValueError if the values are not real numbers."""
     array = np.asarray(values)
     if np.iscomplexobj(array):
         raise TypeError("complex numbers")
@@ -140,59 +111,46 @@ def _real(values: Any) -> np.ndarray:
 def call(
     task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
 ) -> Outcome:
-    """Run a method on a problem. Its own errors pass through.
-
-    Parameters
-    ----------
-    task, problem, start, plugins : As for `measure`.
-
-    Returns
-    -------
-    The answer of the method, with what it says of itself.
-    """
-    spec, tol = task.run.method, None if task.run.setting == "default" else task.run.tolerance
+    """The answer of a method, with what it says of itself. Its own errors pass through."""
+    spec, usual = task.run.method, task.run.setting == "default"
     plugin = None if spec.name in METHODS else plugins.find(spec.name)
-    if plugin is None or plugin.iterates:
-        method = (
-            find_method(spec.name, **spec.settings)
-            if plugin is None
-            else plugin.make(**spec.settings)
-        )
-        settings: dict[str, Any] = {} if tol is None else {"tol": tol}
-        settings |= {
-            "max_iterations": task.max_iterations,
-            "time_limit": task.time_limit,
-            "start": start,
-        }
-        s = solve(problem, method, **settings)
-        return Outcome(
-            s.reactions,
-            s.multipliers,
-            s.status.label,
-            s.message,
-            s.method,
-            s.iterations,
-            s.seconds["solve"],
-            s.history,
-        )
     given = {
         "tol": task.run.tolerance,
         "time_limit": task.time_limit,
         "max_iterations": task.max_iterations,
         "start": start,
     }
+    if plugin is None or plugin.iterates:
+        if plugin is None:
+            method = find_method(spec.name, **spec.settings)
+        else:
+            method = plugin.make(**spec.settings)
+        if usual:
+            del given["tol"]
+        s = solve(problem, method, **given)
+        return _of_solution(s, s.method, s.seconds["solve"])
     wanted = inspect.signature(plugin.make).parameters
     passed = {name: given[name] for name in PASSED if name in wanted and name not in spec.settings}
-    if tol is None and "tol" in passed and wanted["tol"].default is not inspect.Parameter.empty:
+    if usual and "tol" in passed and wanted["tol"].default is not inspect.Parameter.empty:
         del passed["tol"]
     answer = plugin.make(problem, **passed, **spec.settings)
     if isinstance(answer, Solution):
-        return Outcome(
-            answer.reactions, answer.multipliers, answer.status.label, answer.message, spec.label, answer.iterations,
-            history=answer.history,
-        )  # fmt: skip
+        return _of_solution(answer, spec.label)
     reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)
     return Outcome(reactions, multipliers, Status.SOLVED.label, label=spec.label)
+
+
+def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Outcome:
+    return Outcome(
+        s.reactions,
+        s.multipliers,
+        s.status.label,
+        s.message,
+        label,
+        s.iterations,
+        seconds,
+        s.history,
+    )
 
 
 def _thinned(
@@ -212,24 +170,14 @@ def _thinned(
 
 
 def _reset_peak() -> float:
-    """Forget the largest resident memory so far; the present one [MB], nan where the system does
-    not tell.
-    """
-    try:
-        with open("/proc/self/clear_refs", "w") as file:
-            file.write("5")
-        return _status("VmRSS")
-    except OSError:
-        return np.nan
+    """Forget the largest resident memory so far; the present one [MB]."""
+    with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
+        file.write("5")
+    return _memory("VmRSS")
 
 
-def _peak() -> float:
-    try:
-        return _status("VmHWM")
-    except OSError:
-        return np.nan
-
-
-def _status(field: str) -> float:
-    with open("/proc/self/status") as file:
+def _memory(field: str) -> float:
+    """What the system tells of this process [MB]; nan where it tells nothing."""
+    with suppress(OSError), open("/proc/self/status") as file:
         return next(int(line.split()[1]) * 1024 / MB for line in file if line.startswith(field))
+    return np.nan

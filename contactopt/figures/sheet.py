@@ -4,6 +4,7 @@ what is known exactly.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from inspect import Parameter, getdoc, signature
 from typing import Any
@@ -46,36 +47,26 @@ def describe(name: str, changes: dict[str, Any]) -> str:
         head, arguments = [f"{name}: {SCENES[name][2]}"], _argument_lines(name)
     scene = states[-1]
     length, stress = scene.units
-    lines = [
-        *head,
-        f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}",
-        "",
-    ]
+    kind = f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}"
+    lines = [*head, kind, ""]
     meshes = {
         part.name: part.build_mesh(min(scene.elements, 8), scene.zone)
         for part in scene.parts
         if isinstance(part, Part)
     }
     if meshes:
-        lines += [*sketch(list(meshes.values())), ""]
-        lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(
-            scene
-        )
-        lines.append("")
+        legend = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes))
+        lines += [*sketch(list(meshes.values())), "", legend + _section(scene), ""]
     for part in scene.parts:
         lines += _part_lines(scene, part, meshes.get(part.name))
     images = f"; {scene.copies} mirror images make the whole" if scene.copies > 1 else ""
-    lines.append(
-        f"{count(len(scene.pairs), 'pair')} of surfaces:"
-        f" {', '.join(pair.name for pair in scene.pairs)}{images}"
-    )
+    names = ", ".join(pair.name for pair in scene.pairs)
+    lines.append(f"{count(len(scene.pairs), 'pair')} of surfaces: {names}{images}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states")
-    exact = (
-        "nothing is known exactly"
-        if scene.reference is None
-        else f"known exactly: {scene.reference.label}"
-    )
+    exact = "nothing is known exactly"
+    if scene.reference is not None:
+        exact = f"known exactly: {scene.reference.label}"
     return "\n".join([*lines, exact, *arguments])
 
 
@@ -85,9 +76,10 @@ def _argument_lines(name: str) -> list[str]:
     """
     module = SCENES[name][0]
     fixed = SCENES[name][-1] if isinstance(SCENES[name][-1], dict) else {}
-    entries = [PATHS[name], SCENES[name]] if name in PATHS else [SCENES[name]]
     makers = [
-        getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1]) for entry in entries
+        getattr(import_module(f"contactopt.scenes.{table[name][0]}"), table[name][1])
+        for table in (PATHS, SCENES)
+        if name in table
     ]
     lines = [
         "",
@@ -108,13 +100,9 @@ def _argument_lines(name: str) -> list[str]:
 
 
 def _section(scene: Scene) -> str:
-    if scene.copies == 1 and scene.kind != "axisymmetric":
-        return ""
-    return (
-        "  (one half of the section)"
-        if scene.kind == "axisymmetric"
-        else "  (the part that is modelled)"
-    )
+    if scene.kind == "axisymmetric":
+        return "  (one half of the section)"
+    return "" if scene.copies == 1 else "  (the part that is modelled)"
 
 
 def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
@@ -128,28 +116,27 @@ def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
         lines[0] += f"; {size} {length}"
         for support in part.supports:
             held = support.displacement
-            what = "clamped" if held is None else ", ".join(f"{c} = {v:g}" for c, v in held.items())
+            what = "clamped" if held is None else _components(held)
             lines.append(f"  support '{support.boundary}': {what}")
-        for load in part.loads:
-            lines.append(f"  {_load(load)}")
+        lines += [f"  {_load(load)}" for load in part.loads]
     elif not isinstance(part, HalfSpace):
         lines[0] += ": rigid"
     if getattr(part, "force", None):
-        lines.append("  total force: " + ", ".join(f"{c} = {v:g}" for c, v in part.force.items()))
+        lines.append(f"  total force: {_components(part.force)}")
     return lines
+
+
+def _components(vector: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in vector.items())
 
 
 def _load(load: Any) -> str:
     if isinstance(load, Plate):
-        return f"plate on '{load.boundary}': total force " + ", ".join(
-            f"{c} = {v:g}" for c, v in load.force.items()
-        )
+        return f"plate on '{load.boundary}': total force {_components(load.force)}"
     value = ", ".join(f"{v:g}" for v in load.value)
-    return (
-        f"traction on '{load.boundary}': {value}"
-        if isinstance(load, Traction)
-        else f"force per volume: {value}"
-    )
+    if isinstance(load, Traction):
+        return f"traction on '{load.boundary}': {value}"
+    return f"force per volume: {value}"
 
 
 def sketch(meshes: list[Any]) -> list[str]:
