@@ -9,8 +9,9 @@ import errno
 import inspect
 import random
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,20 +31,6 @@ MB = 1e6
 FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
 
 
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a method returned, in one form for all; `status` is its own word."""
-
-    reactions: np.ndarray
-    multipliers: np.ndarray | None
-    status: str
-    message: str = ""
-    label: str = ""
-    iterations: float = np.nan
-    seconds: float = np.nan
-    history: tuple[dict[str, float], ...] = ()
-
-
 def measure(
     task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
 ) -> Answer:
@@ -56,7 +43,7 @@ def measure(
     wall, cpu = time.perf_counter(), time.process_time()
     error: BaseException | None = None
     try:
-        outcome = call(task, problem, start, plugins)
+        answer = call(task, problem, start, plugins)
     except (Exception, SystemExit, KeyboardInterrupt) as raised:
         error = raised
     measured["call_seconds"] = time.perf_counter() - wall
@@ -66,37 +53,35 @@ def measure(
         word = next((word for kind, word in FAILURES.items() if isinstance(error, kind)), "error")
         if isinstance(error, OSError) and error.errno == errno.ENOMEM:
             word = "out_of_memory"
-        return Answer(word, one_line(error), measured)
+        return Answer(word, one_line(error), measured=measured)
     try:
-        return _read_outcome(outcome, problem, measured)
+        return replace(_in_form(answer, problem, measured["call_seconds"]), measured=measured)
     except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
-        return Answer("error", one_line(f"its answer has the wrong form: {wrong}"), measured)
+        message = one_line(f"its answer has the wrong form: {wrong}")
+        return Answer("error", message, measured=measured)
 
 
-def _read_outcome(
-    outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]
-) -> Answer:
+def _in_form(answer: Answer, problem: InterfaceProblem, seconds: float) -> Answer:
     """The answer in its one form; TypeError or ValueError if it has another."""
-    r = _real(outcome.reactions)
-    lam = None if outcome.multipliers is None else _real(outcome.multipliers)
+    r = _real(answer.reactions)
+    lam = None if answer.multipliers is None else _real(answer.multipliers)
     if r.size != problem.q.size:
         raise ValueError(
             f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}"
         )
     if lam is not None and lam.shape != problem.s.shape:
         raise ValueError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}")
-    if outcome.status not in STATUSES:
-        raise ValueError(f"{outcome.status!r} is no status")
+    if answer.status not in STATUSES:
+        raise ValueError(f"{answer.status!r} is no status")
     return Answer(
-        outcome.status,
-        one_line(outcome.message),
-        measured,
+        answer.status,
+        one_line(answer.message),
         r.reshape(problem.q.shape),
         lam,
-        str(outcome.label),
-        float(outcome.iterations),
-        measured["call_seconds"] if np.isnan(outcome.seconds) else float(outcome.seconds),
-        _thinned(outcome.history),
+        str(answer.label),
+        float(answer.iterations),
+        seconds if np.isnan(answer.seconds) else float(answer.seconds),
+        _thinned(answer.history),
     )
 
 
@@ -110,11 +95,11 @@ def _real(values: Any) -> np.ndarray:
 
 def call(
     task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
-) -> Outcome:
-    """The answer of a method, with what it says of itself. Its own errors pass through."""
+) -> Answer:
+    """The answer of a method, in whatever form it gave it. Its own errors pass through."""
     spec, usual = task.run.method, task.run.setting == "default"
     plugin = None if spec.name in METHODS else plugins.find(spec.name)
-    given = {
+    given: dict[str, Any] = {
         "tol": task.run.tolerance,
         "time_limit": task.time_limit,
         "max_iterations": task.max_iterations,
@@ -137,29 +122,19 @@ def call(
     if isinstance(answer, Solution):
         return _of_solution(answer, spec.label)
     reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)
-    return Outcome(reactions, multipliers, Status.SOLVED.label, label=spec.label)
+    return Answer(Status.SOLVED.label, "", reactions, multipliers, spec.label)
 
 
-def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Outcome:
-    return Outcome(
-        s.reactions,
-        s.multipliers,
-        s.status.label,
-        s.message,
-        label,
-        s.iterations,
-        seconds,
-        s.history,
-    )
+def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Answer:
+    forces = (s.reactions, s.multipliers)
+    return Answer(s.status.label, s.message, *forces, label, s.iterations, seconds, s.history)
 
 
-def _thinned(
-    history: tuple[dict[str, float], ...],
-) -> tuple[list[float], list[float], list[int]] | None:
+def _thinned(history: Sequence[Mapping[str, float]] | None) -> Any:
     """Residuals, seconds and iterations, at most POINTS of them, the last included; None without a
     history.
     """
-    if not len(history):
+    if not history:
         return None
     index = np.unique(np.geomspace(1, len(history), POINTS).astype(int)) - 1
     residuals, seconds = (

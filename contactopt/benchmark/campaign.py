@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,7 @@ def run_campaign(
     return folder
 
 
-def _keep(rows: Iterator[dict[str, Any]], tasks: list[Task], store: Store, bar: Any) -> None:
+def _keep(rows: Iterable[dict[str, Any]], tasks: list[Task], store: Store, bar: Any) -> None:
     """Store the rows of the tasks as they come, and show the progress."""
     failed: Counter[str] = Counter()
     waiting = {task.run.key for task in tasks}

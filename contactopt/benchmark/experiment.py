@@ -243,7 +243,9 @@ class _Reader:
         methods = self.expanded("methods", ("method",), method)
         if not problems or not methods:
             raise NothingToRun(f"'{self.path}': nothing is left to run; " + " ".join(self.skipped))
-        values = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items()}
+        values: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in data.items()
+        }
         values |= {"problems": tuple(problems), "methods": tuple(methods), "plugins": paths}
         return Experiment(**values, path=self.path, skipped=tuple(self.skipped))
 

@@ -1,5 +1,5 @@
 """Every key of an experiment file with an example, as the help of `contactopt bench` and the
-documentation show them. The texts are in keys.toml.
+documentation show them, and every column of a table of results. The texts are in keys.toml.
 """
 
 from __future__ import annotations
@@ -12,6 +12,9 @@ _texts = tomllib.loads(files("contactopt.benchmark").joinpath("keys.toml").read_
 EXPERIMENT: dict[str, tuple[str, str]] = _texts["experiment"]
 FIGURE: dict[str, tuple[str, str]] = _texts["figure"]
 KINDS: dict[str, str] = _texts["kinds"]
+# column -> type, what it is
+COLUMNS: dict[str, tuple[str, str]] = _texts["columns"]
+ENDS: dict[str, str] = _texts["statuses"]  # how runs end besides with a word of contactopt.Status
 
 
 def help_text() -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -45,17 +45,18 @@ class Answer:
     `status` is the method's own word; `reactions` None where there is no answer.
 
     measured  the columns call_seconds, cpu_seconds, peak_mb and base_mb, as far as they are known
+    history   residuals, seconds and iterations
     """
 
     status: str
-    message: str
-    measured: dict[str, float]
+    message: str = ""
     reactions: np.ndarray | None = None
     multipliers: np.ndarray | None = None
     label: str = ""
     iterations: float = np.nan
     seconds: float = np.nan
-    history: tuple[list[float], list[float], list[int]] | None = None
+    history: Any = None
+    measured: dict[str, float] = field(default_factory=dict)
 
 
 def blank(task: Task) -> dict[str, Any]:

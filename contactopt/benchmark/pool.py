@@ -6,7 +6,7 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from typing import Any
 
 from contactopt.benchmark import worker
@@ -199,7 +199,7 @@ class Shares:
             return task
 
 
-def run_locally(tasks: Sequence[Task], jobs: int) -> Iterator[dict[str, Any]]:
+def run_locally(tasks: Sequence[Task], jobs: int) -> Generator[dict[str, Any]]:
     """The row of each run as it is finished, made by `jobs` workers.
 
     When the iteration is left, the workers are killed.

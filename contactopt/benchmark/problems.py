@@ -168,8 +168,15 @@ def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> In
     V = np.zeros((contacts, 2, 1))
     V[:, 0] = 1.0
     q = np.stack([x**2, np.zeros(contacts)], axis=1)
-    Q, V, law = Q.reshape(2 * contacts, -1), V.reshape(-1, 1), Coulomb(np.full(contacts, mu))
-    return InterfaceProblem(Q, q, law, V, np.array([-0.25]), np.full(contacts, h), x[None])
+    return InterfaceProblem(
+        Q.reshape(2 * contacts, -1),
+        q,
+        Coulomb(np.full(contacts, mu)),
+        V.reshape(-1, 1),
+        np.array([-0.25]),
+        np.full(contacts, h),
+        x[None],
+    )
 
 
 def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.benchmark.keys import COLUMNS, ENDS
 from contactopt.errors import InputError
 from contactopt.files.writing import replace_file
 from contactopt.problem import Status
@@ -30,82 +31,7 @@ if TYPE_CHECKING:
 
 SCHEMA = 1  # of COLUMNS; a reader refuses newer ones
 
-# column -> (type, what it is)
-COLUMNS: dict[str, tuple[str, str]] = {
-    "schema": ("int", "version of these columns"),
-    "key": ("str", "of the run: problem, method, backend versions, setting, start and repeat"),
-    "experiment": ("str", "name of the experiment"),
-    "problem": ("str", "name with parameters"),
-    "family": ("str", "the problem's name: scene, FCLib file or generated family"),
-    "parameters": ("str", "of the problem, JSON; load() adds them as columns problem.NAME"),
-    "fingerprint": ("str", "digest of the problem's data"),
-    "contacts": ("int", "number of contacts"),
-    "dim": ("int", "2 or 3"),
-    "plates": ("int", "balance rows"),
-    "rank": ("float", "of Q; nan unless the experiment asks to diagnose, as are the next four"),
-    "condition": ("float", "of Q on its range"),
-    "guaranteed_mu": (
-        "float",
-        "below this friction coefficient the alternating iteration contracts for every load",
-    ),
-    "alternating_mu": (
-        "float",
-        "it does not for some load at this one (all contacts slip one way); the least such",
-    ),
-    "tresca_mu": ("float", "the same for the Tresca iteration"),
-    "method": ("str", "name with the settings given"),
-    "name": ("str", "the method's name"),
-    "settings": ("str", "given to the method, JSON; load() adds them as columns method.NAME"),
-    "label": ("str", "the method with all its settings"),
-    "backend": ("str", "QP and conic backends with versions, or native"),
-    "law": ("str", "the problem solved: coulomb, or associated (convex relaxation)"),
-    "setting": ("str", "default, low, mid, high, or a number"),
-    "tolerance": ("float", "bound on the certificate by which success is judged; 1e-8 at default"),
-    "time_limit": ("float", "of the run [s]"),
-    "start": ("str", "cold or warm"),
-    "repeat": ("int", "0, 1, ..."),
-    "status": ("str", "how the run ended: a key of STATUSES"),
-    "message": ("str", "details"),
-    "claimed": ("bool", "the method called its answer a solution"),
-    "success": ("bool", "law_residual <= tolerance within the time limit"),
-    "iterations": ("float", "outer iterations; nan if unknown"),
-    "residual": (
-        "float",
-        "natural-map residual of Coulomb's problem, recomputed; inf without a finite answer",
-    ),
-    "law_residual": ("float", "the same for the method's own law"),
-    "error": (
-        "float",
-        "|r - r_ref| / |r_ref|, r_ref the answer of least residual <= 1e-8 to this problem",
-    ),
-    "build_seconds": ("float", "building the problem, wall; once per process"),
-    "solve_seconds": (
-        "float",
-        "the method's own time, wall: certificates along the way not counted",
-    ),
-    "call_seconds": ("float", "wall time of the whole call"),
-    "cpu_seconds": ("float", "CPU time of the whole call, all threads"),
-    "peak_mb": ("float", "largest resident memory of the process during the call [MB]"),
-    "base_mb": ("float", "resident memory before it [MB]"),
-    "history": (
-        "str",
-        "JSON: residual after each outer iteration, and the seconds until then; thinned to 100",
-    ),
-    "versions": ("str", "of Python, contactopt, NumPy and SciPy"),
-    "machine": ("str", "processor and number of cores"),
-    "time": ("str", "UTC, end of the run"),
-}
-STATUSES = {s.label: s.sentence for s in Status} | {
-    "solved": "the certificate is at most the tolerance",
-    "false_claim": "called a solution by the method, but its certificate is above the tolerance",
-    "not_finite": "the answer holds numbers that are not finite",
-    "refused": "the method does not take this problem",
-    "error": "the method raised an exception",
-    "crashed": "the method ended its process",
-    "killed": "still running at the hard time limit",
-    "out_of_memory": "asked for more memory than the limit",
-    "not_built": "the problem itself could not be built",
-}
+STATUSES = {status.label: status.sentence for status in Status} | ENDS
 REFERENCE = 1e-8  # largest residual of a reference solution
 KINDS: dict[str, type | tuple[type, ...]] = {
     "int": int,

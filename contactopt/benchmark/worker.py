@@ -123,9 +123,11 @@ def find_start(label: str) -> None:
     problem = _kept.problem
     if problem is None or _kept.label != label or _kept.start is not None:
         return
-    load = {"s": NEIGHBOUR * problem.s} if len(problem.s) else {"q": NEIGHBOUR * problem.q}
+    q, s = problem.q, NEIGHBOUR * problem.s
+    if not len(s):
+        q = NEIGHBOUR * q
     try:
-        found = solve(replace(problem, law=problem.law.times(NEIGHBOUR), **load))
+        found = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
         if not found.solved:
             raise InputError(f"no warm start: {found.message}")
         _kept.start = found
@@ -141,7 +143,7 @@ def execute(task: Task) -> Answer | None:
     if task.run.start == "warm":
         start = _kept.start
         if start is None:
-            return Answer("not_built", one_line(_kept.missing or "no warm start"), {})
+            return Answer("not_built", one_line(_kept.missing or "no warm start"))
     _limit_memory(task.memory_limit)
     answer = measure(task, problem, start, _kept.plugins)
     _only(own)

@@ -236,7 +236,7 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    layout = "constrained" if problem.dim == 3 else None
+    layout: Any = "constrained" if problem.dim == 3 else None
     figure = Figure(figsize=(5.6, 3.6 * len(panels)), layout=layout)
     if problem.dim == 2:
         figure.subplots_adjust(left=0.19, right=0.97, bottom=0.07, top=0.94, hspace=0.24)

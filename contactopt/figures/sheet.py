@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 
 from contactopt.cards import count
+from contactopt.figures.pieces import pieces, surface, triangles
+from contactopt.figures.solids import nearest
+from contactopt.meshes.cells import elements_of
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
 from contactopt.scenes.scene import HalfSpace, Part, Plate, Scene, Traction
 
@@ -148,23 +151,20 @@ def sketch(meshes: list[Any]) -> list[str]:
     size = np.maximum(high - low, 1e-300)
     step = max(size[0] / COLUMNS, size[1] / (ROWS * ASPECT))  # of a column
     columns, rows = max(1, round(size[0] / step)), max(1, round(size[1] / (step * ASPECT)))
-    x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
-    y = high[1] - (np.arange(rows) + 0.5) * size[1] / rows
+    scale = np.array([columns, rows]) / size
     picture = np.full((rows, columns), " ")
     for mark, mesh in zip(MARKS * len(meshes), meshes):
-        corners = mesh.p[axes][:, mesh.t]  # (2, c, cells)
+        kind, elements = elements_of(mesh)
         if len(mesh.p) == 3:  # the cells that the section through the least second coordinate meets
-            second = mesh.p[1][mesh.t]
-            corners = corners[:, :, second.min(axis=0) <= second.min() + 1e-9 * np.ptp(mesh.p[1])]
-        least, most = corners.min(axis=1), corners.max(axis=1)
-        for cell in range(corners.shape[2]):
-            inside_x = np.flatnonzero((x >= least[0, cell]) & (x <= most[0, cell]))
-            inside_y = np.flatnonzero((y >= least[1, cell]) & (y <= most[1, cell]))
-            if len(inside_x) and len(inside_y):
-                block = np.ix_(inside_y, inside_x)
-                found = _inside(corners[:, :, cell], *np.meshgrid(x[inside_x], y[inside_y]))
-                picture[block] = np.where(found, mark, picture[block])
-    return ["".join(row).rstrip() for row in picture]
+            second = mesh.p[1][elements]
+            met = second.min(axis=1) <= second.min() + 1e-9 * np.ptp(mesh.p[1])
+            elements = elements[met]
+        kind, faces = surface(kind, elements, mesh.p.T)
+        corners = mesh.p.T[triangles(pieces(kind, faces))]
+        flat = np.zeros((len(corners), 3, 3))
+        flat[..., :2] = (corners[..., axes] - low) * scale
+        picture[nearest(flat, (rows, columns)) >= 0] = mark
+    return ["".join(row).rstrip() for row in picture[::-1]]
 
 
 def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -179,16 +179,3 @@ def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         return low, high
     centre = ends[small].mean(axis=0)
     return np.maximum(low, centre - extent[small]), np.minimum(high, centre + extent[small])
-
-
-def _inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether points lie in the convex hull of the corners (2, c) of a cell, seen along the axis
-    that is left out.
-    """
-    centre = corners.mean(axis=1, keepdims=True)
-    around = corners[:, np.argsort(np.arctan2(*(corners - centre)[::-1]))]
-    after = np.roll(around, -1, axis=1)
-    sides = (after[0] - around[0]) * (y[..., None] - around[1]) - (after[1] - around[1]) * (
-        x[..., None] - around[0]
-    )
-    return np.asarray(np.all(sides >= -1e-9 * np.abs(sides).max(initial=0.0), axis=-1))
