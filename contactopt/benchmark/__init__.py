@@ -49,14 +49,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contactopt.benchmark.campaign import run_campaign, run_reports  # noqa: F401
     from contactopt.benchmark.experiment import Experiment, read_experiment  # noqa: F401
+    from contactopt.benchmark.keys import COLUMNS  # noqa: F401
     from contactopt.benchmark.plugins import method, problem  # noqa: F401
-    from contactopt.benchmark.store import COLUMNS, STATUSES, load, save  # noqa: F401
+    from contactopt.benchmark.store import STATUSES, load, save  # noqa: F401
 
 _HOMES = {
     "campaign": ("run_campaign", "run_reports"),
     "experiment": ("Experiment", "read_experiment"),
+    "keys": ("COLUMNS",),
     "plugins": ("method", "problem"),
-    "store": ("COLUMNS", "STATUSES", "load", "save"),
+    "store": ("STATUSES", "load", "save"),
 }
 _MODULES = {"figures": "report_figures", "report": "reports", "tables": "tables"}  # name -> module
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])

@@ -20,7 +20,7 @@ from contactopt.benchmark.reports import build, publish, read_layout
 from contactopt.benchmark.store import Store, load, require, save, told
 from contactopt.checks import check_count
 from contactopt.errors import InputError
-from contactopt.files.writing import remove_files, replace_file
+from contactopt.files.writing import remove_files, whole_file
 
 MOST_JOBS = 1000
 WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml")  # by a campaign
@@ -73,20 +73,13 @@ def run_campaign(
     limits = (e.time_limit, e.memory_limit, e.max_iterations, e.seed, e.diagnose)
     with Store(folder, resume) as store:
         if e.path.is_file():
-            text = e.path.read_bytes()
-            with told(folder, "choose another --out"):
-                replace_file(folder / "experiment.toml", lambda file: file.write_bytes(text))
+            with whole_file(folder / "experiment.toml") as file:
+                file.write_bytes(e.path.read_bytes())
         finished = store.finished()
         left = [run for run in runs if run.key not in finished]
         tasks = [Task(run, e.name, e.plugins, *limits) for run in left]
-        bar = tqdm(
-            total=len(runs),
-            initial=len(runs) - len(tasks),
-            desc=e.name,
-            unit="run",
-            file=sys.stderr,
-            disable=quiet,
-        )
+        done = {"total": len(runs), "initial": len(runs) - len(tasks)}
+        bar = tqdm(desc=e.name, unit="run", file=sys.stderr, disable=quiet, **done)
         with closing(run_locally(tasks, jobs)) as rows, bar:
             _keep(rows, tasks, store, bar)
         save(load(store.path), folder / "rows.parquet")
@@ -123,7 +116,6 @@ def run_reports(
     version: str = "",
     names: Sequence[str] = (),
     jobs: int | None = None,
-    quiet: bool = False,
 ) -> Path:
     """Rebuild all reports from their tables.
 
@@ -137,7 +129,7 @@ def run_reports(
         `reports`. 'quick': run their quick versions, with tables and reports in out/quick, so that
         `reports` stays as it is.
     names : Stems of the experiment files to run; all by default.
-    jobs, quiet : As for `run_campaign`.
+    jobs : As for `run_campaign`.
 
     Returns
     -------
@@ -164,20 +156,18 @@ def run_reports(
             )
         for path in paths:
             if path.stem in names or not names:
-                _renew(path, version, work, target, jobs, quiet)
+                _renew(path, version == "quick", work, target, jobs)
     return build(paths, target)
 
 
-def _renew(
-    path: Path, version: str, work: Path, target: Path, jobs: int | None, quiet: bool
-) -> None:
+def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
     """Run an experiment anew in a folder of `work`, and put its small table into `target`."""
     try:
-        experiment = read_experiment(path, quick=version == "quick")
+        experiment = read_experiment(path, quick)
     except NothingToRun as error:
         print(f"left out: {error}", file=sys.stderr)
         return
     folder = work / experiment.name
     with told(folder):
         remove_files(folder, WRITTEN)
-    publish(path, run_campaign(experiment, folder, jobs=jobs, quiet=quiet), target)
+    publish(path, run_campaign(experiment, folder, jobs=jobs), target)

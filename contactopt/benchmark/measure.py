@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.benchmark.keys import COLUMNS
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
-from contactopt.benchmark.store import COLUMNS, SCHEMA, UNKNOWN, pack
+from contactopt.benchmark.store import SCHEMA, UNKNOWN, pack
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Status, natural_map_residual
 from contactopt.problem.laws.associated import Associated

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactopt.benchmark.figure_style import COLOURS
+from contactopt.benchmark.keys import COLUMNS
 from contactopt.benchmark.reports import Layout, read_layout, rendered, write_report
-from contactopt.benchmark.store import COLUMNS, load, require
+from contactopt.benchmark.store import load, require
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
 

@@ -29,8 +29,9 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from contactopt.benchmark.keys import COLUMNS
 from contactopt.benchmark.report_figures import FIGURES
-from contactopt.benchmark.store import COLUMNS, load, require, save
+from contactopt.benchmark.store import load, require, save
 from contactopt.benchmark.tables import TABLES, select
 from contactopt.checks import check_name
 from contactopt.errors import InputError

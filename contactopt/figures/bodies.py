@@ -9,7 +9,7 @@ import numpy as np
 
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
-from contactopt.figures.solids import View, draw_frame, picture
+from contactopt.figures.solids import draw_frame, picture, seen_from
 from contactopt.figures.style import highest_colour, magnification, make_axes
 from contactopt.meshes.cells import elements_of
 from contactopt.problem import InterfaceProblem
@@ -129,7 +129,7 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     from matplotlib.colors import Normalize
 
     ax = make_axes(ax)
-    shade, view = ScalarMappable(Normalize(0, top), "viridis"), View(ELEVATION, AZIMUTH)
+    shade, view = ScalarMappable(Normalize(0, top), "viridis"), seen_from(ELEVATION, AZIMUTH)
     drawn = []
     for f in fields:
         # of bodies that fly away, which are drawn at rest
@@ -142,7 +142,7 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
         lined = np.isin(_key(opposite, len(points)), _key(lines, len(points)))
         drawn.append((points[cells], f.von_mises[cells], lined))
     corners, values, lined = (np.concatenate(parts) for parts in zip(*drawn))
-    image, extent = picture(view.project(corners), values, lined, shade.to_rgba, PIXELS)
+    image, extent = picture(corners @ view, values, lined, shade.to_rgba, PIXELS)
     ax.imshow(image, extent=extent, origin="lower", aspect="equal", zorder=2)
     names = [f"{name} [{scene.units[0]}]" for name in scene.components]
     draw_frame(ax, view, corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), names)

@@ -8,7 +8,6 @@ small ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,28 +20,17 @@ EDGE = 1e-6  # pixels by which triangles are enlarged, so that nothing shows bet
 BLOCK = 1_000_000  # pixels of triangles that are looked at together
 
 
-@dataclass(frozen=True)
-class View:
-    """A direction from which bodies are seen, with the axes of the picture.
+def seen_from(elevation: float, azimuth: float) -> np.ndarray:
+    """The axes of a picture, as unit vectors in the columns (3, 3): to the right, up, and towards
+    the eye. Points (..., 3) @ axes are places in the picture and distances towards the eye.
 
     Angles are in degrees as in Matplotlib: of the eye above the x-y plane, and from the x axis
     towards the y axis.
     """
-
-    elevation: float
-    azimuth: float
-
-    @property
-    def axes(self) -> np.ndarray:
-        """(3, 3) unit vectors, one per row: to the right, up, and towards the eye."""
-        e, a = np.radians(self.elevation), np.radians(self.azimuth)
-        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        right = np.array([-np.sin(a), np.cos(a), 0.0])
-        return np.stack([right, np.cross(eye, right), eye])
-
-    def project(self, points: np.ndarray) -> np.ndarray:
-        """Places (..., 3) in the picture and the distance towards the eye, for points (..., 3)."""
-        return points @ self.axes.T
+    e, a = np.radians(elevation), np.radians(azimuth)
+    eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    return np.stack([right, np.cross(eye, right), eye], axis=1)
 
 
 def picture(
@@ -51,7 +39,7 @@ def picture(
     """Triangles as an image (h, w, 4), coloured by values that are linear on each of them, and its
     extent (left, right, bottom, top) in the units of the corners. Its first row is below.
 
-    corners  (m, 3, 3) of the triangles after View.project
+    corners  (m, 3, 3) of the triangles as they are seen
     values   (m, 3) at the corners
     lined    (m, 3) whether the edge opposite to a corner is an edge of the mesh, which gets a line
     colours  values (n,) -> colours (n, 4)
@@ -173,7 +161,7 @@ def _light(corners: np.ndarray) -> np.ndarray:
 
 
 def draw_frame(
-    ax: Any, view: View, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
+    ax: Any, view: np.ndarray, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
 ) -> None:
     """Three edges of the box between `low` and `high` (3,) as axes with ticks and labels, those
     that stand free of the bodies.
@@ -186,7 +174,7 @@ def draw_frame(
     for axis, (foot, shift, align) in enumerate(places):
         end = foot.copy()
         end[axis] = high[axis]
-        ends = view.project(np.stack([foot, end]))
+        ends = np.stack([foot, end]) @ view
         ax.plot(ends[:, 0], ends[:, 1], lw=0.8, **line)
         options = {"textcoords": "offset points", "ha": align, "va": "center"}
         mark = {"marker": "_" if axis == 2 else "|", "ms": 5, "mew": 0.8}
@@ -194,7 +182,7 @@ def draw_frame(
             if low[axis] <= value <= high[axis]:
                 place = foot.copy()
                 place[axis] = value
-                x, y, _ = view.project(place)
+                x, y, _ = place @ view
                 ax.plot([x], [y], **mark, **line)
                 ax.annotate(f"{value:.6g}", (x, y), shift, fontsize=8, **options)
         middle = ends[:, :2].mean(axis=0)
