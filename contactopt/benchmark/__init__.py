@@ -23,24 +23,15 @@ An experiment file names problems, methods and settings; lists and ranges are mu
     [[methods]]
     method = ["auto", "nsgs", "mine"]
 
-A method of your own is a function in `mine.py`; nothing in this package changes:
+A method of your own is a function `mine(problem, tol, ...)` in `mine.py` that returns reactions,
+with the decorator `method`; nothing in this package changes. Instead of a function it may be a dataclass
+with `iterate`, as in contactopt.methods: it then gets the driver's stopping rule and history.
+`problem` registers a function that makes an InterfaceProblem in the same way, for `family = NAME`.
+An installed package offers methods as entry points of the group "contactopt.methods".
 
-    import numpy as np
-    from contactopt.benchmark import method
-
-    @method
-    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start
-        r = np.zeros(problem.q.shape)           # are passed if asked for
-        ...
-        return r                                # or (r, multipliers), or a contactopt.Solution
-
-Instead of a function it may be a dataclass with `iterate`, as in contactopt.methods: it then gets
-the driver's stopping rule and history. `@problem` registers a function that makes an
-InterfaceProblem in the same way, for `family = NAME`. An installed package offers methods as entry
-points of the group "contactopt.methods". What a method claims is never believed: each answer gets
-the certificate of contactopt.natural_map_residual, in the process of the campaign and from the
-problem that it holds. Plug-ins run in worker processes only, so that none can change how it is
-judged.
+What a method claims is never believed: each answer gets the certificate of
+contactopt.natural_map_residual, in the process of the campaign and from the problem that it holds.
+Plug-ins run in worker processes only, so that none can change how it is judged.
 """
 
 from importlib import import_module
