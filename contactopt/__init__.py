@@ -38,7 +38,8 @@ if TYPE_CHECKING:
         siconos_residual,
     )
     from contactopt.problem.transfer import transfer
-    from contactopt.runner import Result, run
+    from contactopt.result import Result
+    from contactopt.runner import run
     from contactopt.scenes.contact import Contact
     from contactopt.scenes.scene import (
         BodyForce,
@@ -77,7 +78,8 @@ _HOMES = {
         "siconos_residual",
     ),
     "problem.transfer": ("transfer",),
-    "runner": ("Result", "run"),
+    "result": ("Result",),
+    "runner": ("run",),
     "material": ("Material",),
     "scenes.contact": ("Contact",),
     "meshes.mesh_files": ("load_mesh",),

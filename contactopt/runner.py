@@ -6,27 +6,24 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from contactopt.bodies.ranks import Team, spread
-from contactopt.cards import card, count, line
-from contactopt.coupling.back_to_bodies import Fields, recover
-from contactopt.coupling.reduction import Reduction
+from contactopt.cards import count
+from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
-from contactopt.figures.output import PAGE, draw, earlier_files, squeeze, write
+from contactopt.figures.output import PAGE, draw, earlier_files, write
 from contactopt.figures.style import FORMATS
 from contactopt.files.writing import check_folder, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
-from contactopt.problem import InterfaceProblem, Solution
 from contactopt.readings.quantities import Reading, approach, pressure_reading, stick_width, width
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
+from contactopt.result import Result
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.limits import Limits
@@ -48,113 +45,6 @@ PATH_KEYS = (
     "stick_half_width",
     "friction_work",
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Result:
-    """A solved scene.
-
-    `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
-
-    `summary["seconds"]` holds the wall time [s] of each phase: those of the solution (see
-    contactopt.solving.solve_scene), `recover` of the fields, `figures` and `files` where some were
-    asked for, and `total` of the whole run.
-
-    `path` holds all states of a scene that has a load path; the rest of the result is then that of
-    the last state. `estimate` is what refinement to an asked accuracy found.
-    """
-
-    scene: Scene
-    reduction: Reduction
-    solution: Solution
-    fields: tuple[Fields, ...]
-    zones: tuple[float, ...]
-    summary: dict[str, Any]
-    path: PathResult | None = None
-    estimate: Estimate | None = None
-
-    def __repr__(self) -> str:
-        s = self.summary
-        states = "" if self.path is None else count(len(self.path.states), "state")
-        contacts = count(s["contact_nodes"], "contact")
-        aim = "" if self.estimate is None else repr(self.estimate)
-        return line(
-            "Result",
-            self.scene.name,
-            s["status"],
-            f"residual {s['residual']:.1e}",
-            contacts,
-            states,
-            aim,
-        )
-
-    def _repr_html_(self) -> str:
-        s, (length, stress) = self.summary, self.scene.units
-        rows: dict[str, object] = {
-            "status": f"{s['status']}: {self.solution.message}",
-            "residual (certificate)": f"{s['residual']:.2e}",
-            "unknowns, contacts": f"{s['dofs']}, {s['contact_nodes']}",
-            "sum of normal forces": f"{s['normal_force']:.6g} {stress} {length}^2",
-            "largest pressure": f"{s['max_pressure']:.6g} {stress}",
-        }
-        for key in ("approach", "contact_half_width", "stick_half_width"):
-            if s[key] is not None:
-                rows[key.replace("_", " ")] = f"{s[key]:.6g} {length}"
-        if self.estimate is not None:
-            rows[self.estimate.quantity] = f"{self.estimate.value:.6g}; {self.estimate.message}"
-            rows["meshes"] = "; ".join(
-                f"{level.unknowns}: {level.value:.6g}" for level in self.estimate.levels
-            )
-        return card(f"{self.scene.name}, {self.scene.friction}", rows)
-
-    def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
-
-        The page needs no network and nothing but the browser (contactopt.figures.view_page says
-        what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
-        """
-        import tempfile
-        import webbrowser
-
-        from contactopt.figures.view_page import write_page
-
-        if file is None:
-            file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
-        with tempfile.TemporaryDirectory() as folder:
-            write(self, Path(folder), states=True)
-            (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
-            made = write_page(folder, file)
-        if show:
-            webbrowser.open(made.resolve().as_uri())
-        return made
-
-    @property
-    def problem(self) -> InterfaceProblem:
-        return self.reduction.problem
-
-    @property
-    def pressure(self) -> np.ndarray:
-        """Contact pressure at the contact nodes, (k,) [stress]."""
-        return np.asarray(self.solution.reactions[:, 0] / self.problem.areas)
-
-    @property
-    def traction(self) -> np.ndarray:
-        """Tangential traction on the upper body, (k,) or in 3D (k, 2) [stress]."""
-        return squeeze(self.solution.reactions[:, 1:] / self.problem.areas[:, None])
 
 
 def run(
@@ -341,9 +231,9 @@ def _finish(
     with whole_folder(out, earlier_files(Path(out))) as folder:
         if formats:
             with _clock(seconds, "figures"):
-                draw(made, folder, formats)
+                draw(solved, fields, estimate, folder, formats)
         with _clock(seconds, "files"):
-            write(made, folder, states="html" in files)
+            write(solved, fields, folder, states="html" in files)
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
         if "html" in files:

@@ -17,9 +17,8 @@ import psutil
 import pytest
 
 from contactopt import InputError, benchmark
-from contactopt.benchmark import pool, problems, process, store, worker
-from contactopt.benchmark.catalogue import read_catalogue
-from contactopt.benchmark.experiment import read_experiment
+from contactopt.benchmark import pool, problems, process, store
+from contactopt.benchmark.experiment import read_catalogue, read_experiment
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.reports import read_layout
 from contactopt.benchmark.runs import MethodSpec, Run
@@ -284,8 +283,10 @@ from contactopt.benchmark import method
 
 @method
 def leaves_children(problem):
-    code = "import os, time; os.fork() and os._exit(0); print(os.getpid(), flush=True); time.sleep(1e4)"
-    own = subprocess.Popen([sys.executable, "-c", code], start_new_session=True, stdout=subprocess.PIPE)
+    code = "import os, time; os.fork() and os._exit(0)"
+    code += "; print(os.getpid(), flush=True); time.sleep(1e4)"
+    options = {"start_new_session": True, "stdout": subprocess.PIPE}
+    own = subprocess.Popen([sys.executable, "-c", code], **options)
     Path(__file__).with_name("numbers").open("a").write(own.stdout.readline().decode())
     if Path(__file__).with_name("stay").exists():
         time.sleep(1e4)
@@ -571,6 +572,33 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
     )
 
 
+def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch):
+    """A builder that dies between two problems costs no run, and one that is killed once while it
+    builds costs none either.
+    """
+    with pool.Worker() as worker:
+        first = worker.builder.ask(60.0, "look", os.getpid)
+        executor = worker.builder.executor
+        os.kill(first, signal.SIGKILL)
+        with pytest.raises(RuntimeError):  # as loky says it, once it has noticed
+            for _ in range(1000):
+                executor.submit(os.getpid).result(60.0)
+        with pytest.raises(RuntimeError):
+            executor.submit(os.getpid)
+        assert worker.builder.ask(60.0, "look", os.getpid) != first
+        ask, deaths = process.Process.ask, [process.Ended("build", "out_of_memory", process.KILLED)]
+
+        def once(self, limit, phase, *given):
+            if phase == "build" and deaths:
+                raise deaths.pop()
+            return ask(self, limit, phase, *given)
+
+        monkeypatch.setattr(process.Process, "ask", once)
+        spec = problems.ProblemSpec("family", "rigid_bodies", {"bodies": 3, "contacts": 4})
+        run = Run(spec, MethodSpec("auto"), "mid", 1e-6, "cold", 0)
+        assert worker.run(Task(run, "x", (), 5.0, 4.0, 100, 0))["success"] and not deaths
+
+
 @pytest.mark.parametrize("kills", [2, 3])
 def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
     """Twice may be chance; a process that never lives to say a word ends the campaign with one
@@ -581,13 +609,13 @@ def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
     def prepare(*told):
         os.kill(os.getpid(), signal.SIGKILL)
 
-    whole = worker.prepare
+    whole = process.prepare
 
     class Killed(process.Process):
         def start(self):
             if self.executor is None:
                 starts.append(1)
-                monkeypatch.setattr(worker, "prepare", prepare if len(starts) <= kills else whole)
+                monkeypatch.setattr(process, "prepare", prepare if len(starts) <= kills else whole)
             super().start()
 
     made = Killed()

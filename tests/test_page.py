@@ -69,7 +69,7 @@ def test_the_bodies_on_the_page_are_those_of_the_result(degree, tmp_path):
 
 
 def test_the_inside_of_large_bodies_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("contactopt.figures.view_page.MOST_INSIDE", 10)
+    monkeypatch.setattr("contactopt.figures.page_data.MOST_INSIDE", 10)
     result = run(scenes.flat_punch(3, elements=2), tmp_path, figures=(), html=True)
     for body in data_of(tmp_path / "view.html")["bodies"]:
         (fields,) = (fields for fields in result.fields if fields.name == body["name"])

@@ -5,7 +5,8 @@ import pytest
 import skfem
 
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, run
-from contactopt.figures.view_page import _body, page_data
+from contactopt.figures.page_data import page_data
+from contactopt.figures.view_page import _body
 
 SOFT = Material(1000.0, 0.3)
 

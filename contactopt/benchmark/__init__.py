@@ -3,15 +3,14 @@ reports.
 
     >>> from contactopt import benchmark
     >>> folder = benchmark.run_campaign("friction.toml", jobs=2)
-    >>> table = benchmark.load(folder)          # pandas.DataFrame, one row per run; columns:
-                                                benchmark.COLUMNS
+    >>> table = benchmark.load(folder)  # pandas.DataFrame, one row per run: benchmark.COLUMNS
 
 An experiment file names problems, methods and settings; lists and ranges are multiplied out:
 
     name = "friction"
     plugins = ["mine.py"]                       # files beside this one
     settings = ["low", "mid", "high", 1e-7]     # bounds on the certificate: 1e-3, 1e-6, 1e-9;
-                                                "default": the method's own
+                                                # "default": the method's own
     repeats = 3
     time_limit = 10.0                           # s per run, enforced
     [[problems]]
@@ -24,25 +23,15 @@ An experiment file names problems, methods and settings; lists and ranges are mu
     [[methods]]
     method = ["auto", "nsgs", "mine"]
 
-A method of your own is a function in `mine.py`; nothing in this package changes:
+A method of your own is a function `mine(problem, tol, ...)` in `mine.py` that returns reactions,
+with the decorator `method`; nothing in this package changes. Instead of a function it may be a
+dataclass with `iterate`, as in contactopt.methods: it then gets the driver's stopping rule and
+history. `problem` registers a function that makes an InterfaceProblem in the same way, for `family
+= NAME`. An installed package offers methods as entry points of the group "contactopt.methods".
 
-    import numpy as np
-    from contactopt.benchmark import method
-
-    @method
-    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start are
-                                                passed if asked for
-        r = np.zeros(problem.q.shape)
-        ...
-        return r                                # or (r, multipliers), or a contactopt.Solution
-
-Instead of a function it may be a dataclass with `iterate`, as in contactopt.methods: it then gets
-the driver's stopping rule and history. `@problem` registers a function that makes an
-InterfaceProblem in the same way, for `family = NAME`. An installed package offers methods as entry
-points of the group "contactopt.methods". What a method claims is never believed: each answer gets
-the certificate of contactopt.natural_map_residual, in the process of the campaign and from the
-problem that it holds. Plug-ins run in worker processes only, so that none can change how it is
-judged.
+What a method claims is never believed: each answer gets the certificate of
+contactopt.natural_map_residual, in the process of the campaign and from the problem that it holds.
+Plug-ins run in worker processes only, so that none can change how it is judged.
 """
 
 from importlib import import_module
@@ -51,14 +40,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contactopt.benchmark.campaign import run_campaign, run_reports  # noqa: F401
     from contactopt.benchmark.experiment import Experiment, read_experiment  # noqa: F401
+    from contactopt.benchmark.keys import COLUMNS  # noqa: F401
     from contactopt.benchmark.plugins import method, problem  # noqa: F401
-    from contactopt.benchmark.store import COLUMNS, STATUSES, load, save  # noqa: F401
+    from contactopt.benchmark.store import STATUSES, load, save  # noqa: F401
 
 _HOMES = {
     "campaign": ("run_campaign", "run_reports"),
     "experiment": ("Experiment", "read_experiment"),
+    "keys": ("COLUMNS",),
     "plugins": ("method", "problem"),
-    "store": ("COLUMNS", "STATUSES", "load", "save"),
+    "store": ("STATUSES", "load", "save"),
 }
 _MODULES = {"figures": "report_figures", "report": "reports", "tables": "tables"}  # name -> module
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])

@@ -7,20 +7,20 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
-from contactopt.benchmark.campaign_files import subfolder, told
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
 from contactopt.benchmark.measure import Task
-from contactopt.benchmark.pool import run_locally, run_on_cluster
+from contactopt.benchmark.pool import run_locally
 from contactopt.benchmark.process import end_orphans
 from contactopt.benchmark.reports import build, publish, read_layout
-from contactopt.benchmark.store import Store, load, require, save
+from contactopt.benchmark.store import Store, load, require, save, told
 from contactopt.checks import check_count
 from contactopt.errors import InputError
-from contactopt.files.writing import remove_files, replace_file
+from contactopt.files.writing import remove_files, whole_file
 
 MOST_JOBS = 1000
 WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml")  # by a campaign
@@ -33,7 +33,6 @@ def run_campaign(
     jobs: int | None = None,
     resume: bool = False,
     filters: Sequence[str] = (),
-    scheduler: str | None = None,
     quiet: bool = False,
 ) -> Path:
     """Execute the runs of an experiment that are not finished yet.
@@ -45,7 +44,6 @@ def run_campaign(
     jobs : Number of worker processes; by default one per core.
     resume : Whether to go on where an interrupted campaign stopped. No finished run is repeated.
     filters : "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match.
-    scheduler : Address of a Dask scheduler, instead of local processes.
     quiet : Whether no progress is shown.
 
     Returns
@@ -58,41 +56,58 @@ def run_campaign(
         folder without `resume`, and a folder that cannot be written to.
     """
     require("loky", "pandas", "psutil", "pyarrow", "tqdm")
+    from tqdm import tqdm
+
     end_orphans()
-    if not isinstance(experiment, Experiment):
-        experiment = read_experiment(experiment)
-    if jobs is not None:
-        check_count("jobs", jobs)
-        if jobs > MOST_JOBS:
-            raise InputError(f"jobs must be at most {MOST_JOBS}; got {jobs}.")
-    folder = Path(out) if out is not None else subfolder(Path("out/bench"), experiment.name)
-    runs = experiment.runs(filters)
+    e = experiment if isinstance(experiment, Experiment) else read_experiment(experiment)
+    jobs = jobs if jobs is not None else os.cpu_count() or 1
+    check_count("jobs", jobs)
+    if jobs > MOST_JOBS:
+        raise InputError(f"jobs must be at most {MOST_JOBS}; got {jobs}.")
+    folder = Path("out/bench", e.name) if out is None else Path(out)
+    runs = e.runs(filters)
     if not runs:
         raise InputError("no run matches the filters.")
-    e = experiment
-    if not quiet:
-        for sentence in dict.fromkeys(e.skipped):  # once for each reason
-            print(f"left out: {sentence}", file=sys.stderr)
+    for sentence in () if quiet else dict.fromkeys(e.skipped):  # once for each reason
+        print(f"left out: {sentence}", file=sys.stderr)
     limits = (e.time_limit, e.memory_limit, e.max_iterations, e.seed, e.diagnose)
     with Store(folder, resume) as store:
-        if experiment.path.is_file():
-            text = experiment.path.read_bytes()
-            with told(folder, "choose another --out"):
-                replace_file(folder / "experiment.toml", lambda file: file.write_bytes(text))
+        if e.path.is_file():
+            with whole_file(folder / "experiment.toml") as file:
+                file.write_bytes(e.path.read_bytes())
         finished = store.finished()
-        tasks = [
-            Task(run, experiment.name, experiment.plugins, *limits)
-            for run in runs
-            if run.key not in finished
-        ]
-        rows = (
-            run_on_cluster(tasks, scheduler)
-            if scheduler
-            else run_locally(tasks, jobs or os.cpu_count() or 1)
-        )
-        _execute(experiment, store, tasks, len(runs), rows, quiet)
+        left = [run for run in runs if run.key not in finished]
+        tasks = [Task(run, e.name, e.plugins, *limits) for run in left]
+        done = {"total": len(runs), "initial": len(runs) - len(tasks)}
+        bar = tqdm(desc=e.name, unit="run", file=sys.stderr, disable=quiet, **done)
+        with closing(run_locally(tasks, jobs)) as rows, bar:
+            _keep(rows, tasks, store, bar)
         save(load(store.path), folder / "rows.parquet")
     return folder
+
+
+def _keep(rows: Iterable[dict[str, Any]], tasks: list[Task], store: Store, bar: Any) -> None:
+    """Store the rows of the tasks as they come, and show the progress."""
+    failed: Counter[str] = Counter()
+    waiting = {task.run.key for task in tasks}
+    for row in rows:
+        if row["key"] not in waiting:
+            raise InputError(
+                f"a row arrived that was not asked for, or twice: {row['problem']},"
+                f" {row['method']}."
+            )
+        waiting.remove(row["key"])
+        store.append(row)
+        if not row["success"]:
+            failed[row["status"]] += 1
+            words = ", ".join(f"{n} {status}" for status, n in failed.most_common())
+            bar.set_postfix_str(words, refresh=False)
+        bar.update()
+    if waiting:
+        raise InputError(
+            f"{len(waiting)} of {len(tasks)} runs left no row; finished runs are kept, go on with"
+            " --resume."
+        )
 
 
 def run_reports(
@@ -101,7 +116,6 @@ def run_reports(
     version: str = "",
     names: Sequence[str] = (),
     jobs: int | None = None,
-    quiet: bool = False,
 ) -> Path:
     """Rebuild all reports from their tables.
 
@@ -115,7 +129,7 @@ def run_reports(
         `reports`. 'quick': run their quick versions, with tables and reports in out/quick, so that
         `reports` stays as it is.
     names : Stems of the experiment files to run; all by default.
-    jobs, quiet : As for `run_campaign`.
+    jobs : As for `run_campaign`.
 
     Returns
     -------
@@ -128,72 +142,32 @@ def run_reports(
     """
     paths = [Path(path) for path in experiments]
     missing = set(names) - {path.stem for path in paths}
-    if version not in ("", "quick", "full") or missing:
-        wrong = (
-            f"version {version!r}; choose quick or full"
-            if not missing
-            else f"experiments: {', '.join(sorted(missing))}"
-        )
-        raise InputError(f"unknown {wrong}.")
-    work = Path("out") / (version or "bench")
+    if missing:
+        raise InputError(f"unknown experiments: {', '.join(sorted(missing))}.")
+    if version not in ("", "quick", "full"):
+        raise InputError(f"unknown version {version!r}; choose quick or full.")
+    work = Path("out", version)
     target = work / "reports" if version == "quick" else Path(reports)
-    if version:  # complain before anything is run or removed
-        layouts = [read_layout(path) for path in paths]
-        for layout in layouts:
-            subfolder(target, layout.name)
-        twice = [name for name, n in Counter(layout.name for layout in layouts).items() if n > 1]
-        if twice:
+    if version:
+        found = Counter(read_layout(path).name for path in paths)  # before anything is run
+        for name in [name for name, n in found.items() if n > 1]:
             raise InputError(
-                f"two experiments are called {twice[0]!r}; their results would be mixed, rename"
-                " one."
+                f"two experiments are called {name!r}; their results would be mixed, rename one."
             )
-    for path in paths if version else ():
-        if names and path.stem not in names:
-            continue
-        try:
-            experiment = read_experiment(path, quick=version == "quick")
-        except NothingToRun as error:
-            print(f"left out: {error}", file=sys.stderr)
-            continue
-        folder = subfolder(work, experiment.name)
-        with told(folder):
-            remove_files(folder, WRITTEN)
-        publish(path, run_campaign(experiment, folder, jobs=jobs, quiet=quiet), target)
+        for path in paths:
+            if path.stem in names or not names:
+                _renew(path, version == "quick", work, target, jobs)
     return build(paths, target)
 
 
-def _execute(experiment, store, tasks, total, rows, quiet) -> None:  # type: ignore[no-untyped-def]
-    from tqdm import tqdm
-
-    failed: Counter[str] = Counter()
-    waiting = {task.run.key for task in tasks}
-    with (
-        closing(rows),
-        tqdm(
-            total=total,
-            initial=total - len(tasks),
-            desc=experiment.name,
-            unit="run",
-            file=sys.stderr,
-            disable=quiet,
-        ) as bar,
-    ):
-        for row in rows:
-            if row["key"] not in waiting:
-                raise InputError(
-                    f"a row arrived that was not asked for, or twice: {row['problem']},"
-                    f" {row['method']}."
-                )
-            waiting.remove(row["key"])
-            store.append(row)
-            if not row["success"]:
-                failed[row["status"]] += 1
-                bar.set_postfix_str(
-                    ", ".join(f"{n} {status}" for status, n in failed.most_common()), refresh=False
-                )
-            bar.update()
-    if waiting:
-        raise InputError(
-            f"{len(waiting)} of {len(tasks)} runs left no row; finished runs are kept, go on with"
-            " --resume."
-        )
+def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
+    """Run an experiment anew in a folder of `work`, and put its small table into `target`."""
+    try:
+        experiment = read_experiment(path, quick)
+    except NothingToRun as error:
+        print(f"left out: {error}", file=sys.stderr)
+        return
+    folder = work / experiment.name
+    with told(folder):
+        remove_files(folder, WRITTEN)
+    publish(path, run_campaign(experiment, folder, jobs=jobs), target)

@@ -17,22 +17,38 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.catalogue import Catalogue, read_catalogue
+from contactopt.benchmark import worker
+from contactopt.benchmark.plugins import Catalogue
 from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
+from contactopt.benchmark.process import Ended, Process
 from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
+from contactopt.methods import METHODS
 
 MOST_RUNS = 200_000  # of one experiment
+LOAD_LIMIT = 120.0  # s to load all plug-ins
+# key -> type of its value, and how a message names that
+TYPES: dict[str, tuple[type, str]] = {
+    **dict.fromkeys(("name", "title", "text", "findings"), (str, "a text")),
+    **dict.fromkeys(
+        ("plugins", "settings", "starts", "problems", "methods", "figures", "columns"),
+        (list, "a list"),
+    ),
+    "quick": (dict, "a table"),
+    "diagnose": (bool, "true or false"),
+}
 # s; GB: less than the least holds no NumPy and SciPy
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}
-MOST_ALLOWED = {
-    "repeats": MOST_RUNS,
-    "max_iterations": 10**9,
-    "seed": 2**32 - 1,
-}  # NumPy's generator takes no larger seed
+# key -> least and most; NumPy's generator takes no larger seed
+WHOLE = {
+    "repeats": (1, MOST_RUNS),
+    "max_iterations": (1, 10**9),
+    "seed": (0, 2**32 - 1),
+}
 LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
+FILTERED = ("problem", "method", "setting", "start", "repeat")
 
 
 class NothingToRun(InputError):
@@ -79,40 +95,32 @@ class Experiment:
     skipped: tuple[str, ...] = ()
 
     def runs(self, filters: Sequence[str] = ()) -> list[Run]:
-        """All runs, those of a problem together; filters: COLUMN=PATTERN, of which all must match."""
-        chosen = [_filter(text) for text in filters]
+        """All runs, those of a problem together; filters: COLUMN=PATTERN, all must match."""
+        for text in filters:
+            column, sign, _ = text.partition("=")
+            if column not in FILTERED or not sign:
+                raise InputError(
+                    f"cannot filter by '{text}'; write COLUMN=PATTERN with a column of"
+                    f" {', '.join(FILTERED)}."
+                )
+        tolerances = {
+            str(setting): SETTINGS.get(str(setting)) or float(setting) for setting in self.settings
+        }
         runs = [
-            Run(
-                problem,
-                method,
-                str(setting),
-                SETTINGS.get(str(setting)) or float(setting),
-                start,
-                repeat,
-            )
+            Run(problem, method, setting, tolerance, start, repeat)
             for problem in self.problems
-            for repeat, setting, start, method in product(
-                range(self.repeats), self.settings, self.starts, self.methods
+            for repeat, (setting, tolerance), start, method in product(
+                range(self.repeats), tolerances.items(), self.starts, self.methods
             )
         ]
-        return [run for run in runs if all(match(run) for match in chosen)]
+        return [run for run in runs if all(_matches(run, text) for text in filters)]
 
 
-def _filter(text: str) -> Any:
-    columns = ("problem", "method", "setting", "start", "repeat")
-    column, sign, pattern = text.partition("=")
-    if column not in columns or not sign:
-        raise InputError(
-            f"cannot filter by '{text}'; write COLUMN=PATTERN with a column of"
-            f" {', '.join(columns)}."
-        )
-
-    def match(run: Run) -> bool:
-        value = getattr(run, column)
-        texts = (value.name, value.label) if column in ("problem", "method") else (str(value),)
-        return any(fnmatchcase(text, pattern) for text in texts)
-
-    return match
+def _matches(run: Run, text: str) -> bool:
+    column, _, pattern = text.partition("=")
+    value = getattr(run, column)
+    names = (value.name, value.label) if column in ("problem", "method") else (str(value),)
+    return any(fnmatchcase(name, pattern) for name in names)
 
 
 def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
@@ -136,230 +144,196 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
     own = root.data.get("quick", {}) if quick else {}
     if not isinstance(own, dict):
         raise root.fail("'quick' must be a table.", "quick")
-    return _Reader(path, root, own).experiment(root.data | own)
+    lines = {place: line for place, line in root.lines.items() if place[0] not in own}
+    if own:
+        lines |= {place[1:]: line for place, line in root.lines.items() if place[0] == "quick"}
+    table = Table(root.file, lines, root.data | own)
+    _check(table)
+    return _Reader(table, path).experiment()
+
+
+def _check(table: Table) -> None:
+    """Refuse unknown keys, values of the wrong type or size, and more runs than MOST_RUNS, before
+    anything is expanded, built or run.
+    """
+    data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped"}
+    for key in data:
+        if key not in known:
+            raise table.fail(f"unknown key {key!r}.", key)
+    for key in ("name", "problems", "methods"):
+        if not data.get(key):
+            raise table.fail(f"an experiment needs '{key}'.", key)
+    for key, (kind, what) in TYPES.items():
+        table.take(key, kind, what)
+    if not re.fullmatch(r"[\w.-]+", data["name"]):
+        raise table.fail(
+            "'name' becomes a directory: letters, digits, '-', '_' and '.' only.", "name"
+        )
+    with table.about("name"):
+        check_name("'name'", data["name"])
+    for key in ("plugins", "columns"):
+        if not all(isinstance(value, str) for value in data.get(key, ())):
+            raise table.fail(f"'{key}' must be a list of texts.", key)
+    for key, (least, most) in WHOLE.items():
+        value = table.take(key, int, f"a whole number from {least} to {most}", 1)
+        if not least <= value <= most:
+            raise table.fail(
+                f"'{key}' must be a whole number from {least} to {most}; got {short(value)}.", key
+            )
+    for key, (low, high) in BOUNDS.items():
+        table.number(key, low=low, high=high)
+    for key, choices, more in (("settings", SETTINGS, " or a number"), ("starts", STARTS, "")):
+        values = data.get(key, ())
+        for value in values:
+            if more and not isinstance(value, str):
+                with table.about(key):
+                    check_number("a setting", value, 0.0)
+            elif value not in choices:
+                raise table.fail(
+                    f"unknown {key[:-1]} {value!r}; choose from {', '.join(choices)}{more}.", key
+                )
+        if twice := _twice(map(str, values)):
+            raise table.fail(f"'{key}' holds {twice} twice.", key)
+    number = data.get("repeats", 1)
+    for key in ("settings", "starts"):
+        number *= len(data.get(key, ("default",)))
+    for key in ("problems", "methods"):
+        entries = [entry for entry in data[key] if isinstance(entry, dict)]
+        number *= max(1, sum(math.prod(map(_size_of, entry.values())) for entry in entries))
+    if number > MOST_RUNS:
+        raise table.fail(
+            f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or take"
+            " fewer repeats or values.",
+            "repeats",
+        )
+
+
+def _twice(texts: Any) -> str:
+    """The first text that occurs twice, or none."""
+    return next((text for text, n in Counter(texts).items() if n > 1), "")
 
 
 class _Reader:
-    """Checks one file's keys; every complaint goes through `located`, which finds the line.
+    """Expands the problems and methods of one file whose other keys were checked.
 
-    quick  the keys of the quick version that is read
+    skipped  why optional entries are left out
     """
 
-    def __init__(self, path: Path, root: Table, quick: Mapping[str, Any]):
-        self.path, self.root, self.quick = path, root, quick
+    def __init__(self, table: Table, path: Path):
+        self.table, self.path = table, path
+        self.skipped: list[str] = []
 
-    def experiment(self, data: dict[str, Any]) -> Experiment:
-        known = {f.name: f for f in fields(Experiment)}
-        for key in data:
-            if key not in known or key in ("path", "skipped"):
-                raise self.located(f"unknown key {key!r}", key)
-        for key in ("name", "problems", "methods"):
-            if not data.get(key):
-                raise self.located(f"an experiment needs '{key}'", key)
-        data = {
+    def experiment(self) -> Experiment:
+        data, folder = self.table.data, self.path.parent
+        paths = tuple(str((folder / plugin).resolve()) for plugin in data.get("plugins", ()))
+        catalogue = self.catalogue(paths)
+
+        def problem(kind: str, name: str, parameters: dict[str, Any]) -> list[ProblemSpec]:
+            found = named(kind, name, parameters, folder)
+            for spec in found:
+                spec.check(catalogue.problems)
+            return found
+
+        def method(kind: str, name: str, settings: dict[str, Any]) -> list[MethodSpec]:
+            spec = MethodSpec(name, settings, catalogue.methods.get(name))
+            spec.check()
+            return [spec]
+
+        problems = self.expanded("problems", KINDS, problem)
+        methods = self.expanded("methods", ("method",), method)
+        if not problems or not methods:
+            raise NothingToRun(f"'{self.path}': nothing is left to run; " + " ".join(self.skipped))
+        values: dict[str, Any] = {
             key: tuple(value) if isinstance(value, list) else value for key, value in data.items()
         }
-        self.scalars(data)
-        self.count(data)
-        paths = tuple(
-            str((self.path.parent / plugin).resolve()) for plugin in data.get("plugins", ())
-        )
-        catalogue = self.catalogue(paths, data["methods"])
-        skipped: list[str] = []
-        problems = [
-            p
-            for i, e in enumerate(data["problems"])
-            for p in self.problems(i, e, catalogue, skipped)
-        ]
-        methods = [
-            m for i, e in enumerate(data["methods"]) for m in self.methods(i, e, catalogue, skipped)
-        ]
-        for title, specs in (("problems", problems), ("methods", methods)):
-            twice = [label for label, n in Counter(spec.label for spec in specs).items() if n > 1]
-            if twice:
-                raise self.located(f"two {title} are called {twice[0]!r}", title)
-        if not problems or not methods:
-            raise NothingToRun(f"'{self.path}': nothing is left to run; " + " ".join(skipped))
-        return Experiment(
-            **data
-            | dict(problems=tuple(problems), methods=tuple(methods), plugins=paths, path=self.path)
-            | dict(skipped=tuple(skipped))
-        )
+        values |= {"problems": tuple(problems), "methods": tuple(methods), "plugins": paths}
+        return Experiment(**values, path=self.path, skipped=tuple(self.skipped))
 
-    def scalars(self, data: Mapping[str, Any]) -> None:
-        for key, kind in (
-            ("name", str),
-            ("title", str),
-            ("text", str),
-            ("findings", str),
-            ("quick", dict),
-        ):
-            if not isinstance(data.get(key, kind()), kind):
-                raise self.located(f"'{key}' must be a {'table' if kind is dict else 'text'}", key)
-        if not re.fullmatch(r"[\w.-]+", data["name"]):
-            raise self.located(
-                "'name' becomes a directory: letters, digits, '-', '_' and '.' only", "name"
-            )
-        self.guard("name", check_name, "'name'", data["name"])
-        for key in ("plugins", "settings", "starts", "problems", "methods", "figures", "columns"):
-            if not isinstance(data.get(key, ()), tuple):
-                raise self.located(f"'{key}' must be a list", key)
-        for key in ("plugins", "columns"):
-            if not all(isinstance(value, str) for value in data.get(key, ())):
-                raise self.located(f"'{key}' must be a list of texts", key)
-        for key, most in MOST_ALLOWED.items():
-            value, least = data.get(key, 1), int(key != "seed")
-            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-                raise self.located(
-                    f"'{key}' must be a whole number from {least} to {most}; got {short(value)}",
-                    key,
-                )
-        if not isinstance(data.get("diagnose", False), bool):
-            raise self.located("'diagnose' must be true or false", "diagnose")
-        for key, (low, high) in BOUNDS.items():
-            self.guard(key, check_number, f"'{key}'", data.get(key, 1.0), low, high)
-        for setting in data.get("settings", ()):
-            if isinstance(setting, str) and setting not in SETTINGS:
-                raise self.located(
-                    f"unknown setting {setting!r}; choose from {', '.join(SETTINGS)} or a number",
-                    "settings",
-                )
-            if not isinstance(setting, str):
-                self.guard("settings", check_number, "a setting", setting, 0.0)
-        for start in data.get("starts", ()):
-            if start not in STARTS:
-                raise self.located(
-                    f"unknown start {start!r}; choose from {', '.join(STARTS)}", "starts"
-                )
-        for key in ("settings", "starts"):
-            twice = [text for text, n in Counter(map(str, data.get(key, ()))).items() if n > 1]
-            if twice:
-                raise self.located(f"'{key}' holds {twice[0]} twice", key)
-
-    def count(self, data: Mapping[str, Any]) -> None:
-        """Refuse an experiment of too many runs by their number, before anything is expanded, built
-        or run.
-        """
-        number = data.get("repeats", 1)
-        for key in ("settings", "starts"):
-            number *= len(data.get(key, ("default",)))
-        for table in ("problems", "methods"):
-            entries = [entry for entry in data[table] if isinstance(entry, dict)]
-            number *= max(1, sum(math.prod(map(_size_of, entry.values())) for entry in entries))
-        if number > MOST_RUNS:
-            raise self.located(
-                f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or"
-                " take fewer repeats or values",
-                "repeats",
-            )
-
-    def catalogue(self, paths: tuple[str, ...], methods: Sequence[Any]) -> Catalogue:
+    def catalogue(self, paths: tuple[str, ...]) -> Catalogue:
         """What the plug-ins declare, and installed packages for the methods named."""
-        given = [entry.get("method") for entry in methods if isinstance(entry, dict)]
-        names = [
-            name for names in given for name in (names if isinstance(names, list) else [names])
-        ]
-        try:
+        given = [e.get("method") for e in self.table.data["methods"] if isinstance(e, dict)]
+        names = [name for one in given for name in (one if isinstance(one, list) else [one])]
+        with self.table.about("plugins"):
             found = read_catalogue(paths, [name for name in names if isinstance(name, str)])
-        except InputError as error:
-            raise self.located(str(error), "plugins") from error
         for name in found.problems:
             if name in FAMILIES:
-                raise self.located(
-                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it",
+                raise self.table.fail(
+                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it.",
                     "plugins",
                 )
         return found
 
-    def problems(
-        self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]
-    ) -> Iterator[ProblemSpec]:
-        kinds = [kind for kind in KINDS if isinstance(entry, dict) and kind in entry]
-        if len(kinds) != 1:
-            raise self.located(f"a problem needs one of {', '.join(KINDS)}", "problems", index)
-        for name, parameters in self.expand("problems", index, entry, kinds[0], skipped):
-            try:
-                found = named(kinds[0], name, parameters, self.path.parent)
-                for spec in found:
-                    spec.check(catalogue.problems)
-            except (ValueError, TypeError, ArithmeticError) as error:  # InputError is a ValueError
-                self.refuse(error, "problems", index, entry, kinds[0], skipped)
-            else:
-                yield from found
+    def expanded(self, key: str, kinds: Sequence[str], make: Callable[..., list[Any]]) -> list[Any]:
+        """What `make(kind, name, values)` makes of every combination of the lists and ranges of the
+        entries below a key; `kinds` are the keys of which each entry needs one.
+        """
+        made: list[Any] = []
+        for index, entry in enumerate(self.table.data[key]):
+            own = [kind for kind in kinds if isinstance(entry, dict) and kind in entry]
+            if len(own) != 1:
+                what = f"one of {', '.join(kinds)}" if len(kinds) > 1 else f"the key '{kinds[0]}'"
+                raise self.table.fail(f"a {key[:-1]} needs {what}.", key, index)
+            for name, values in self.combinations(key, index, entry, own[0]):
+                try:
+                    made += make(own[0], name, values)
+                except (ValueError, TypeError, ArithmeticError) as error:  # InputError, too
+                    if not entry.get("optional"):
+                        message = f"{str(error).rstrip('.')}."
+                        culprit = _blamed(message, entry, own[0])
+                        raise self.table.fail(message, key, index, culprit) from error
+                    self.skipped.append(str(error))
+        if twice := _twice(spec.label for spec in made):
+            raise self.table.fail(f"two {key} are called {twice!r}.", key)
+        return made
 
-    def methods(
-        self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]
-    ) -> Iterator[MethodSpec]:
-        if not isinstance(entry, dict) or "method" not in entry:
-            raise self.located("a method needs the key 'method'", "methods", index)
-        for name, settings in self.expand("methods", index, entry, "method", skipped):
-            spec = MethodSpec(name, settings, catalogue.methods.get(name))
-            try:
-                spec.check()
-            except (ValueError, TypeError, ArithmeticError) as error:
-                self.refuse(error, "methods", index, entry, "method", skipped)
-            else:
-                yield spec
-
-    def expand(
-        self, table: str, index: int, entry: Mapping[str, Any], kind: str, skipped: list[str]
+    def combinations(
+        self, table: str, index: int, entry: Mapping[str, Any], kind: str
     ) -> Iterator[tuple[str, dict[str, Any]]]:
         """(name, parameters) of every combination of the entry's lists and ranges."""
         names = entry[kind] if isinstance(entry[kind], list) else [entry[kind]]
         rest = {key: value for key, value in entry.items() if key not in (kind, "optional")}
         choices = []
         for key, value in rest.items():
-            try:
+            with self.table.about(table, index, key):
                 choices.append(_values_of(key, value))
-            except InputError as error:
-                raise self.located(str(error), table, index, key) from error
         for name, *values in product(names, *choices):
             if not isinstance(name, str):
-                raise self.located(f"'{kind}' must be a name", table, index, kind)
+                raise self.table.fail(f"'{kind}' must be a name.", table, index, kind)
             yield name, dict(zip(rest, values))
 
-    def refuse(
-        self,
-        error: Exception,
-        table: str,
-        index: int,
-        entry: Mapping[str, Any],
-        kind: str,
-        skipped: list[str],
-    ) -> None:
-        if not entry.get("optional"):
-            words = {
-                key: [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))]
-                for key, value in entry.items()
-            }
-            found = {
-                key: [
-                    match.start()
-                    for name in names
-                    if (match := re.search(rf"\b{re.escape(name)}\b", str(error)))
-                ]
-                for key, names in words.items()
-                if key != kind
-            }
-            blamed = {
-                key: min(places) for key, places in found.items() if places
-            }  # what a message names first is wrong
-            culprit = min(blamed, key=blamed.__getitem__, default=kind)
-            raise self.located(str(error), table, index, culprit) from error
-        skipped.append(str(error))
 
-    def guard(self, key: str, function: Any, *arguments: Any) -> None:
-        try:
-            function(*arguments)
-        except InputError as error:
-            raise self.located(str(error), key) from error
+def _blamed(message: str, entry: Mapping[str, Any], kind: str) -> str:
+    """The key of an entry that is wrong: the message names it, or its value, first."""
+    places = {}
+    for key, value in entry.items():
+        words = [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))]
+        found = [re.search(rf"\b{re.escape(word)}\b", message) for word in words]
+        starts = [match.start() for match in found if match]
+        if starts and key != kind:
+            places[key] = min(starts)
+    return min(places, key=places.__getitem__, default=kind)
 
-    def located(self, message: str, *place: str | int) -> InputError:
-        """The error with the line of an entry: a top-level key, or a table with its number and a
-        key of it.
-        """
-        above = ("quick",) if place[0] in self.quick else ()
-        return self.root.fail(f"{message.rstrip('.')}.", *above, *place)
+
+def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
+    """What plug-in files declare, and the entry points among names of methods, read in a process of
+    its own.
+
+    InputError, naming the file, if a plug-in fails, hangs or ends the process.
+    """
+    asked = [name for name in dict.fromkeys(names) if name not in METHODS]
+    if not paths and not asked:
+        return Catalogue()
+    process = Process()
+    try:
+        found: Catalogue | str = process.ask(LOAD_LIMIT, "load", worker.inspect, paths, asked)
+    except Ended as end:
+        where = ", ".join(f"'{path}'" for path in paths) or "entry points"
+        raise InputError(f"plug-ins ({where}) could not be loaded: {end.status}, {end}.") from end
+    finally:
+        process.kill()
+    if isinstance(found, str):
+        raise InputError(found)
+    return found
 
 
 def _size_of(value: Any) -> int:
@@ -372,28 +346,35 @@ def _size_of(value: Any) -> int:
 
 def _values_of(name: str, value: Any) -> list[Any]:
     """One value, a list of them, or a range {from, to, steps, scale = "linear" or "log"}."""
+    if isinstance(value, dict):
+        return _range_of(name, value)
     if isinstance(value, list) and not value:
-        raise InputError(f"the list '{name}' is empty")
-    if not isinstance(value, dict):
-        values = value if isinstance(value, list) else [value]
-        for one in values:
-            if not isinstance(one, str | int | float) or (
-                isinstance(one, int) and abs(one) >= LARGEST_INTEGER
-            ):
-                raise InputError(
-                    f"a value of '{name}' must be a text, a number, true or false; got {short(one)}"
-                )
-        return values
-    if not {"from", "to", "steps"} <= set(value) or set(value) - {"from", "to", "steps", "scale"}:
-        raise InputError(f"the range '{name}' needs from, to, steps, and may have scale = \"log\"")
-    scales: dict[str, Callable[..., np.ndarray]] = {"linear": np.linspace, "log": np.geomspace}
-    spaced = scales.get(value.get("scale", "linear"))
-    if spaced is None or not isinstance(value["steps"], int) or value["steps"] < 1:
-        raise InputError(f'the range \'{name}\' needs whole steps >= 1 and scale "linear" or "log"')
+        raise InputError(f"the list '{name}' is empty.")
+    values = value if isinstance(value, list) else [value]
+    for one in values:
+        large = isinstance(one, int) and abs(one) >= LARGEST_INTEGER
+        if not isinstance(one, str | int | float) or large:
+            raise InputError(
+                f"a value of '{name}' must be a text, a number, true or false; got {short(one)}."
+            )
+    return values
+
+
+def _range_of(name: str, value: Mapping[str, Any]) -> list[Any]:
+    if not {"from", "to", "steps"} <= set(value) <= {"from", "to", "steps", "scale"}:
+        raise InputError(f"the range '{name}' needs from, to, steps, and may have scale = \"log\".")
+    low, high, steps = value["from"], value["to"], value["steps"]
+    scale = value.get("scale", "linear")
+    if scale not in ("linear", "log") or not isinstance(steps, int) or steps < 1:
+        raise InputError(
+            f'the range \'{name}\' needs whole steps >= 1 and scale "linear" or "log".'
+        )
     for key in ("from", "to"):
         check_number(f"'{key}' of the range '{name}'", value[key])
-    if spaced is np.geomspace and not (value["from"] > 0 and value["to"] > 0):
-        raise InputError(f"the logarithmic range '{name}' needs bounds above 0")
-    numbers = [float(f"{x:.6g}") for x in spaced(value["from"], value["to"], value["steps"])]
-    whole = isinstance(value["from"], int) and isinstance(value["to"], int)
-    return list(dict.fromkeys(round(x) for x in numbers)) if whole else numbers
+    if scale == "log" and not (low > 0 and high > 0):
+        raise InputError(f"the logarithmic range '{name}' needs bounds above 0.")
+    spaced = np.geomspace if scale == "log" else np.linspace
+    numbers = [float(f"{x:.6g}") for x in spaced(low, high, steps)]
+    if isinstance(low, int) and isinstance(high, int):
+        return list(dict.fromkeys(round(x) for x in numbers))
+    return numbers

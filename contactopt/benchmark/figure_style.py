@@ -6,6 +6,7 @@ Colours are those of Okabe and Ito.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +25,10 @@ WIDE, TALL = 5.4, 11.0  # pixels of a character of a label, and between labels o
 POINTS = 0.72  # of a pixel at the usual resolution of a figure
 SHORT = 20  # characters of a label, up to which three of them fit side by side below a figure
 LONGEST = 26  # characters of a label
-MOST_ROUNDS = 20  # of sixteen methods in one figure
 WIDTH = 5.6  # of a figure [inch], so that its letters can be read where it is 400 pixels wide
 ROW = 0.19  # of a legend [inch]
 CELLS = 240  # of a map, above which no numbers are written into them
+NO_LABELS: Mapping[str, str] = MappingProxyType({})
 NAMES = {
     "solve_seconds": "time of the method [s]",
     "call_seconds": "time of the whole call [s]",
@@ -46,41 +47,15 @@ NAMES = {
     "method.factor": "penalty factor [-]",
     "problem.upper_nu": "Poisson's ratio, upper body [-]",
 }
+STYLES = [
+    {"color": colour, "marker": marker, "ls": line}
+    for colour, marker, line in zip(cycle(COLOURS), MARKERS, ["-"] * 8 + ["--"] * 8)
+]
 
 
-def styles() -> list[dict[str, Any]]:
-    """Make the styles of lines.
-
-    Returns
-    -------
-    Sixteen that differ in marker, and in colour or line; they come back after that.
-    """
-    made = [
-        {
-            "color": COLOURS[i % len(COLOURS)],
-            "marker": MARKERS[i],
-            "ls": "-" if i < len(COLOURS) else "--",
-        }
-        for i in range(len(MARKERS))
-    ]
-    return made * MOST_ROUNDS
-
-
-def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Shorten the label of a line.
-
-    It is the label that was given for a name; else the name itself, where it is long with the
-    values of its settings only. normal_qp(backend='clarabel', exact=True) becomes 'normal_qp
-    clarabel exact'.
-
-    Parameters
-    ----------
-    name : The name of a method with its settings.
-    labels : Labels that the experiment gives.
-
-    Returns
-    -------
-    The label.
+def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
+    """The label that was given for a name; else the name, where it is long with the values of its
+    settings only: normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
     """
     if name in labels:
         return str(labels[name])
@@ -90,23 +65,20 @@ def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> 
     words = [head]
     for setting in settings.rstrip(")").split(", "):
         key, _, value = setting.partition("=")
-        if value != "False":
-            words.append(
-                key if value == "True" else value.strip("'") if value.startswith("'") else setting
-            )
+        if value == "True":
+            words.append(key)
+        elif value.startswith("'"):
+            words.append(value.strip("'"))
+        elif value != "False":
+            words.append(setting)
     return " ".join(words)
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
     """Write the names of lines in their colours beside their last points, one above the other where
-    they meet.
+    they meet: (x, y, name, colour) of each.
 
     A name stands to the left of a point in the right half of the figure, to the right of any other.
-
-    Parameters
-    ----------
-    ax : The axes.
-    ends : (x, y, name, colour) of each line.
     """
     ax.autoscale_view()
     middle = float(ax.transAxes.transform((0.5, 0.5))[0])
@@ -115,30 +87,24 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
     for x, y, name, colour in sorted(ends, key=lambda end: end[1]):
         across, up = (float(place) for place in ax.transData.transform((x, y)))
         left = across - WIDE * len(name) if across > middle else across
-        right, shift = left + WIDE * len(name), 3.0
+        right, height = left + WIDE * len(name), up + 3.0
         while any(
-            left < end and start < right and abs(up + shift - height) < TALL
-            for start, end, height in taken
+            left < end and start < right and abs(height - other) < TALL
+            for start, end, other in taken
         ):
-            shift += TALL
-        taken.append((left, right, up + shift))
-        side = (
-            {"ha": "right", "xytext": (-5, shift * POINTS)}
-            if across > middle
-            else {"xytext": (5, shift * POINTS)}
-        )
-        ax.annotate(name, (x, y), textcoords="offset points", color=colour, fontsize=7, **side)
+            height += TALL
+        taken.append((left, right, height))
+        side, place = ("right", -5) if across > middle else ("left", 5)
+        above = (place, (height - up) * POINTS)
+        options = {"textcoords": "offset points", "color": colour, "fontsize": 7, "ha": side}
+        ax.annotate(name, (x, y), above, **options)
 
 
 def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
     """Write the numbers of a map in its cells, black on light colours and white on dark ones.
 
-    Parameters
-    ----------
-    ax : The axes.
-    grid : The numbers, row by row.
-    norm : What takes a number to its place between the darkest and the lightest colour.
-    size : Of the letters [pt].
+    `norm` takes a number to its place between the darkest and the lightest colour; `size` is that
+    of the letters [pt].
     """
     values = grid.to_numpy(float)
     if values.size > CELLS:
@@ -151,19 +117,9 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
 
 
 def make_figure(
-    columns: int = 1, rows: int = 1, size: Sequence[float] = (WIDTH, 4.0)
+    columns: int = 1, rows: int = 1, size: tuple[float, float] = (WIDTH, 4.0)
 ) -> tuple[Any, Any]:
-    """Make a figure with axes.
-
-    Parameters
-    ----------
-    columns, rows : Number of axes.
-    size : Width and height of one of them [inch].
-
-    Returns
-    -------
-    The figure, and its axes: one, or an array of them.
-    """
+    """A figure with axes of a size [inch] each: one, or an array of them."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
@@ -173,10 +129,6 @@ def make_figure(
 def set_ticks(axis: Any) -> None:
     """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels
     run into each other.
-
-    Parameters
-    ----------
-    axis : The axis.
     """
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
@@ -188,50 +140,20 @@ def set_ticks(axis: Any) -> None:
 
 
 def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
-    """Add a grid, and a legend below the figure, which grows for it.
-
-    Parameters
-    ----------
-    figure, ax : The figure and its axes.
-    title : Of the legend.
-
-    Returns
-    -------
-    The figure.
-    """
+    """The figure with a grid, and with a legend below it, for which it grows."""
     ax.grid(alpha=0.3)
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         columns = 2 if max(len(label) for label in labels) > SHORT else 3
-        figure.set_figheight(
-            figure.get_figheight() + ROW * (-(-len(labels) // columns) + (title is not None))
-        )
-        figure.legend(
-            handles,
-            labels,
-            loc="outside lower center",
-            ncols=columns,
-            frameon=False,
-            fontsize=8,
-            title=title,
-            title_fontsize=8,
-        )
+        rows = -(-len(labels) // columns) + (title is not None)
+        figure.set_figheight(figure.get_figheight() + ROW * rows)
+        look = {"ncols": columns, "frameon": False, "fontsize": 8, "title_fontsize": 8}
+        figure.legend(handles, labels, loc="outside lower center", title=title, **look)
     return figure
 
 
 def short_tick(value: float) -> str:
-    """Write a number as short as it can be: 100000.0 becomes 1e5.
-
-    Parameters
-    ----------
-    value : The number.
-
-    Returns
-    -------
-    The text.
-    """
-    plain, power = (
-        f"{value:g}",
-        f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-"),
-    )
+    """A number as short as it can be: 100000.0 becomes 1e5."""
+    plain = f"{value:g}"
+    power = f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
     return power if len(power) < len(plain) and float(power) == value else plain

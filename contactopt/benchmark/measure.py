@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -16,15 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.benchmark.keys import COLUMNS
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
-from contactopt.benchmark.store import SCHEMA, pack
+from contactopt.benchmark.store import SCHEMA, UNKNOWN, pack
 from contactopt.errors import InputError
-from contactopt.problem import (
-    InterfaceProblem,
-    Status,
-    natural_map_residual,
-)
+from contactopt.problem import InterfaceProblem, Status, natural_map_residual
 from contactopt.problem.laws.associated import Associated
 
 
@@ -49,45 +46,31 @@ class Answer:
     `status` is the method's own word; `reactions` None where there is no answer.
 
     measured  the columns call_seconds, cpu_seconds, peak_mb and base_mb, as far as they are known
+    history   residuals, seconds and iterations
     """
 
     status: str
-    message: str
-    measured: dict[str, float]
+    message: str = ""
     reactions: np.ndarray | None = None
     multipliers: np.ndarray | None = None
     label: str = ""
     iterations: float = np.nan
     seconds: float = np.nan
-    history: tuple[list[float], list[float], list[int]] | None = None
+    history: Any = None
+    measured: dict[str, float] = field(default_factory=dict)
 
 
 def blank(task: Task) -> dict[str, Any]:
-    """Make the row of a run of which nothing is known yet but what it is.
-
-    Parameters
-    ----------
-    task : The run and its limits.
-
-    Returns
-    -------
-    A value for every column, with status 'error'.
-    """
+    """A row with every column, of a run of which nothing is known yet but what it is."""
     run = task.run
-    return {
+    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
+    return unknown | {
         "schema": SCHEMA,
         "key": run.key,
         "experiment": task.experiment,
         "problem": run.problem.label,
         "family": run.problem.name,
         "parameters": json.dumps(run.problem.parameters),
-        "fingerprint": "",
-        "contacts": 0,
-        "dim": 0,
-        "plates": 0,
-        **dict.fromkeys(
-            ("rank", "condition", "guaranteed_mu", "alternating_mu", "tresca_mu"), np.nan
-        ),
         "method": run.method.label,
         "name": run.method.name,
         "settings": json.dumps(run.method.settings),
@@ -100,23 +83,17 @@ def blank(task: Task) -> dict[str, Any]:
         "start": run.start,
         "repeat": run.repeat,
         "status": "error",
-        "message": "",
-        "claimed": False,
-        "success": False,
-        "iterations": np.nan,
         "residual": np.inf,
         "law_residual": np.inf,
-        "build_seconds": np.nan,
-        "solve_seconds": np.nan,
-        "call_seconds": np.nan,
-        "cpu_seconds": np.nan,
-        "peak_mb": np.nan,
-        "base_mb": np.nan,
         "history": "[]",
         "versions": _versions(),
         "machine": _machine(),
-        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        "time": _now(),
     }
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 @cache
@@ -128,48 +105,31 @@ def _versions() -> str:
 @cache
 def _machine() -> str:
     model = platform.processor() or platform.machine()
-    try:
+    if os.path.exists("/proc/cpuinfo"):
         with open("/proc/cpuinfo") as file:
-            model = next(
-                (line.split(":")[1].strip() for line in file if line.startswith("model name")),
-                model,
-            )
-    except OSError:
-        pass
+            names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
+        model = names[0] if names else model
     return f"{model}, {os.cpu_count()} cores, {platform.system()}"
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
-    """Judge an answer by its certificate.
+    """The columns of the row that follow from the answer, judged by its certificate.
 
     The method's own word counts only where it admits failure.
-
-    Parameters
-    ----------
-    task : The run and its limits.
-    problem : The interface problem.
-    answer : What the method returned.
-
-    Returns
-    -------
-    The columns of the row that follow from the answer.
     """
-    out: dict[str, Any] = {"message": answer.message, **answer.measured}
-    out["time"] = datetime.now(UTC).isoformat(timespec="seconds")
+    out: dict[str, Any] = {"message": answer.message, "time": _now(), **answer.measured}
     if answer.reactions is None:
-        return out | {
-            "status": answer.status,
-            "solve_seconds": answer.measured.get("call_seconds", np.nan),
-        }
-    r, lam, seconds = answer.reactions, answer.multipliers, answer.seconds
+        seconds = answer.measured.get("call_seconds", np.nan)
+        return out | {"status": answer.status, "solve_seconds": seconds}
+    r, lam = answer.reactions, answer.multipliers
     claimed = answer.status == Status.SOLVED.label
     out |= {
         "claimed": claimed,
         "iterations": answer.iterations,
-        "solve_seconds": seconds,
+        "solve_seconds": answer.seconds,
         "label": answer.label,
+        "history": json.dumps(answer.history or []),
     }
-    out["history"] = json.dumps(answer.history or [])
     try:
         residual = natural_map_residual(problem, r, lam)
     except InputError as error:
@@ -179,24 +139,15 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
     if not np.all(np.isfinite(r)) or (lam is not None and not np.all(np.isfinite(lam))):
         return out | {"status": "not_finite"}
     out["answer"] = pack(r)
-    if own <= task.run.tolerance:
-        if seconds <= task.time_limit:
-            return out | {"status": "solved", "success": True}
+    if own > task.run.tolerance:
+        return out | {"status": "false_claim" if claimed else answer.status}
+    if answer.seconds > task.time_limit:
         return out | {"status": "time_limit", "message": "certified, but after the time limit"}
-    return out | {"status": "false_claim" if claimed else answer.status}
+    return out | {"status": "solved", "success": True}
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """Compute the certificate of the same problem under the associated law.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    r : (k, dim) contact forces, normal first [force].
-    lam : (p,) multipliers; None: those that fit best.
-
-    Returns
-    -------
-    The natural-map residual [-].
+    """The natural-map residual [-] of the same problem under the associated law, as
+    natural_map_residual computes it under its own.
     """
     return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

@@ -2,14 +2,15 @@
 of a package.
 
 A plug-in runs in worker processes only. The campaign knows it by what it declares, which a process
-of its own reads (contactopt.benchmark.catalogue).
+of its own reads (contactopt.benchmark.experiment).
 """
 
 from __future__ import annotations
 
 import hashlib
+import inspect
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
@@ -37,6 +38,23 @@ class Plugin:
     @property
     def iterates(self) -> bool:
         return hasattr(self.make, "iterate")
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A plug-in method without its code: its law, whether it iterates, and its arguments."""
+
+    law: str
+    iterates: bool
+    arguments: inspect.Signature
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """methods and problems that plug-ins declare, by name."""
+
+    methods: Mapping[str, Declared] = field(default_factory=dict)
+    problems: Mapping[str, inspect.Signature] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -71,6 +89,17 @@ class Registry:
             for point in entry_points(group=GROUP, name=name):
                 self.methods[name] = Plugin(name, point.load())
         return self.methods.get(name)
+
+    def declared(self, names: Sequence[str]) -> Catalogue:
+        """What was loaded, and the entry points of these names, without any code."""
+        for name in names:
+            self.find(name)
+        methods = {
+            p.name: Declared(p.law, p.iterates, arguments_of(p.make)) for p in self.methods.values()
+        }
+        return Catalogue(
+            methods, {name: arguments_of(make) for name, make in self.problems.items()}
+        )
 
 
 # The registry that receives what the plug-in file declares that is being run; None at any other
@@ -124,8 +153,7 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
 
 def problem(make: Any = None, *, name: str | None = None) -> Any:
     """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME`
-    in an experiment
-    file.
+    in an experiment file.
 
     Parameters
     ----------
@@ -151,7 +179,7 @@ def problem(make: Any = None, *, name: str | None = None) -> Any:
 
 
 def _name(kind: str, make: Any, name: object) -> str:
-    """The name under which `make` is registered; InputError if one of the two is of the wrong kind."""
+    """The name under which `make` is registered, if both are of the right kind."""
     if not callable(make):
         raise InputError(
             f"a plug-in {kind} must be a function or a class; got {type(make).__name__}."
@@ -174,3 +202,13 @@ def _run(path: Path) -> None:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
+
+
+def arguments_of(function: Callable[..., Any]) -> inspect.Signature:
+    """The arguments of a function or class, without types, and None for each default value."""
+    empty = inspect.Parameter.empty
+    parameters = [
+        own.replace(annotation=empty, default=empty if own.default is empty else None)
+        for own in inspect.signature(function).parameters.values()
+    ]
+    return inspect.Signature(parameters)

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
-from contactopt.benchmark.catalogue import arguments_of
+from contactopt.benchmark.plugins import arguments_of
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.scenes import SCENES, make_scene
+from contactopt.scenes import make_scene
 from contactopt.scenes.scene import Part, Scene
 
 KINDS = ("scene", "fclib", "family")
@@ -51,9 +51,8 @@ class ProblemSpec:
         if self.kind == "scene":
             scene(self.name, **self.parameters)
         elif self.kind == "family":
-            families = {name: arguments_of(family) for name, family in FAMILIES.items()} | dict(
-                declared
-            )
+            families = {name: arguments_of(make) for name, make in FAMILIES.items()}
+            families |= declared
             if self.name not in families:
                 raise InputError(
                     f"unknown family {self.name!r}; choose from {', '.join(families)}."
@@ -84,35 +83,15 @@ class ProblemSpec:
 
 
 def short_number(value: Any) -> str:
-    """Write a float in the fewest characters that give it back, and anything else as text.
-
-    Parameters
-    ----------
-    value : Any value.
-
-    Returns
-    -------
-    The text.
-    """
+    """A float in the fewest characters that give it back, and anything else as text."""
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 def scene(name: str, **parameters: Any) -> Scene:
-    """Make a named scene, with other materials if they are given.
+    """A named scene, with other materials if they are given.
 
-    Parameters
-    ----------
-    name : A name in SCENES.
-    parameters : The scene's own arguments, and upper_E, upper_nu, lower_E, lower_nu, and
-        stiffness_ratio, which is the lower body's Young's modulus over the upper one's.
-
-    Returns
-    -------
-    The scene.
-
-    Raises
-    ------
-    InputError : For arguments that the scene does not have, or that contradict each other.
+    `parameters` are the scene's own arguments, and upper_E, upper_nu, lower_E, lower_nu, and
+    stiffness_ratio, which is the lower body's Young's modulus over the upper one's.
     """
     given = {key: parameters.pop(key) for key in MATERIALS if key in parameters}
     made = make_scene(name, **parameters)
@@ -136,16 +115,7 @@ def scene(name: str, **parameters: Any) -> Scene:
 
 
 def reduced(name: str, **parameters: Any) -> InterfaceProblem:
-    """Reduce a named scene to its interface problem with explicit Q.
-
-    Parameters
-    ----------
-    name, parameters : As for `scene`.
-
-    Returns
-    -------
-    The problem.
-    """
+    """The interface problem, with explicit Q, of a scene made by `scene`."""
     from contactopt.coupling.reduction import reduce
 
     return reduce(scene(name, **parameters), Q="explicit")
@@ -154,24 +124,8 @@ def reduced(name: str, **parameters: Any) -> InterfaceProblem:
 def rigid_bodies(
     bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: int = 0
 ) -> InterfaceProblem:
-    """Draw random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H'
-    v, so that a solution
-    exists.
-
-    Parameters
-    ----------
-    bodies : Number of bodies, at least two.
-    contacts : Number of contacts.
-    mu : Friction coefficient.
-    seed : Of the random numbers.
-
-    Returns
-    -------
-    The problem.
-
-    Raises
-    ------
-    InputError : With fewer than two bodies or one contact.
+    """Random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H' v, so
+    that a solution exists.
     """
     if bodies < 2 or contacts < 1:
         raise InputError("rigid_bodies needs at least two bodies and one contact.")
@@ -182,36 +136,23 @@ def rigid_bodies(
         pair = rng.choice(bodies, 2, replace=False)
         for body, sign in zip(pair, (1.0, -1.0)):
             arm = rng.normal(size=3)
-            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 6] = sign * np.hstack(
-                [frame, np.cross(arm, frame)]
-            )
+            force = np.hstack([frame, np.cross(arm, frame)])
+            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 6] = sign * force
     inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
-    return InterfaceProblem(
-        (H * inverse_mass) @ H.T,
-        (H @ rng.normal(size=6 * bodies)).reshape(-1, 3),
-        Coulomb(np.full(contacts, mu)),
-    )
+    q = (H @ rng.normal(size=6 * bodies)).reshape(-1, 3)
+    return InterfaceProblem((H * inverse_mass) @ H.T, q, Coulomb(np.full(contacts, mu)))
 
 
 def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> InterfaceProblem:
-    """Press a parabola on an elastic half-plane: the dense logarithmic kernel of piecewise constant
-    tractions.
+    """A parabola pressed on an elastic half-plane: the dense logarithmic kernel of piecewise
+    constant tractions.
 
     Half the candidate zone and the plane's modulus pi E* / 2 are the units. The load, by a plate,
-    makes about half of the candidate nodes touch.
+    makes about half of the candidate nodes touch. `coupling` is Dundurs' constant, in (-.5, .5), by
+    which tangential tractions move the surface normally. At 0 friction has nothing to do and only
+    the normal problem is left.
 
     Source: Johnson (1985), Contact Mechanics, eqs (2.30).
-
-    Parameters
-    ----------
-    contacts : Number of candidate nodes.
-    mu : Friction coefficient.
-    coupling : Dundurs' constant, in (-.5, .5), by which tangential tractions move the surface
-        normally. At 0 friction has nothing to do and only the normal problem is left.
-
-    Returns
-    -------
-    The problem.
     """
     h = 2.0 / contacts
     x = -1.0 + h * (np.arange(contacts) + 0.5)
@@ -239,27 +180,14 @@ def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> In
 
 
 def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:
-    """Make the friction of a scene under given normal forces (Tresca's problem) a contact problem
+    """The friction of a scene under given normal forces (Tresca's problem) as a contact problem
     without coupling.
 
     Normal forces p are those without friction. The scene's Q_tt, and per contact u_n = (r_n - p) c
     with its own normal compliance c, so that r_n = p solves the normal part exactly; plates are
     held. The tangential displacement at no force is that of the scene under p, and a drag along the
-    first axis that would need the force shear * mu * p if nothing slipped.
-
-    Parameters
-    ----------
-    of, parameters : The name of the scene and its arguments, as for `scene`.
-    mu : Friction coefficient.
-    shear : The drag, over the one at which every contact slips.
-
-    Returns
-    -------
-    The problem.
-
-    Raises
-    ------
-    InputError : If the normal problem is not solved.
+    first axis that would need the force shear * mu * p if nothing slipped. `of` and `parameters`
+    are the name of the scene and its arguments.
     """
     from contactopt.methods.driver import solve
 
@@ -287,16 +215,8 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
 
 
 def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
-    """List every contact of a scene several times: forces are shared, and Q is rank-deficient.
-
-    Parameters
-    ----------
-    of, parameters : The name of the scene and its arguments, as for `scene`.
-    copies : How often each contact is listed.
-
-    Returns
-    -------
-    The problem.
+    """Every contact of the scene `of` listed several times: forces are shared, and Q is
+    rank-deficient.
     """
     p = reduced(of, **parameters)
     index = np.repeat(np.arange(p.q.size).reshape(p.q.shape), copies, axis=0).ravel()
@@ -314,16 +234,8 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
 def in_units(
     of: str, force: float = 1.0, length: float = 1.0, **parameters: Any
 ) -> InterfaceProblem:
-    """Write a scene's numbers in other units.
-
-    Parameters
-    ----------
-    of, parameters : The name of the scene and its arguments, as for `scene`.
-    force, length : What one newton and one millimetre are in the other units.
-
-    Returns
-    -------
-    The problem.
+    """The numbers of the scene `of` in units in which one newton is `force` and one millimetre
+    `length`.
     """
     p = reduced(of, **parameters)
     return replace(
@@ -337,35 +249,12 @@ def in_units(
 
 
 FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
-    "rigid_bodies": rigid_bodies,
-    "half_plane": half_plane,
-    "tangential": tangential,
-    "redundant": redundant,
-    "in_units": in_units,
+    make.__name__: make for make in (rigid_bodies, half_plane, tangential, redundant, in_units)
 }
 
 
 def named(kind: str, name: str, parameters: Mapping[str, Any], folder: Path) -> list[ProblemSpec]:
-    """Find the problems behind one entry: one, or every file that an FCLib pattern matches.
-
-    Parameters
-    ----------
-    kind : 'scene', 'fclib' or 'family'.
-    name : The name of the scene or family, or a pattern of files.
-    parameters : The arguments of the problem.
-    folder : The folder to which a pattern is relative.
-
-    Returns
-    -------
-    The problems, files in the order of their names.
-
-    Raises
-    ------
-    InputError : For an unknown scene, and if a pattern uses a variable that is not set or matches
-        nothing.
-    """
-    if kind == "scene" and name not in SCENES:
-        raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
+    """The problems of one entry: one, or each file that an FCLib pattern in `folder` matches."""
     if kind != "fclib":
         return [ProblemSpec(kind, name, parameters)]
     pattern = Path(os.path.expandvars(os.path.expanduser(name)))

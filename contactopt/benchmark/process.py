@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import os
 import re
+import signal
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable
@@ -22,16 +24,8 @@ from contactopt.errors import InputError
 if TYPE_CHECKING:
     import psutil
 
-LIBRARIES = (
-    "OMP_NUM",
-    "OPENBLAS_NUM",
-    "MKL_NUM",
-    "BLIS_NUM",
-    "NUMEXPR_NUM",
-    "VECLIB_MAXIMUM",
-    "RAYON_NUM",
-)
-ONE_THREAD = {f"{name}_THREADS": "1" for name in LIBRARIES}
+LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "RAYON")
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in LIBRARIES} | {"VECLIB_MAXIMUM_THREADS": "1"}
 # environment variable of all that a campaign starts: number and start time of its process
 MARK = "CONTACTOPT_CAMPAIGN"
 START = "start"  # the phase until the process answers at all
@@ -41,13 +35,8 @@ STARTS = 3
 BEAT = 0.1  # s between two looks at what a busy process printed
 MOST_WORDS = 10e6  # bytes of print that are kept on disk; more is thrown away
 KEPT_WORDS = 4000  # bytes of what a process printed last, which may tell why it ended
-MEMORY_WORDS = (
-    b"MemoryError",
-    b"bad_alloc",
-    b"out of memory",
-    b"Out of memory",
-    b"Cannot allocate memory",
-)
+MEMORY_WORDS = re.compile(rb"MemoryError|bad_alloc|[Oo]ut of memory|Cannot allocate memory")
+KILLED = "killed from outside, as the system does when memory runs out"
 
 
 class Ended(Exception):
@@ -80,13 +69,10 @@ class Process:
             return
         from loky import ProcessPoolExecutor
 
-        from contactopt.benchmark.worker import prepare
-
         try:
             self.noise = tempfile.NamedTemporaryFile("a+b", delete=False)  # noqa: SIM115
             # a solver's last words tell more than the stack of a crashed process
-            quiet = {"PYTHONFAULTHANDLER": ""}
-            environment = ONE_THREAD | quiet | {MARK: mark()}
+            environment = ONE_THREAD | {"PYTHONFAULTHANDLER": "", MARK: _mark()}
             told = (self.noise.name, os.getpid())
             self.executor = ProcessPoolExecutor(
                 1, env=environment, initializer=prepare, initargs=told
@@ -100,32 +86,26 @@ class Process:
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function returns that the process calls.
 
-        Parameters
-        ----------
-        limit : Seconds for the call, after which the process is killed.
-        phase : What the call is, for `Ended`.
-        function, arguments : What is called; both are pickled.
-
-        Returns
-        -------
-        What the function returned.
-
-        Raises
-        ------
-        Ended : If the process did not survive the call. A process that is killed before it answers
-            at all is started anew, STARTS times.
+        After `limit` seconds the process is killed. Raises Ended if it did not survive the call,
+        which `phase` names. A process that is killed before the call, while it starts or while
+        nobody asks it anything, is started anew, STARTS times.
         """
-        for trial in range(STARTS):
+        from loky.process_executor import BrokenProcessPool
+
+        for _ in range(STARTS):
             self.start()
-            if self.number is not None:
-                break
             try:
-                self.number = self._wait(self.ready, START_LIMIT, START)
-                os.unlink(self.noise.name)
-            except Ended:
-                if trial == STARTS - 1:
-                    raise
-        return self._wait(self.executor.submit(function, *arguments), limit, phase)
+                if self.number is None:
+                    self.number = self._wait(self.ready, START_LIMIT, START)
+                    os.unlink(self.noise.name)
+                answer = self.executor.submit(function, *arguments)
+            except Ended as end:
+                last = end
+            except BrokenProcessPool as error:
+                last = Ended(START, *self._death(error))
+            else:
+                return self._wait(answer, limit, phase)
+        raise last
 
     def _wait(self, future: Future[Any], limit: float, phase: str) -> Any:
         from loky.process_executor import BrokenProcessPool
@@ -135,9 +115,7 @@ class Process:
             try:
                 return future.result(max(0.0, min(BEAT, deadline - time.monotonic())))
             except BrokenProcessPool as error:
-                raise Ended(
-                    phase, *self._death(str(error.__cause__ or error) + str(error))
-                ) from None
+                raise Ended(phase, *self._death(error)) from None
             except TimeoutError:
                 if os.fstat(self.noise.fileno()).st_size > MOST_WORDS:
                     self.noise.truncate(0)
@@ -145,25 +123,30 @@ class Process:
                     self.kill()
                     raise Ended(phase, "killed", f"still running after {limit:g} s") from None
 
-    def _death(self, how: str) -> tuple[str, str]:
+    def _death(self, error: Exception) -> tuple[str, str]:
         """How the process ended by itself: (status, message)."""
         self.noise.seek(max(0, os.fstat(self.noise.fileno()).st_size - KEPT_WORDS))
         said = self.noise.read(KEPT_WORDS)
         self.kill()
         last = said.strip().splitlines()[-1].decode(errors="replace") if said.strip() else ""
-        if any(word in said for word in MEMORY_WORDS):
+        if MEMORY_WORDS.search(said):
             return "out_of_memory", one_line(last)
-        found = re.search(r"exit codes of the workers are \{(\w+)\((-?\d+)\)", how)
+        told = f"{error.__cause__} {error}"
+        found = re.search(r"exit codes of the workers are \{(\w+)\((-?\d+)\)", told)
         name, code = found.groups() if found else ("EXIT", "unknown")
         if name == "SIGKILL":
-            return "out_of_memory", "killed from outside, as the system does when memory runs out"
+            return "out_of_memory", KILLED
         name = f"exit code {code}" if name == "EXIT" else name
         return "crashed", one_line(f"{name}: {last}".rstrip(": "))
 
     def interrupt(self) -> None:
         """Kill the process from another thread; the one that uses it sees it end."""
+        import psutil
+
         if self.number is not None:
-            end_tree(self.number)
+            with suppress(psutil.Error):
+                process = psutil.Process(self.number)
+                _kill([process, *process.children(recursive=True)])
 
     def kill(self) -> None:
         """End the process with all that it started."""
@@ -178,23 +161,28 @@ class Process:
         end_orphans()
 
 
-def mark() -> str:
-    """What tells the processes of this campaign from all others: number and start of this process."""
+def prepare(noise: str, parent: int) -> None:
+    """Make the new process ready: it ends with the process of the number `parent`, leaves Ctrl-C to
+    it, and prints into the file `noise`.
+    """
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: however the parent ends
+        if os.getppid() != parent:
+            os._exit(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    file = os.open(noise, os.O_WRONLY | os.O_APPEND)
+    for stream in (1, 2):
+        os.dup2(file, stream)
+    os.close(file)
+
+
+def _mark() -> str:
+    """Number and start of this process, which tell those of this campaign from all others."""
     import psutil
 
     return f"{os.getpid()} {psutil.Process().create_time()}"
-
-
-def end_tree(number: int) -> None:
-    """Kill a process and what it started.
-
-    What frees shared memory after them is left to end by itself.
-    """
-    import psutil
-
-    with suppress(psutil.Error):
-        process = psutil.Process(number)
-        _kill([process, *process.children(recursive=True)])
 
 
 def end_orphans() -> None:
@@ -211,15 +199,13 @@ def end_orphans() -> None:
             alive = psutil.pid_exists(int(number)) and psutil.Process(
                 int(number)
             ).create_time() == float(began)
-            strange = os.getpid() not in (
-                process.pid,
-                *(parent.pid for parent in process.parents()),
-            )
-            if not alive or (int(number) == os.getpid() and strange):
+            family = (process.pid, *(parent.pid for parent in process.parents()))
+            if not alive or (int(number) == os.getpid() and os.getpid() not in family):
                 _kill([process])
 
 
 def _kill(processes: Iterable[psutil.Process]) -> None:
+    """Kill processes; what frees shared memory after them is left to end by itself."""
     import psutil
 
     killed = []
@@ -232,16 +218,8 @@ def _kill(processes: Iterable[psutil.Process]) -> None:
 
 
 def one_line(error: object) -> str:
-    """Write a text, or an exception with its name unless it is an InputError, in one line of at
-    most 200 characters.
-
-    Parameters
-    ----------
-    error : The text or exception.
-
-    Returns
-    -------
-    The line.
+    """A text, or an exception with its name unless it is an InputError, in one line of at most 200
+    characters.
     """
     text = str(error) if isinstance(error, str | InputError) else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]

@@ -2,14 +2,15 @@
 here.
 
 `table` is what contactopt.benchmark.load returns. A figure that compares times takes the runs of
-one law only. Every figure takes `labels`, short names for long ones.
+one law only. `by` is the column whose values have a line or a panel each, `labels` are short names
+for long ones.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from contactopt.benchmark.figure_style import (
     FLOOR,
     LEAST_RESIDUAL,
     NAMES,
+    NO_LABELS,
+    STYLES,
     WIDTH,
     add_legend,
     label_ends,
@@ -25,7 +28,6 @@ from contactopt.benchmark.figure_style import (
     set_ticks,
     short_label,
     short_tick,
-    styles,
     write_numbers,
 )
 from contactopt.benchmark.tables import INSTANCE, groups
@@ -39,7 +41,7 @@ def speed_accuracy(
     table: pd.DataFrame,
     time: str = "solve_seconds",
     by: str = "method",
-    labels: Mapping[str, str] = MappingProxyType({}),
+    labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
     """Draw time against certified residual: per method a line through its settings, medians over
     problems and repeats.
@@ -47,25 +49,15 @@ def speed_accuracy(
     Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both
     faster and more accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at
     FLOOR. Labels stand where the lines end, too.
-
-    Parameters
-    ----------
-    table : The rows.
-    time : The column with the times [s].
-    by : The column whose values have a line each.
-    labels : Short labels by the names of methods.
-
-    Returns
-    -------
-    The figure of matplotlib.
     """
     figure, ax = make_figure()
     points, ends = [], []
-    for (name, rows), style in zip(groups(table, by), styles()):
+    for (name, rows), style in zip(groups(table, by), cycle(STYLES)):
         name = short_label(name, labels)
+        # settings of the same tolerance are one point
         settings = rows.groupby("tolerance").agg(
             {time: "median", "residual": "median", "success": "mean"}
-        )  # settings of the same tolerance are one point
+        )
         settings = settings.sort_index(ascending=False)
         shown = settings[np.isfinite(settings["residual"])]
         floor = FLOOR * shown.index.to_numpy(float)
@@ -73,22 +65,14 @@ def speed_accuracy(
         ends += [(x[-1], y[-1], name, style["color"])] if len(x) else []
         ax.loglog(x, y, "-", color=style["color"], lw=1, alpha=0.7)
         good = shown["success"].to_numpy() >= 0.5
-        options = {"ls": "none", "marker": style["marker"], "color": style["color"], "ms": 6}
+        look = style | {"ls": "none", "ms": 6}
         if good.any():
-            ax.loglog(x[good], y[good], label=name, **options)
-        ax.loglog(x[~good], y[~good], mfc="white", label="" if good.any() else name, **options)
+            ax.loglog(x[good], y[good], label=name, **look)
+        ax.loglog(x[~good], y[~good], mfc="white", label="" if good.any() else name, **look)
         points += list(zip(x, y))
     label_ends(ax, ends)
-    front = _pareto(np.array(points))
-    ax.step(
-        front[:, 0],
-        front[:, 1],
-        where="post",
-        color="#bbbbbb",
-        lw=5,
-        zorder=0,
-        label="Pareto front",
-    )
+    wide = {"color": "#bbbbbb", "lw": 5, "zorder": 0}
+    ax.step(*_pareto(np.array(points)).T, where="post", label="Pareto front", **wide)
     ax.set(xlabel=NAMES.get(time, time) + ", median", ylabel="natural-map residual [-], median")
     set_ticks(ax.xaxis)
     return add_legend(figure, ax)
@@ -107,7 +91,7 @@ def performance_profile(
     table: pd.DataFrame,
     metric: str = "solve_seconds",
     by: str = "method",
-    labels: Mapping[str, str] = MappingProxyType({}),
+    labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
     """Draw a profile: the share of the instances solved within a factor of the best method's time
     on each.
@@ -117,56 +101,28 @@ def performance_profile(
 
     Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math.
     Program. 91, 201-213.
-
-    Parameters
-    ----------
-    table : The rows.
-    metric : The column with the times [s].
-    by, labels : As for `speed_accuracy`.
-
-    Returns
-    -------
-    The figure of matplotlib.
     """
     figure, ax = make_figure()
-    times = table[metric].where(table["success"], np.inf)
-    medians = (
-        table.assign(_time=times)
-        .groupby([*INSTANCE, by])["_time"]
+    timed = table.assign(_time=table[metric].where(table["success"], np.inf))
+    wide = (
+        timed.groupby([*INSTANCE, by])["_time"]
         .agg(lambda t: t.median() if np.isfinite(t).all() else np.inf)
+        .unstack(by)
     )
-    wide = medians.unstack(by)
     solvable = wide[np.isfinite(wide.min(axis=1))]
     ratio = solvable.div(solvable.min(axis=1), axis=0)
-    largest = 1.3 * max(
-        2.0, float(np.nanmax(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0))
-    )
-    for (full, _), style in zip(groups(table, by), styles()):
-        name = short_label(full, labels)
-        sorted_ratios = np.sort(ratio[full].dropna().to_numpy())
-        sorted_ratios = sorted_ratios[np.isfinite(sorted_ratios)]
-        share = np.arange(1, len(sorted_ratios) + 1) / len(wide)
-        x, y = (
-            np.concatenate([[1.0], sorted_ratios, [largest]]),
-            np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]]),
-        )
-        ax.step(
-            x,
-            y,
-            where="post",
-            color=style["color"],
-            ls=style["ls"],
-            lw=1.6,
-            label=f"{name} ({len(share)})",
-        )
+    largest = 1.3 * float(np.max(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0))
+    for (full, _), style in zip(groups(table, by), cycle(STYLES)):
+        reached = np.sort(ratio[full][np.isfinite(ratio[full])].to_numpy())
+        share = np.arange(len(reached) + 1) / len(wide)
+        label = f"{short_label(full, labels)} ({len(reached)})"
+        look = {"color": style["color"], "ls": style["ls"], "lw": 1.6, "label": label}
+        x, y = np.concatenate([[1.0], reached, [largest]]), np.append(share, share[-1])
+        ax.step(x, y, where="post", **look)
     what = NAMES.get(metric, metric).partition(" [")[0]
-    ax.set(
-        xscale="log",
-        xlim=(1, largest),
-        ylim=(0, 1.03),
-        xlabel=f"ratio: {what} / the best method's [-]",
-    )
-    ax.set_ylabel(f"share of the {len(wide)} instances solved")
+    ax.set(xscale="log", xlim=(1, largest), ylim=(0, 1.03))
+    ax.set(xlabel=f"ratio: {what} / the best method's [-]")
+    ax.set(ylabel=f"share of the {len(wide)} instances solved")
     return add_legend(figure, ax, "method (solved)")
 
 
@@ -175,25 +131,14 @@ def time_against_size(
     size: str = "contacts",
     metric: str = "solve_seconds",
     by: str = "method",
-    labels: Mapping[str, str] = MappingProxyType({}),
+    labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
     """Draw the median time of successful runs against size, with the exponent p of time ~ size^p
     from the larger sizes.
-
-    Parameters
-    ----------
-    table : The rows.
-    size : The column with the sizes.
-    metric : The column with the times [s].
-    by, labels : As for `speed_accuracy`.
-
-    Returns
-    -------
-    The figure of matplotlib.
     """
     figure, ax = make_figure()
     ends = []
-    look = {name: style for (name, _), style in zip(groups(table, by), styles())}
+    look = {name: style for (name, _), style in zip(groups(table, by), cycle(STYLES))}
     for full, rows in groups(table[table["success"]], by):
         name, style = short_label(full, labels), look[full]
         medians = rows.groupby(size)[metric].median()
@@ -201,16 +146,7 @@ def time_against_size(
         exponent = fitted_exponent(x, y)
         ends.append((x[-1], y[-1], name, style["color"]))
         label = name + ("" if np.isnan(exponent) else f": {exponent:.1f}")
-        ax.loglog(
-            x,
-            y,
-            marker=style["marker"],
-            color=style["color"],
-            ls=style["ls"],
-            ms=5,
-            lw=1.2,
-            label=label,
-        )
+        ax.loglog(x, y, ms=5, lw=1.2, label=label, **style)
     label_ends(ax, ends)
     ax.set(xlabel=NAMES.get(size, size), ylabel=NAMES.get(metric, metric) + ", median")
     set_ticks(ax.xaxis)
@@ -218,16 +154,8 @@ def time_against_size(
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
-    """Fit the exponent p of y ~ x^p by least squares over the larger half of the sizes, three at
-    least.
-
-    Parameters
-    ----------
-    x, y : (n,) sizes and times.
-
-    Returns
-    -------
-    The exponent; nan with fewer than three sizes.
+    """The exponent p of y ~ x^p by least squares over the larger half of the sizes (n,), three at
+    least; nan with fewer than three.
     """
     if len(x) < 3:
         return np.nan
@@ -243,67 +171,38 @@ def stability_map(
     by: str = "method",
 ) -> Any:
     """Draw one panel per method: success, iterations, error or time over two parameters; hatched
-    grey where no run
-    succeeded.
+    grey where no run succeeded.
 
     The cells hold their numbers, unless a map has more than CELLS of them. Runs that ended by the
     method's own criterion above the tolerance ("settled") show their value too. Where one axis is
     the friction coefficient and the experiment diagnosed its problems, lines on top: below the
     dashed one the alternating iteration contracts for every load, at the full one it does not for
     some load.
-
-    Parameters
-    ----------
-    table : The rows.
-    x, y : The columns of the two parameters.
-    value : The column that is shown.
-    by : The column whose values have a panel each.
-
-    Returns
-    -------
-    The figure of matplotlib.
     """
     from matplotlib.colors import LogNorm, Normalize
 
     parts = groups(table, by)
     columns = min(2, len(parts))
-    figure, axes = make_figure(
-        columns, -(-len(parts) // columns), (WIDTH / columns, 2.5 if columns > 1 else 3.8)
-    )
-    grids = [(name, rows, _grid(rows, x, y, value)) for name, rows in parts]
-    shown = np.concatenate([grid.to_numpy(float).ravel() for _, _, grid in grids])
+    size = (WIDTH / columns, 2.5 if columns > 1 else 3.8)
+    figure, axes = make_figure(columns, -(-len(parts) // columns), size)
+    grids = [_grid(rows, x, y, value) for _, rows in parts]
+    shown = np.concatenate([grid.to_numpy(float).ravel() for grid in grids])
     shown = shown[np.isfinite(shown) & (shown > 0)]
     low, high = (float(shown.min()), float(shown.max())) if len(shown) else (0.1, 1.0)
     norm = Normalize(0, 1) if value == "success" else LogNorm(low, high if high > low else 2 * low)
-    for number, (ax, (name, rows, grid)) in enumerate(zip(np.ravel(axes), grids)):
-        ax.set_facecolor("#cccccc")
-        ax.patch.set(hatch="xx", edgecolor="#999999")
-        write_numbers(ax, grid, norm, 7 if columns > 1 else 8)
-        mesh = ax.imshow(
-            grid.to_numpy(float), norm=norm, cmap="viridis", origin="lower", aspect="auto"
-        )
+    small = 8 if columns > 1 else None
+    for number, (ax, (name, rows), grid) in enumerate(zip(np.ravel(axes), parts, grids)):
+        mesh = _draw_map(ax, grid, norm, columns > 1)
         ax.set_title(name, fontsize=9)
-        ax.set_xlabel(NAMES.get(x, x), fontsize=8 if len(parts) > 1 else None)
-        ax.set_ylabel(
-            NAMES.get(y, y) if number % columns == 0 else "", fontsize=8 if len(parts) > 1 else None
-        )
-        for axis, index in ((ax.xaxis, grid.columns), (ax.yaxis, grid.index)):
-            room = 26 if axis is ax.xaxis and len(parts) > 1 else 60  # characters
-            names = [short_tick(v) for v in index]
-            ticks = range(0, len(index), -(-sum(len(name) + 1 for name in names) // room))
-            axis.set_ticks(list(ticks), [names[i] for i in ticks], fontsize=8)
+        ax.set_xlabel(NAMES.get(x, x), fontsize=small)
+        ax.set_ylabel(NAMES.get(y, y) if number % columns == 0 else "", fontsize=small)
         _thresholds(ax, rows, x, y, grid)
     for ax in np.ravel(axes)[len(parts) :]:
         ax.set_axis_off()
     handles = {line.get_label(): line for ax in np.ravel(axes) for line in ax.get_lines()}
     if handles:
-        figure.legend(
-            handles=list(handles.values()),
-            loc="outside lower center",
-            ncols=1,
-            frameon=False,
-            fontsize=8,
-        )
+        look = {"loc": "outside lower center", "ncols": 1, "frameon": False, "fontsize": 8}
+        figure.legend(handles=list(handles.values()), **look)
     label = "share of runs solved" if value == "success" else NAMES.get(value, value) + ", median"
     figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.8, aspect=30)
     return figure
@@ -311,13 +210,31 @@ def stability_map(
 
 def _grid(rows: pd.DataFrame, x: str, y: str, value: str) -> pd.DataFrame:
     if value == "success":
-        values = rows["success"].astype(float)
+        values, how = rows["success"].astype(float), "mean"
     else:
         values = rows[value].where(rows["success"] | (rows["status"] == "settled"))
-    how = "mean" if value == "success" else "median"
+        how = "median"
     return rows.assign(_value=values).pivot_table(
         index=y, columns=x, values="_value", aggfunc=how, dropna=False
     )
+
+
+def _draw_map(ax: Any, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
+    """Draw one map, with less room if another stands beside it; its picture."""
+    ax.set_facecolor("#cccccc")
+    ax.patch.set(hatch="xx", edgecolor="#999999")
+    write_numbers(ax, grid, norm, 7 if beside else 8)
+    look = {"cmap": "viridis", "origin": "lower", "aspect": "auto"}
+    mesh = ax.imshow(grid.to_numpy(float), norm=norm, **look)
+    # the last number is the room along the axis [characters]
+    for axis, index, room in (
+        (ax.xaxis, grid.columns, 26 if beside else 60),
+        (ax.yaxis, grid.index, 60),
+    ):
+        names = [short_tick(v) for v in index]
+        ticks = range(0, len(index), -(-sum(len(name) + 1 for name in names) // room))
+        axis.set_ticks(list(ticks), [names[i] for i in ticks], fontsize=8)
+    return mesh
 
 
 def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame) -> None:
@@ -326,9 +243,12 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
     """
     if "problem.mu" not in (x, y):
         return
-    other, frictions = (y, grid.columns) if x == "problem.mu" else (x, grid.index)
+    upright = x == "problem.mu"
+    other, frictions, values = (
+        (y, grid.columns, grid.index) if upright else (x, grid.index, grid.columns)
+    )
     cells = np.log(np.asarray(frictions, dtype=float).clip(1e-300))
-    places = {v: i for i, v in enumerate(grid.index if x == "problem.mu" else grid.columns)}
+    places = {v: i for i, v in enumerate(values)}
     lines = (
         ("guaranteed_mu", "--", "alternating iteration contracts for every load below"),
         ("alternating_mu", "-", "does not for some load from here on"),
@@ -336,68 +256,35 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
     for column, style, label in lines:
         known = rows.groupby(other)[column].median().dropna()
         known = known[np.isfinite(known) & (known > 0)]
-        along = np.interp(
-            np.log(known.to_numpy()), cells, np.arange(len(cells)), left=np.nan, right=np.nan
-        )
+        number = np.arange(len(cells))
+        along = np.interp(np.log(known.to_numpy()), cells, number, left=np.nan, right=np.nan)
         line = along, np.array([places[v] for v in known.index])
         if np.isfinite(along).sum() > 1:
-            ax.plot(
-                *(line if x == "problem.mu" else line[::-1]),
-                style,
-                color="#D55E00",
-                lw=2,
-                label=label,
-            )
+            ax.plot(*(line if upright else line[::-1]), style, color="#D55E00", lw=2, label=label)
 
 
 def convergence(
     table: pd.DataFrame,
     x: str = "iterations",
     by: str = "method",
-    labels: Mapping[str, str] = MappingProxyType({}),
+    labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
-    """Draw the natural-map residual after each outer iteration, or against time, of the first
-    repeat of each method.
-
-    Parameters
-    ----------
-    table : The rows, with their histories.
-    x : "iterations" or "seconds".
-    by, labels : As for `speed_accuracy`.
-
-    Returns
-    -------
-    The figure of matplotlib.
-
-    Raises
-    ------
-    InputError : For another `x`.
+    """Draw the natural-map residual after each outer iteration, or against time ("seconds"), of the
+    first repeat of each method.
     """
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
     figure, ax = make_figure()
-    for (name, rows), style in zip(groups(table, by), styles()):
+    for (name, rows), style in zip(groups(table, by), cycle(STYLES)):
         history = json.loads(rows.sort_values("repeat")["history"].iloc[0])
         if not history:
             continue
         residual, seconds, iterations = history
         along = iterations if x == "iterations" else seconds
         residual = np.maximum(residual, max(LEAST_RESIDUAL, FLOOR * float(rows["tolerance"].min())))
-        name = short_label(name, labels)
-        ax.loglog(
-            along,
-            residual,
-            marker=style["marker"],
-            ms=3,
-            lw=1,
-            color=style["color"],
-            ls=style["ls"],
-            label=name,
-        )
-    ax.set(
-        xlabel="outer iteration" if x == "iterations" else "seconds",
-        ylabel="natural-map residual [-]",
-    )
+        ax.loglog(along, residual, ms=3, lw=1, label=short_label(name, labels), **style)
+    across = "outer iteration" if x == "iterations" else "seconds"
+    ax.set(xlabel=across, ylabel="natural-map residual [-]")
     return add_legend(figure, ax)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
-from contactopt.benchmark.catalogue import Declared
+from contactopt.benchmark.plugins import Declared
 from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
 from contactopt.methods import METHODS, find_method
@@ -27,7 +27,7 @@ OTHER_LAWS = {"relaxation": "associated"}
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method of contactopt, or a plug-in by what it declares, with the settings that were given."""
+    """A method of contactopt, or a plug-in by what it declares, with the settings given."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -35,11 +35,10 @@ class MethodSpec:
 
     @property
     def label(self) -> str:
-        texts = {
-            k: short_number(v) if isinstance(v, float) else repr(v)
-            for k, v in self.settings.items()
-        }
-        given = ", ".join(f"{key}={text}" for key, text in texts.items())
+        given = ", ".join(
+            f"{key}={short_number(value) if isinstance(value, float) else repr(value)}"
+            for key, value in self.settings.items()
+        )
         return f"{self.name}({given})" if given else self.name
 
     @property
@@ -54,11 +53,11 @@ class MethodSpec:
                 " plug-in file."
             )
         if self.plugin is not None:
-            given = {
-                name: None for name in PASSED if name in self.plugin.arguments.parameters
-            } | dict(self.settings)
+            arguments = self.plugin.arguments
+            passed = {name: None for name in PASSED if name in arguments.parameters}
+            problem = [] if self.plugin.iterates else [None]
             try:
-                self.plugin.arguments.bind(*[None] * (not self.plugin.iterates), **given)
+                arguments.bind(*problem, **passed | dict(self.settings))
             except TypeError as error:
                 raise InputError(f"method '{self.name}': {error}.") from error
         else:
@@ -106,12 +105,6 @@ class Run:
 
     @cached_property
     def key(self) -> str:
-        parts = (
-            self.problem.label,
-            self.method.label,
-            self.method.backends(2, 3),
-            self.setting,
-            self.start,
-            self.repeat,
-        )
+        method, backends = self.method.label, self.method.backends(2, 3)
+        parts = (self.problem.label, method, backends, self.setting, self.start, self.repeat)
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

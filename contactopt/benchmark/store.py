@@ -14,13 +14,14 @@ import json
 import logging
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.campaign_files import told
+from contactopt.benchmark.keys import COLUMNS, ENDS
 from contactopt.errors import InputError
 from contactopt.files.writing import replace_file
 from contactopt.problem import Status
@@ -30,107 +31,20 @@ if TYPE_CHECKING:
 
 SCHEMA = 1  # of COLUMNS; a reader refuses newer ones
 
-# column -> (type, what it is)
-COLUMNS: dict[str, tuple[str, str]] = {
-    "schema": ("int", "version of these columns"),
-    "key": ("str", "of the run: problem, method, backend versions, setting, start and repeat"),
-    "experiment": ("str", "name of the experiment"),
-    "problem": ("str", "name with parameters"),
-    "family": ("str", "the problem's name: scene, FCLib file or generated family"),
-    "parameters": ("str", "of the problem, JSON; load() adds them as columns problem.NAME"),
-    "fingerprint": ("str", "digest of the problem's data"),
-    "contacts": ("int", "number of contacts"),
-    "dim": ("int", "2 or 3"),
-    "plates": ("int", "balance rows"),
-    "rank": ("float", "of Q; nan unless the experiment asks to diagnose, as are the next four"),
-    "condition": ("float", "of Q on its range"),
-    "guaranteed_mu": (
-        "float",
-        (
-            "the alternating iteration contracts for every load below this largest friction"
-            " coefficient"
-        ),
-    ),
-    "alternating_mu": (
-        "float",
-        "it does not for some load at this one (all contacts slip one way); the least such",
-    ),
-    "tresca_mu": ("float", "the same for the Tresca iteration"),
-    "method": ("str", "name with the settings given"),
-    "name": ("str", "the method's name"),
-    "settings": ("str", "given to the method, JSON; load() adds them as columns method.NAME"),
-    "label": ("str", "the method with all its settings"),
-    "backend": ("str", "QP and conic backends with versions, or native"),
-    "law": ("str", "the problem solved: coulomb, or associated (convex relaxation)"),
-    "setting": ("str", "default, low, mid, high, or a number"),
-    "tolerance": ("float", "bound on the certificate by which success is judged; 1e-8 at default"),
-    "time_limit": ("float", "of the run [s]"),
-    "start": ("str", "cold or warm"),
-    "repeat": ("int", "0, 1, ..."),
-    "status": ("str", "how the run ended: a key of STATUSES"),
-    "message": ("str", "details"),
-    "claimed": ("bool", "the method called its answer a solution"),
-    "success": ("bool", "law_residual <= tolerance within the time limit"),
-    "iterations": ("float", "outer iterations; nan if unknown"),
-    "residual": (
-        "float",
-        "natural-map residual of Coulomb's problem, recomputed; inf without a finite answer",
-    ),
-    "law_residual": ("float", "the same for the method's own law"),
-    "error": (
-        "float",
-        "|r - r_ref| / |r_ref|, r_ref the answer of least residual <= 1e-8 to this problem",
-    ),
-    "build_seconds": ("float", "building the problem, wall; once per process"),
-    "solve_seconds": (
-        "float",
-        "the method's own time, wall: certificates along the way not counted",
-    ),
-    "call_seconds": ("float", "wall time of the whole call"),
-    "cpu_seconds": ("float", "CPU time of the whole call, all threads"),
-    "peak_mb": ("float", "largest resident memory of the process during the call [MB]"),
-    "base_mb": ("float", "resident memory before it [MB]"),
-    "history": (
-        "str",
-        "JSON: residual after each outer iteration, and the seconds until then; thinned to 100",
-    ),
-    "versions": ("str", "of Python, contactopt, NumPy and SciPy"),
-    "machine": ("str", "processor and number of cores"),
-    "time": ("str", "UTC, end of the run"),
-}
-STATUSES = {s.label: s.sentence for s in Status} | {
-    "solved": "the certificate is at most the tolerance",
-    "false_claim": "called a solution by the method, but its certificate is above the tolerance",
-    "not_finite": "the answer holds numbers that are not finite",
-    "refused": "the method does not take this problem",
-    "error": "the method raised an exception",
-    "crashed": "the method ended its process",
-    "killed": "still running at the hard time limit",
-    "out_of_memory": "asked for more memory than the limit",
-    "not_built": "the problem itself could not be built",
-}
+STATUSES = {status.label: status.sentence for status in Status} | ENDS
 REFERENCE = 1e-8  # largest residual of a reference solution
-LATER = ("error",)  # columns that load() works out
 KINDS: dict[str, type | tuple[type, ...]] = {
     "int": int,
     "str": str,
     "float": (int, float),
     "bool": bool,
 }
+UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
 _log = logging.getLogger(__name__)
 
 
 def require(*modules: str) -> None:
-    """Check that packages of the benchmark layer are installed.
-
-    Parameters
-    ----------
-    modules : Names of modules.
-
-    Raises
-    ------
-    InputError : If one is missing, with what to install.
-    """
+    """InputError, with what to install, if one of these packages is missing."""
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         raise InputError(
@@ -139,49 +53,48 @@ def require(*modules: str) -> None:
         )
 
 
+@contextmanager
+def told(place: Path, advice: str = "choose another directory") -> Iterator[None]:
+    """Turn an OSError within the block, as of a full disk, into one sentence with what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"cannot write into '{place}': {error.strerror or error}; {advice}."
+        ) from error
+
+
 class Store:
-    """The appending end, for one campaign at a time (file lock). Use as a context manager."""
+    """The appending end, for one campaign at a time (file lock). Use as a context manager.
+
+    InputError if the folder holds results and `resume` is not set, if another campaign writes
+    there, or if nothing can be written.
+    """
 
     def __init__(self, folder: Path, resume: bool):
-        """InputError if the folder holds results and `resume` is not set, if another campaign
-        writes there, or if
-        nothing can be written.
-        """
         self.path = folder / "rows.jsonl"
         with told(folder, "choose another --out"):
             folder.mkdir(parents=True, exist_ok=True)
-            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND
-            self.descriptor = os.open(self.path, flags, 0o644)
+            self.file = open(self.path, "a+b", buffering=0)  # noqa: SIM115
+        wrong = ""
         try:
-            fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            os.close(self.descriptor)
-            raise InputError(
-                f"another campaign is writing into '{folder}'; wait for it or choose another --out."
-            ) from error
-        if os.fstat(self.descriptor).st_size and not resume:
-            os.close(self.descriptor)
-            raise InputError(
-                f"'{folder}' holds results already; add --resume to go on, or choose another --out."
-            )
-        self._cut_torn_tail()
+            fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            wrong = f"another campaign is writing into '{folder}'; wait for it"
+        if not wrong and self.path.stat().st_size and not resume:
+            wrong = f"'{folder}' holds results already; add --resume to go on,"
+        if wrong:
+            self.file.close()
+            raise InputError(f"{wrong} or choose another --out.")
+        with open(self.path, "rb") as rows:
+            whole = sum(len(row) for row in rows if row.endswith(b"\n"))
+        self.file.truncate(whole)  # the last line may be torn
 
     def __enter__(self) -> Store:
         return self
 
     def __exit__(self, *error: object) -> None:
-        os.close(self.descriptor)
-
-    def _cut_torn_tail(self) -> None:
-        end, block = os.fstat(self.descriptor).st_size, 1 << 16
-        while end > 0:
-            begin = max(0, end - block)
-            newline = os.pread(self.descriptor, end - begin, begin).rfind(b"\n")
-            if newline >= 0:
-                end = begin + newline + 1
-                break
-            end = begin
-        os.ftruncate(self.descriptor, end)
+        self.file.close()
 
     def finished(self) -> set[str]:
         """Keys of the runs that have a row."""
@@ -189,12 +102,12 @@ class Store:
 
     def append(self, row: dict[str, Any]) -> None:
         """Write one row, or nothing of it: InputError if the disk is full."""
-        data, end = (json.dumps(row) + "\n").encode(), os.fstat(self.descriptor).st_size
+        data, end = (json.dumps(row) + "\n").encode(), os.fstat(self.file.fileno()).st_size
         try:
             while data:  # a second write only if the disk is nearly full or a signal came
-                data = data[os.write(self.descriptor, data) :]
+                data = data[self.file.write(data) :]
         except OSError as error:
-            os.ftruncate(self.descriptor, end)
+            self.file.truncate(end)
             raise InputError(
                 f"cannot write into '{self.path}': {error.strerror}; finished runs are kept, make"
                 " room and go on with --resume."
@@ -202,21 +115,9 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """Read the rows of a rows.jsonl.
+    """The rows of a rows.jsonl; InputError if one has a newer schema.
 
     Lines that are no rows are left out, with a warning: their runs count as not made.
-
-    Parameters
-    ----------
-    path : The file.
-
-    Yields
-    ------
-    A row.
-
-    Raises
-    ------
-    InputError : If a row has a newer schema.
     """
     bad = 0
     with open(path, "rb") as file:
@@ -225,14 +126,11 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
                 row = json.loads(line)
             except (ValueError, RecursionError):
                 row = None
-            if (
-                isinstance(row, dict)
-                and isinstance(row.get("schema"), int)
-                and row["schema"] > SCHEMA
-            ):
+            if not isinstance(row, dict):
+                row = {}
+            if isinstance(schema := row.get("schema"), int) and schema > SCHEMA:
                 raise InputError(
-                    f"'{path}' was written by a newer version (schema {row['schema']}); update"
-                    " contactopt."
+                    f"'{path}' was written by a newer version (schema {schema}); update contactopt."
                 )
             if _is_row(row):
                 yield row
@@ -242,32 +140,19 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
         _log.warning("'%s': %d lines are no rows of a campaign and are left out", path, bad)
 
 
-def _is_row(row: Any) -> bool:
+def _is_row(row: dict[str, Any]) -> bool:
     """Whether it has every column that a run fills, each of its type."""
-    if not isinstance(row, dict) or not isinstance(row.get("answer", ""), str):
-        return False
     for name, (kind, _) in COLUMNS.items():
-        value = row.get(name)
-        if name not in LATER and (
-            not isinstance(value, KINDS[kind]) or isinstance(value, bool) != (kind == "bool")
-        ):
+        value = row.get(name, np.nan if name == "error" else None)  # which load() works out
+        if not isinstance(value, KINDS[kind]) or isinstance(value, bool) != (kind == "bool"):
             return False
         if isinstance(value, int) and abs(value) >= 2**63:
             return False
-    return True
+    return isinstance(row.get("answer", ""), str)
 
 
 def pack(reactions: np.ndarray) -> str:
-    """Write forces as text, in base64.
-
-    Parameters
-    ----------
-    reactions : (k, dim) contact forces.
-
-    Returns
-    -------
-    The text of their bytes.
-    """
+    """The bytes of forces (k, dim) as text, in base64."""
     return base64.b64encode(np.ascontiguousarray(reactions, dtype=float).tobytes()).decode()
 
 
@@ -298,11 +183,8 @@ def load(path: str | Path) -> pd.DataFrame:
 
     path = Path(path)
     if path.is_dir():
-        found = [
-            path / f"rows.{kind}"
-            for kind in ("jsonl", "parquet", "csv")
-            if (path / f"rows.{kind}").exists()
-        ]
+        files = [path / f"rows.{kind}" for kind in ("jsonl", "parquet", "csv")]
+        found = [file for file in files if file.exists()]
         if not found:
             raise InputError(f"'{path}' holds no results (rows.jsonl, rows.parquet or rows.csv).")
         path = found[0]
@@ -313,12 +195,8 @@ def load(path: str | Path) -> pd.DataFrame:
             table = pd.read_parquet(path)
         else:
             texts = {name: "str" for name, (kind, _) in COLUMNS.items() if kind == "str"}
-            table = pd.read_csv(
-                path,
-                dtype=texts,
-                keep_default_na=False,
-                na_values={n: ["", "nan"] for n in COLUMNS if n not in texts},
-            )
+            empty = {name: ["", "nan"] for name in COLUMNS if name not in texts}
+            table = pd.read_csv(path, dtype=texts, keep_default_na=False, na_values=empty)
         if len(table) and int(table["schema"].max()) > SCHEMA:
             raise InputError(f"'{path}' was written by a newer version; update contactopt.")
         for source, prefix in (("parameters", "problem"), ("settings", "method")):
@@ -340,20 +218,17 @@ def _from_lines(path: Path) -> pd.DataFrame:
     import pandas as pd
 
     rows = {row["key"]: row for row in lines(path)}  # one per run
-    best: dict[str, dict[str, Any]] = {}
-    for row in rows.values():
-        if row["residual"] <= REFERENCE and row.get("answer"):
-            known = best.get(row["fingerprint"])
-            if known is None or row["residual"] < known["residual"]:
-                best[row["fingerprint"]] = row
-    reference = {fingerprint: _unpack(row["answer"]) for fingerprint, row in best.items()}
+    exact: dict[str, np.ndarray] = {}  # the best answer to each problem
+    good = [row for row in rows.values() if row["residual"] <= REFERENCE and row.get("answer")]
+    for row in sorted(good, key=lambda row: row["residual"]):
+        exact.setdefault(row["fingerprint"], _unpack(row["answer"]))
     for row in rows.values():
         answer, row["error"] = row.pop("answer", ""), np.nan
-        if answer and row["fingerprint"] in reference:
-            exact = reference[row["fingerprint"]]
-            found, size = _unpack(answer), float(np.linalg.norm(exact))
-            if size > 0 and found.shape == exact.shape:
-                row["error"] = float(np.linalg.norm(found - exact)) / size
+        reference = exact.get(row["fingerprint"])
+        if answer and reference is not None:
+            found, size = _unpack(answer), float(np.linalg.norm(reference))
+            if size > 0 and found.shape == reference.shape:
+                row["error"] = float(np.linalg.norm(found - reference)) / size
     types = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}
     table = pd.DataFrame(list(rows.values()), columns=list(COLUMNS))
     return table.astype({name: types[kind] for name, (kind, _) in COLUMNS.items()})

@@ -19,21 +19,10 @@ SHIFT = 1e-3  # s, of shifted geometric means
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
-    """Choose the rows of one law whose columns have given values.
+    """The rows of one law, or of all at '', whose columns have given values, at least one.
 
-    Parameters
-    ----------
-    table : The rows.
-    law : The law; '' for all.
-    where : For a column a value or a list of them; '' stands for no value.
-
-    Returns
-    -------
-    The rows that are left, at least one.
-
-    Raises
-    ------
-    InputError : On an unknown column, or if no row is left.
+    `where` holds for a column a value or a list of them; '' stands for no value. InputError on an
+    unknown column, or if no row is left.
     """
     rows = table[table["law"] == law] if law else table
     for column, value in where.items():
@@ -47,17 +36,8 @@ def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFr
 
 
 def success_table(table: pd.DataFrame, by: str = "method", across: str = "setting") -> pd.DataFrame:
-    """Count the runs that kept the tolerance, those with a right claim, and the ways of failing.
-
-    Parameters
-    ----------
-    table : The rows.
-    by : The column whose values have a row each.
-    across : The column whose values have a column each.
-
-    Returns
-    -------
-    Percentages and failures.
+    """Percent of the runs that kept the tolerance and of those with a right claim, and the ways of
+    failing, with a row for each value of the column `by` and a column for each of `across`.
     """
     import pandas as pd
 
@@ -81,21 +61,11 @@ def success_table(table: pd.DataFrame, by: str = "method", across: str = "settin
 def time_table(
     table: pd.DataFrame, metric: str = "solve_seconds", by: str = "method", across: str = "setting"
 ) -> pd.DataFrame:
-    """Compute the shifted geometric mean of times, a failure counted at its time limit, with median
-    and quartiles.
+    """The shifted geometric mean of the times [s] in a column, a failure counted at its time limit,
+    with median and quartiles, and over the least mean.
 
-    With shift sh = 1 ms it is exp(mean(log(t + sh))) - sh. The last column is the median over
-    instances of the spread (largest - least) / median of repeats.
-
-    Parameters
-    ----------
-    table : The rows.
-    metric : The column with the times [s].
-    by, across : The columns whose values have a row each.
-
-    Returns
-    -------
-    Times [s], and the mean over the least one.
+    With shift sh = 1 ms it is exp(mean(log(t + sh))) - sh. The last but one column is the median
+    over instances of the spread (largest - least) / median of repeats.
     """
     import pandas as pd
 
@@ -104,51 +74,30 @@ def time_table(
         rows: list[dict[str, Any]] = []
         for name, r in groups(runs, by):
             times = r[metric].where(r["success"], r["time_limit"]).to_numpy(float)
-            mean = float(np.exp(np.mean(np.log(times + SHIFT))) - SHIFT)
-            solved = r.loc[r["success"], metric]
-            low, mid, high = (
-                (float(q) for q in solved.quantile([0.25, 0.5, 0.75]))
-                if len(solved)
-                else (np.nan,) * 3
-            )
-            repeats = (
-                r[r["success"]]
-                .groupby(INSTANCE)[metric]
-                .agg(lambda t: (t.max() - t.min()) / t.median())
+            solved = r[r["success"]]
+            low, mid, high = map(float, solved[metric].quantile([0.25, 0.5, 0.75]))
+            repeats = solved.groupby(INSTANCE)[metric].agg(
+                lambda t: (t.max() - t.min()) / t.median()
             )
             rows.append(
                 {
                     across: value,
                     by: name,
                     "solved": f"{len(solved)} of {len(r)}",
-                    "shifted mean": mean,
+                    "shifted mean": float(np.exp(np.mean(np.log(times + SHIFT))) - SHIFT),
+                    "median": mid,
+                    "quartiles": f"{low:.2g} to {high:.2g}",
+                    "spread of repeats": repeats.median(),
                 }
             )
-            rows[-1] |= {
-                "median": mid,
-                "quartiles": f"{low:.2g} to {high:.2g}",
-                "spread of repeats": repeats.median(),
-            }
         best = min(row["shifted mean"] for row in rows)
         out += [row | {"over the least": row["shifted mean"] / best} for row in rows]
     return pd.DataFrame(out)
 
 
 def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
-    """Split a table into groups, sorted by name; settings from the loosest to the tightest.
-
-    Parameters
-    ----------
-    table : The rows.
-    by : The column whose values are the names.
-
-    Returns
-    -------
-    The name and the rows of each group.
-
-    Raises
-    ------
-    InputError : If there is no such column.
+    """The rows for each value of a column, sorted by name; settings from the loosest to the
+    tightest. InputError if there is no such column.
     """
     if by not in table:
         raise InputError(f"the table has no column {by!r}.")

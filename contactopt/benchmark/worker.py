@@ -9,8 +9,6 @@ methods gets its problems from outside and judges nothing.
 from __future__ import annotations
 
 import os
-import signal
-import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -18,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.calls import call, measure, no_answer
-from contactopt.benchmark.catalogue import Catalogue, declared
+from contactopt.benchmark.calls import call, measure
 from contactopt.benchmark.measure import Answer, Task
-from contactopt.benchmark.plugins import Registry
+from contactopt.benchmark.plugins import Catalogue, Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
 from contactopt.errors import InputError
@@ -50,34 +47,11 @@ class Kept:
 _kept = Kept()
 
 
-def prepare(noise: str, parent: int) -> None:
-    """Make the process ready: it ends with its parent, leaves Ctrl-C to it, and prints into a file.
-
-    Parameters
-    ----------
-    noise : The file for all that is printed.
-    parent : The number of the process of the campaign.
-    """
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: however the parent ends
-        if os.getppid() != parent:
-            os._exit(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    file = os.open(noise, os.O_WRONLY | os.O_APPEND)
-    for stream in (1, 2):
-        os.dup2(file, stream)
-    os.close(file)
-
-
 def inspect(paths: tuple[str, ...], names: list[str]) -> Catalogue | str:
-    """What plug-in files declare, and the entry points of these names; a sentence if a plug-in
-    fails.
-    """
+    """What plug-in files declare, and the entry points of these names; a sentence if one fails."""
     try:
         _kept.plugins.load(paths)
-        return declared(_kept.plugins, names)
+        return _kept.plugins.declared(names)
     except InputError as error:
         return str(error)
     except (Exception, SystemExit) as error:
@@ -86,8 +60,8 @@ def inspect(paths: tuple[str, ...], names: list[str]) -> Catalogue | str:
 
 def build(
     spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float
-) -> dict[str, Any]:
-    """A problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
+) -> tuple[InterfaceProblem, dict[str, Any]] | str:
+    """A problem with the columns that it fills, or a sentence that says why there is none."""
     _limit_memory(memory_limit)
     try:
         _kept.plugins.load(paths)
@@ -99,13 +73,29 @@ def build(
                 f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other"
                 " processes."
             )
-        return {
-            "problem": problem,
+        facts = {
+            "fingerprint": problem.fingerprint,
+            "contacts": problem.contacts,
+            "dim": problem.dim,
+            "plates": len(problem.s),
             "build_seconds": seconds,
-            "diagnosis": _diagnosis(problem) if diagnosed else {},
         }
+        return problem, facts | (_diagnosis(problem) if diagnosed else {})
     except (Exception, SystemExit) as error:
-        return {"error": one_line(error)}
+        return one_line(error)
+
+
+def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
+    from contactopt.methods.diagnosis import diagnose
+
+    found = diagnose(problem)
+    return {
+        "rank": found.rank,
+        "condition": found.condition,
+        "guaranteed_mu": found.guaranteed.alternating,
+        "alternating_mu": found.uniform_slip.alternating,
+        "tresca_mu": found.uniform_slip.tresca,
+    }
 
 
 def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
@@ -133,9 +123,9 @@ def find_start(label: str) -> None:
     problem = _kept.problem
     if problem is None or _kept.label != label or _kept.start is not None:
         return
-    q, s = (
-        (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
-    )
+    q, s = problem.q, NEIGHBOUR * problem.s
+    if not len(s):
+        q = NEIGHBOUR * q
     try:
         found = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
         if not found.solved:
@@ -147,36 +137,23 @@ def find_start(label: str) -> None:
 
 def execute(task: Task) -> Answer | None:
     """The answer to one task; None if its problem is not kept here."""
-    problem, own = _kept.problem, os.getpid()
+    problem, start, own = _kept.problem, None, os.getpid()
     if problem is None or _kept.label != task.run.problem.label:
         return None
-    if task.run.start == "warm" and _kept.start is None:
-        return no_answer("not_built", _kept.missing or "no warm start")
+    if task.run.start == "warm":
+        start = _kept.start
+        if start is None:
+            return Answer("not_built", one_line(_kept.missing or "no warm start"))
     _limit_memory(task.memory_limit)
-    answer = measure(
-        task, problem, _kept.start if task.run.start == "warm" else None, _kept.plugins
-    )
+    answer = measure(task, problem, start, _kept.plugins)
     _only(own)
     return answer
 
 
 def _only(own: int) -> None:
-    """End this process if it is a copy of the true one, which a method made by forking and forgot."""
+    """End this process if it is a copy of the true one, which a method forked and forgot."""
     if os.getpid() != own:
         os._exit(1)
-
-
-def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
-    from contactopt.methods.diagnosis import diagnose
-
-    found = diagnose(problem)
-    return {
-        "rank": found.rank,
-        "condition": found.condition,
-        "guaranteed_mu": found.guaranteed.alternating,
-        "alternating_mu": found.uniform_slip.alternating,
-        "tresca_mu": found.uniform_slip.tresca,
-    }
 
 
 def _limit_memory(gigabytes: float) -> None:

@@ -232,7 +232,6 @@ def bench(options: argparse.Namespace) -> int:
             jobs=options.jobs,
             resume=options.resume,
             filters=options.filter,
-            scheduler=options.scheduler,
             quiet=options.quiet,
         )
     except KeyboardInterrupt:

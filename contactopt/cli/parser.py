@@ -312,11 +312,6 @@ def _bench(bench: argparse.ArgumentParser) -> None:
         metavar="COL=PATTERN",
         help="make only the runs whose column problem, method, setting, ... fits the pattern",
     )
-    bench.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="address of a Dask cluster that makes the runs instead of local processes",
-    )
 
 
 def _report(report: argparse.ArgumentParser) -> None:

@@ -47,16 +47,7 @@ def energies(path: PathResult, ax: Any = None) -> Any:
 
 
 def path_figure(path: PathResult) -> Any:
-    """Draw the loop of force and displacement of a load path, and its energies below.
-
-    Parameters
-    ----------
-    path : The solved load path.
-
-    Returns
-    -------
-    The figure of matplotlib.
-    """
+    """The loop of force and displacement of a load path, and its energies below, as a figure."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 7.2), layout="constrained")
@@ -69,7 +60,7 @@ def path_figure(path: PathResult) -> Any:
 
 
 def animate(path: PathResult, file: str | Path) -> None:
-    """The path as a GIF: tangential traction within the friction bounds, and the point on the loop."""
+    """The path as a GIF: tangential traction within its bounds, and the point on the loop."""
     from matplotlib.animation import FuncAnimation, PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -85,15 +76,11 @@ def animate(path: PathResult, file: str | Path) -> None:
     peak = float(np.max(bound))
     (upper,) = left.plot(x, bound[0], "--", color=GREY, lw=1, label="friction bound, +/- mu p")
     (lower,) = left.plot(x, -bound[0], "--", color=GREY, lw=1)
-    (traction,) = left.plot(
-        x, shear[0], "o-", color=BLUE, ms=2.5, lw=1, label="traction on the lower body"
-    )
+    look = {"color": BLUE, "ms": 2.5, "lw": 1, "label": "traction on the lower body"}
+    (traction,) = left.plot(x, shear[0], "o-", **look)
     where = ", y = 0" if problem.dim == 3 else ""
-    left.set(
-        xlabel=f"{scene.components[0]} [{scene.units[0]}]{where}",
-        ylabel=f"tangential traction [{scene.units[1]}]",
-        ylim=(-1.15 * peak, 1.45 * peak),
-    )
+    left.set(xlabel=f"{scene.components[0]} [{scene.units[0]}]{where}")
+    left.set(ylabel=f"tangential traction [{scene.units[1]}]", ylim=(-1.15 * peak, 1.45 * peak))
     left.legend(frameon=False, fontsize=8, loc="upper right")
     across, force, labels = _loop(path)
     right.plot(across, force, color=GREY, lw=0.8)

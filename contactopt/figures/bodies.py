@@ -9,39 +9,14 @@ import numpy as np
 
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
-from contactopt.figures.solids import View, draw_frame, picture
-from contactopt.figures.style import make_axes
+from contactopt.figures.solids import draw_frame, picture, seen_from
+from contactopt.figures.style import highest_colour, magnification, make_axes
 from contactopt.meshes.cells import elements_of
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 
 ELEVATION, AZIMUTH = 22.0, -130.0  # degrees, from where solids are seen
 PIXELS = 800  # of the longer side of the picture of solids, more than it takes in a PNG file
-
-
-def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields]) -> float:
-    """Choose the factor by which displacements are drawn: a round number, 1 where bodies are apart
-    at first.
-
-    Parameters
-    ----------
-    scene : The scene.
-    problem : Its interface problem.
-    fields : The displacements of its bodies.
-
-    Returns
-    -------
-    The factor, at least 1.
-    """
-    displacement = max(float(np.abs(f.displacement).max()) for f in fields)
-    if displacement == 0 or np.ptp(problem.q[:, 0]) > 1e-3 * displacement:
-        return 1.0
-    size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
-    target = 0.08 * size / displacement
-    if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(target))
-    return float(max(1.0, power * max(m for m in (1, 2, 5) if m * power <= target)))
 
 
 def deformed(
@@ -61,31 +36,25 @@ def deformed(
     -------
     The axes.
     """
-    scale = magnification(scene, problem, fields)
-    top = float(np.quantile(np.concatenate([f.von_mises for f in fields]), 0.998)) or 1.0
+    size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
+    largest = max(float(np.abs(f.displacement).max()) for f in fields)
+    scale = magnification(size, largest, float(np.ptp(problem.q[:, 0])))
+    top = highest_colour([f.von_mises for f in fields])
     if scene.dim == 3:
         ax = _draw_solid(scene, fields, scale, top, ax)
     else:
-        ax = _draw_section(scene, fields, scale, top, ax, mirror_plane(scene, problem))
+        ax = _draw_section(scene, fields, scale, top, ax, _mirror_plane(scene, problem))
     times = f"\ndisplacements x {scale:g}" if scale != 1 else ""
     ax.set_title(f"{scene.name}: deformed bodies, {scene.friction}{times}")
     return ax
 
 
-def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
-    """Find beyond which place of a plane section the bodies are mirrored.
+def _mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
+    """Beyond which place of a plane section the bodies are mirrored: the number of a coordinate
+    axis and the place on it [length]; None where the bodies are whole.
 
     It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact
     line at the origin of its chart, across the line.
-
-    Parameters
-    ----------
-    scene : The scene.
-    problem : Its interface problem.
-
-    Returns
-    -------
-    The number of a coordinate axis and the place on it [length]; None where the bodies are whole.
     """
     if scene.kind == "axisymmetric":
         return 0, 0.0
@@ -115,9 +84,11 @@ def _draw_section(
         cells, rim = triangles(pieces(kind, elements)), segments(outline(kind, elements)).T
         if plane is not None:  # the plane of symmetry is no edge of the whole body
             rim = rim[:, ~np.all(np.isclose(f.mesh.p[axis][rim], place), axis=0)]
-        for image in (False, True) if plane is not None else (False,):
-            x = points.copy()
-            x[axis] = 2 * place - x[axis] if image else x[axis]
+        images = [points]
+        if plane is not None:
+            images.append(points.copy())
+            images[1][axis] = 2 * place - points[axis]
+        for x in images:
             colours = ax.tripcolor(
                 *x, cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top
             )
@@ -153,12 +124,12 @@ def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
 
 
 def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
-    """The surfaces of all bodies with a depth buffer, so that nearer ones hide those behind them."""
+    """The surfaces of all bodies with a depth buffer: nearer ones hide those behind them."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     ax = make_axes(ax)
-    shade, view = ScalarMappable(Normalize(0, top), "viridis"), View(ELEVATION, AZIMUTH)
+    shade, view = ScalarMappable(Normalize(0, top), "viridis"), seen_from(ELEVATION, AZIMUTH)
     drawn = []
     for f in fields:
         # of bodies that fly away, which are drawn at rest
@@ -167,25 +138,18 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
         plane, faces = surface(*elements_of(f.mesh), points)
         cells = triangles(pieces(plane, faces))
         opposite = np.stack([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]], axis=1)
-        lined = np.isin(
-            _key(opposite, len(points)), _key(segments(mesh_lines(plane, faces)), len(points))
-        )
+        lines = segments(mesh_lines(plane, faces))
+        lined = np.isin(_key(opposite, len(points)), _key(lines, len(points)))
         drawn.append((points[cells], f.von_mises[cells], lined))
     corners, values, lined = (np.concatenate(parts) for parts in zip(*drawn))
-    image, extent = picture(view.project(corners), values, lined, shade.to_rgba, PIXELS)
+    image, extent = picture(corners @ view, values, lined, shade.to_rgba, PIXELS)
     ax.imshow(image, extent=extent, origin="lower", aspect="equal", zorder=2)
     names = [f"{name} [{scene.units[0]}]" for name in scene.components]
     draw_frame(ax, view, corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), names)
     ax.set_axis_off()
     ax.margins(0.12)
-    ax.figure.colorbar(
-        shade,
-        ax=ax,
-        label=f"von Mises stress [{scene.units[1]}]",
-        extend="max",
-        shrink=0.7,
-        pad=0.04,
-    )
+    room = {"extend": "max", "shrink": 0.7, "pad": 0.04}
+    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", **room)
     return ax
 
 

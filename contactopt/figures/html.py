@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -41,35 +42,24 @@ def check_installed() -> None:
 
 
 def packed(array: Any) -> dict[str, Any]:
-    """Pack an array for the data of a page, as numbers of four bytes each.
-
-    Parameters
-    ----------
-    array : Numbers or truth values of any shape.
-
-    Returns
-    -------
-    Its type, its shape, and its bytes as text.
-    """
+    """Numbers or truth values for the data of a page, of four bytes each."""
     array = np.asarray(array)
     name, kind = KINDS[array.dtype.kind]
-    data = np.ascontiguousarray(array.astype(kind))
-    return {
-        "type": name,
-        "shape": list(array.shape),
-        "data": base64.b64encode(data.tobytes()).decode(),
-    }
+    return {"type": name, "shape": list(array.shape), "data": _text(array.astype(kind))}
 
 
 def packed_short(array: np.ndarray) -> dict[str, Any]:
-    """An array for the data of a page: numbers of two bytes each, which divide the range of the
-    array into 65535 steps.
+    """Numbers for the data of a page, of two bytes each, which divide their range into 65535
+    steps.
     """
     low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
     step = (high - low) / SHORT if high > low else 1.0
-    data = np.ascontiguousarray(np.rint((array - low) / step).astype("<u2"))
-    text = base64.b64encode(data.tobytes()).decode()
+    text = _text(np.rint((array - low) / step).astype("<u2"))
     return {"type": "u2", "shape": list(array.shape), "low": low, "step": step, "data": text}
+
+
+def _text(array: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
 
 
 def write_html(
@@ -116,6 +106,21 @@ def write_html(
     with whole_file(file) as beside:
         beside.write_text("".join(parts), encoding="utf-8")
     return Path(file)
+
+
+def filled(name: str, **texts: str) -> str:
+    """Fill a template of HTML.
+
+    Parameters
+    ----------
+    name : Of a file in contactopt/figures/pages.
+    texts : What stands there in place of $NAME: HTML, with every name in it escaped.
+
+    Returns
+    -------
+    The HTML.
+    """
+    return Template(_page_file(name)).substitute(texts)
 
 
 def _page_file(name: str) -> str:

@@ -15,16 +15,8 @@ COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels 
 
 
 def maps_figure(reduction: Reduction, solution: Solution) -> Any:
-    """Draw maps of pressure and gap, and where there is friction of traction, slip and stick.
-
-    Parameters
-    ----------
-    reduction : The reduction of a scene with a half-space.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    The figure of matplotlib.
+    """Draw maps of pressure and gap, and where there is friction of traction, slip and stick, for a
+    scene with a half-space.
     """
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
@@ -32,42 +24,25 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     scene, problem, maps = reduction.scene, reduction.problem, surface_maps(reduction, solution)
     length, stress = scene.units
     closed = maps["status"] > 0
-    panels: list[tuple[str, np.ndarray, str, Any]] = [
-        ("pressure", np.where(closed, maps["pressure"], np.nan), f"pressure [{stress}]", "viridis"),
-        ("gap", np.where(closed, np.nan, maps["gap"]), f"gap [{length}]", "cividis"),
+    panels = [
+        ("pressure", closed, maps["pressure"], f"pressure [{stress}]", "viridis"),
+        ("gap", ~closed, maps["gap"], f"gap [{length}]", "cividis"),
     ]
     if problem.law.rough.any():
         traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
-        panels.append(
-            (
-                "traction",
-                np.where(closed, traction, np.nan),
-                f"tangential traction [{stress}]",
-                "viridis",
-            )
-        )
-        panels.append(
-            (
-                "slip",
-                np.where(closed, slip, np.nan),
-                f"tangential displacement [{length}]",
-                "cividis",
-            )
-        )
-        panels.append(
-            (
-                "status",
-                np.where(closed, maps["status"], np.nan),
-                "1 stick, 2 slip",
-                ListedColormap([BLUE, ORANGE]),
-            )
-        )
+        two: Any = ListedColormap([BLUE, ORANGE])
+        panels += [
+            ("traction", closed, traction, f"tangential traction [{stress}]", "viridis"),
+            ("slip", closed, slip, f"tangential displacement [{length}]", "cividis"),
+            ("status", closed, maps["status"], "1 stick, 2 slip", two),
+        ]
     line = maps["pressure"].ndim == 1
     columns = min(COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(3.6 * columns, (2.8 if line else 4.0) * rows), layout="constrained")
     axes = np.ravel(figure.subplots(rows, columns))
-    for (name, values, label, colours), ax in zip(panels, axes):
+    for (name, where, known, label, colours), ax in zip(panels, axes):
+        values = np.where(where, known, np.nan)
         ax.set_title(name)
         if line:
             ax.plot(problem.chart.places[0], values)
@@ -75,9 +50,8 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
             continue
         x, y = problem.chart.places
         extent = (x.min(), x.max(), y.min(), y.max())
-        image = ax.imshow(
-            values.T, origin="lower", extent=extent, cmap=colours, interpolation="nearest"
-        )
+        look = {"origin": "lower", "interpolation": "nearest", "cmap": colours}
+        image = ax.imshow(values.T, extent=extent, **look)
         ax.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]")
         bar = figure.colorbar(image, ax=ax, label=label, orientation="horizontal")
         if name == "status":

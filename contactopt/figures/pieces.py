@@ -13,10 +13,13 @@ import numpy as np
 FACES = {
     "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
     "tetra10": ((0, 2, 1, 6, 5, 4), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (0, 3, 2, 7, 9, 6)),
-    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    "hexahedron": (
+        (0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7),
+    ),
     "hexahedron27": (
-        (0, 3, 2, 1, 11, 10, 9, 8, 24), (4, 5, 6, 7, 12, 13, 14, 15, 25), (0, 1, 5, 4, 8, 17, 12, 16, 22),
-        (1, 2, 6, 5, 9, 18, 13, 17, 21), (2, 3, 7, 6, 10, 19, 14, 18, 23), (3, 0, 4, 7, 11, 16, 15, 19, 20),
+        (0, 3, 2, 1, 11, 10, 9, 8, 24), (4, 5, 6, 7, 12, 13, 14, 15, 25),
+        (0, 1, 5, 4, 8, 17, 12, 16, 22), (1, 2, 6, 5, 9, 18, 13, 17, 21),
+        (2, 3, 7, 6, 10, 19, 14, 18, 23), (3, 0, 4, 7, 11, 16, 15, 19, 20),
     ),
 }  # fmt: skip
 PLANE = {"tetra": "triangle", "tetra10": "triangle6", "hexahedron": "quad", "hexahedron27": "quad9"}
@@ -24,12 +27,14 @@ PLANE = {"tetra": "triangle", "tetra10": "triangle6", "hexahedron": "quad", "hex
 SOLIDS = {
     "tetra": ((0, 1, 2, 3),),
     "tetra10": (
-        (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 5, 6, 8), (4, 6, 7, 8), (5, 9, 6, 8), (6, 9, 7, 8),
+        (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3),
+        (4, 5, 6, 8), (4, 6, 7, 8), (5, 9, 6, 8), (6, 9, 7, 8),
     ),
     "hexahedron": ((0, 1, 2, 3, 4, 5, 6, 7),),
     "hexahedron27": (
-        (0, 8, 24, 11, 16, 22, 26, 20), (8, 1, 9, 24, 22, 17, 21, 26), (24, 9, 2, 10, 26, 21, 18, 23),
-        (11, 24, 10, 3, 20, 26, 23, 19), (16, 22, 26, 20, 4, 12, 25, 15), (22, 17, 21, 26, 12, 5, 13, 25),
+        (0, 8, 24, 11, 16, 22, 26, 20), (8, 1, 9, 24, 22, 17, 21, 26),
+        (24, 9, 2, 10, 26, 21, 18, 23), (11, 24, 10, 3, 20, 26, 23, 19),
+        (16, 22, 26, 20, 4, 12, 25, 15), (22, 17, 21, 26, 12, 5, 13, 25),
         (26, 21, 18, 23, 25, 13, 6, 14), (20, 26, 23, 19, 15, 25, 14, 7),
     ),
 }  # fmt: skip
@@ -58,17 +63,8 @@ CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}
 
 
 def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, np.ndarray]:
-    """The plane elements that a body shows: itself in the plane; in space its boundary, each face
-    numbered as seen from outside.
-
-    Parameters
-    ----------
-    kind, elements : name of the elements and their nodes (e, v)
-    points : (n, dim) places of the nodes
-
-    Returns
-    -------
-    kind, nodes (m, v)
+    """The plane elements that a body shows, as their kind and nodes (m, v): itself in the plane; in
+    space its boundary, each face numbered as seen from outside.
     """
     if kind not in FACES:
         return kind, elements
@@ -111,9 +107,7 @@ def mesh_lines(kind: str, elements: np.ndarray) -> np.ndarray:
 
 
 def outline(kind: str, elements: np.ndarray) -> np.ndarray:
-    """The edges of plane elements that belong to one element only, as (m, 2 or 3) nodes from corner
-    to corner.
-    """
+    """As mesh_lines, those edges that belong to one element only."""
     edges = _edges(kind, elements)
     return np.asarray(edges[_alone(edges[:, [0, -1]])])
 

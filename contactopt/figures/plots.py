@@ -11,41 +11,36 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.figures.bodies import deformed, magnification, mirror_plane
-from contactopt.figures.style import ARROWS, BLUE, GREEN, GREY, ORANGE, make_axes, singular
+from contactopt.figures.bodies import deformed
+from contactopt.figures.pieces import triangles
+from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, make_axes
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_edge
 from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
+    from contactopt.accuracy.estimate import Estimate
     from contactopt.derivatives.design import Design
     from contactopt.derivatives.fit import Fit
 
 __all__ = [
-    "BLUE", "GREEN", "GREY", "ORANGE", "contact_figure", "contact_line", "contact_place", "convergence", "deformed", "magnification",
-    "mirror_plane", "pressure", "stick_map", "traction",
+    "BLUE", "GREEN", "GREY", "ORANGE", "contact_figure", "contact_line", "contact_place",
+    "convergence", "deformed", "design", "fit", "pressure", "refinement_figure", "stick_map",
+    "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
+ARROWS = 1000  # about as many arrows as a map of tractions can show
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """Choose the contacts along the first direction of the surface, in order; in 3D those of the
-    row nearest to its
-    origin.
+    """The contacts (j,) along the first direction of the surface of one pair, in order; in 3D those
+    of the row nearest to its origin.
 
     A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period
     / 2.
-
-    Parameters
-    ----------
-    problem : The interface problem of one pair of surfaces.
-
-    Returns
-    -------
-    (j,) numbers of contacts.
     """
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
@@ -57,35 +52,27 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
 
 
 def contact_place(problem: InterfaceProblem) -> np.ndarray:
-    """Compute places along the first direction of the surface; of a closed line from its origin
-    either way.
-
-    Parameters
-    ----------
-    problem : The interface problem of one pair of surfaces.
-
-    Returns
-    -------
-    (k,) places [length].
+    """Places (k,) along the first direction of the surface [length]; of a closed line from its
+    origin either way.
     """
     x, period = problem.chart.places[0], problem.chart.period
     return x if period is None else np.asarray((x + period / 2) % period - period / 2)
 
 
-def in_rows(problem: InterfaceProblem) -> bool:
+def _in_rows(problem: InterfaceProblem) -> bool:
     """Whether a row of contacts crosses the surface, so that values can be drawn along it; always
     in 2D.
     """
     return problem.dim == 2 or len(contact_line(problem)) >= max(3.0, np.sqrt(problem.contacts) / 3)
 
 
-def _place_label(scene: Scene, problem: InterfaceProblem) -> str:
-    """What the places along the contact line are: a coordinate where the line follows an axis,
-    otherwise arc length.
+def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
+    """What the places along the contact line are, a coordinate where the line follows an axis and
+    otherwise arc length, and where the line is.
     """
     if problem.dim == 3:
-        return "x"
-    return scene.components[0] if _straight(problem) else "arc length s"
+        return "x", ", y = 0"
+    return scene.components[0] if _straight(problem) else "arc length s", ""
 
 
 def _straight(problem: InterfaceProblem) -> bool:
@@ -96,6 +83,13 @@ def _straight(problem: InterfaceProblem) -> bool:
     return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= STRAIGHT * extent[0])
 
 
+def _singular(scene: Scene) -> bool:
+    """Whether tractions are known to be infinite somewhere, so that the largest nodal value means
+    nothing.
+    """
+    return scene.reference is not None and scene.reference.peak is None
+
+
 def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Contact pressure over its mean against position over half-width (paper, figure 3), with the
     exact curve.
@@ -103,10 +97,10 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     The position is divided by the half-width where the contact zone lies about the origin;
     elsewhere it is a length.
     """
-    if not in_rows(problem):
+    ax, (length, stress) = make_axes(ax), scene.units
+    if not _in_rows(problem):
         values = solution.reactions[:, 0] / problem.areas
-        return _map(scene, problem, values, f"pressure [{scene.units[1]}]", make_axes(ax))
-    ax = make_axes(ax)
+        return _map(scene, problem, values, f"pressure [{stress}]", ax)
     line, place = contact_line(problem), contact_place(problem)
     x, p = place[line], solution.reactions[line, 0] / problem.areas[line]
     a = contact_edge(scene, problem, solution.reactions)
@@ -118,24 +112,14 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         fine = np.linspace(x.min(), x.max(), 801)
         with np.errstate(all="ignore"):
             exact = scene.reference.pressure(fine) / mean
-        ax.plot(
-            fine / unit,
-            exact,
-            color=ORANGE,
-            lw=1.5,
-            label=f"exact: {scene.reference.label}",
-            zorder=1,
-        )
-    name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
-    length = scene.units[0]
+        label = f"exact: {scene.reference.label}"
+        ax.plot(fine / unit, exact, color=ORANGE, lw=1.5, label=label, zorder=1)
+    name, where = _place_names(scene, problem)
+    over_a = f"{name} / a [-]{where}, a = {a:.4g} {length}"
     ax.set(
-        xlabel=(
-            f"{name} / a [-]{where}, a = {a:.4g} {length}"
-            if scaled
-            else f"{name} [{length}]{where}"
-        ),
-        ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
-        ylim=(0, 5.0 if singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
+        xlabel=over_a if scaled else f"{name} [{length}]{where}",
+        ylabel=f"p / mean p [-], mean p = {mean:.4g} {stress}",
+        ylim=(0, 5.0 if _singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
     ax.legend(edgecolor="none")
     return ax
@@ -162,16 +146,10 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     """Tangential traction against position with the friction bound; sticking and slipping nodes
     marked.
     """
-    if not in_rows(problem):
+    ax, (length, stress) = make_axes(ax), scene.units
+    if not _in_rows(problem):
         values = np.linalg.norm(solution.reactions[:, 1:], axis=1) / problem.areas
-        return _map(
-            scene,
-            problem,
-            values,
-            f"size of the tangential traction [{scene.units[1]}]",
-            make_axes(ax),
-        )
-    ax = make_axes(ax)
+        return _map(scene, problem, values, f"size of the tangential traction [{stress}]", ax)
     line, place = contact_line(problem), contact_place(problem)
     x, t = place[line], solution.reactions[line, 1] / problem.areas[line]
     bound = problem.mu[line] * np.abs(solution.reactions[line, 0]) / problem.areas[line]
@@ -186,7 +164,7 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         # singular at the edge of a punch
         exact[np.abs(exact) > 1.1 * bound.max(initial=0.0)] = np.nan
         ax.plot(fine, exact, color="black", lw=1, label=f"exact: {scene.reference.label}", zorder=3)
-    if singular(scene) and np.any(bound):
+    if _singular(scene) and np.any(bound):
         mean = float(np.average(bound, weights=problem.areas[line]))
         ax.set_ylim(-5 * mean, 5 * mean)
     sticking, slipping = status.stick[line], status.slip[line]
@@ -194,11 +172,9 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         ax.plot(x[sticking], t[sticking], "o", color=BLUE, ms=5, label="stick")
     if slipping.any():
         ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
-    name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
-    ax.set(
-        xlabel=f"{name} [{scene.units[0]}]{where}",
-        ylabel=f"tangential traction\non the upper body [{scene.units[1]}]",
-    )
+    name, where = _place_names(scene, problem)
+    ax.set(xlabel=f"{name} [{length}]{where}")
+    ax.set(ylabel=f"tangential traction\non the upper body [{stress}]")
     ax.legend(edgecolor="none")
     return ax
 
@@ -210,13 +186,7 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
     if cells is None or len(cells) not in (3, 4):
         drawn = ax.scatter(x, y, c=values, s=14, cmap="viridis")
     else:
-        corners = cells.T
-        triangles = (
-            np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]])
-            if corners.shape[1] == 4
-            else corners
-        )
-        drawn = ax.tripcolor(x, y, triangles, values, shading="gouraud", cmap="viridis")
+        drawn = ax.tripcolor(x, y, triangles(cells.T), values, shading="gouraud", cmap="viridis")
     ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", aspect="equal")
     ax.figure.colorbar(drawn, ax=ax, label=label, shrink=0.8)
     return ax
@@ -229,25 +199,20 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
-    for mask, colour, marker, label in (
-        (status.stick, BLUE, "o", "stick"),
-        (status.slip, ORANGE, "s", "slip"),
-        (status.open, GREY, "x", "open"),
+    for label, mask, colour, look in (
+        ("stick", status.stick, BLUE, {"marker": "o", "facecolors": BLUE}),
+        ("slip", status.slip, ORANGE, {"marker": "s", "facecolors": "white"}),
+        ("open", status.open, GREY, {"marker": "x"}),
     ):
         if mask.any():
-            face = {} if marker == "x" else {"facecolors": colour if marker == "o" else "white"}
-            ax.scatter(x[mask], y[mask], s=14, marker=marker, color=colour, label=label, **face)
+            ax.scatter(x[mask], y[mask], s=14, color=colour, label=label, **look)
     t = solution.reactions[:, 1:] / problem.areas[:, None]
     if np.any(t):
         shown = np.flatnonzero(status.touching)
         shown = shown[:: max(1, len(shown) // ARROWS)]
         ax.quiver(x[shown], y[shown], t[shown, 0], t[shown, 1], color="black", width=0.003)
-    ax.set(
-        xlabel=f"x [{scene.units[0]}]",
-        ylabel=f"y [{scene.units[0]}]",
-        aspect="equal",
-        title="arrows: tangential traction",
-    )
+    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", aspect="equal")
+    ax.set_title("arrows: tangential traction")
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return ax
 
@@ -271,9 +236,8 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    figure = Figure(
-        figsize=(5.6, 3.6 * len(panels)), layout="constrained" if problem.dim == 3 else None
-    )
+    layout: Any = "constrained" if problem.dim == 3 else None
+    figure = Figure(figsize=(5.6, 3.6 * len(panels)), layout=layout)
     if problem.dim == 2:
         figure.subplots_adjust(left=0.19, right=0.97, bottom=0.07, top=0.94, hspace=0.24)
     for draw, ax in zip(panels, figure.subplots(len(panels), 1)):
@@ -287,9 +251,8 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
 def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
     """Natural-map residual against outer iterations, one line per solve."""
     ax = make_axes(ax)
-    for colour, (label, solution) in zip(
-        (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9"), solutions.items()
-    ):
+    colours = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
+    for colour, (label, solution) in zip(colours, solutions.items()):
         residual = [h["residual"] for h in solution.history]
         ax.semilogy(range(1, len(residual) + 1), residual, "o-", ms=3, color=colour, label=label)
     ax.set(xlabel="outer iteration", ylabel="natural-map residual [-]")
@@ -335,21 +298,54 @@ def design(found: Design, ax: Any = None) -> Any:
     The axes.
     """
     ax = make_axes(ax)
-    problem = found.reduction.problem
+    scene, problem = found.reduction.scene, found.reduction.problem
     place = problem.chart.places[0]
     order = np.argsort(place)
     touching = problem.law.pressed(found.solution.reactions)
     mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
-    unit, stress = found.reduction.scene.units
-    ax.plot(
-        place[order],
-        found.pressure[order],
-        "." if problem.dim == 3 else ".-",
-        color=BLUE,
-        label="pressure",
-    )
+    points = "." if problem.dim == 3 else ".-"
+    ax.plot(place[order], found.pressure[order], points, color=BLUE, label="pressure")
     ax.axhline(mean, color=GREY, lw=0.8, label="mean over the contact")
-    ax.set(xlabel=f"place [{unit}]", ylabel=f"pressure [{stress}]", ylim=(0.0, 1.2 * found.peak))
-    ax.set_title(f"{found.reduction.scene.name}: largest over mean pressure {found.unevenness:.4f}")
+    ax.set(xlabel=f"place [{scene.units[0]}]", ylabel=f"pressure [{scene.units[1]}]")
+    ax.set_ylim(0.0, 1.2 * found.peak)
+    ax.set_title(f"{scene.name}: largest over mean pressure {found.unevenness:.4f}")
     ax.legend(frameon=False)
     return ax
+
+
+def refinement_figure(estimate: Estimate) -> Any:
+    """Two axes over the unknowns of each mesh: estimated errors, on logarithmic axes with the
+    target, and the value with its estimated error.
+
+    The dotted line is the last value with its estimated error added.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
+
+    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    unknowns = np.array([level.unknowns for level in estimate.levels])
+    errors = np.array([np.nan if level.error is None else level.error for level in estimate.levels])
+    energy = np.array([level.energy_error for level in estimate.levels])
+    left.loglog(unknowns, errors, "o-", color=BLUE, label=f"of {estimate.quantity}")
+    if np.any(energy > 0):
+        left.loglog(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
+    left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
+    left.set(ylabel="estimated relative error [-]", title=f"{len(unknowns)} meshes")
+    left.legend(frameon=False)
+    values = np.array([level.value for level in estimate.levels])
+    bar = np.nan_to_num(errors) * np.abs(values)
+    right.errorbar(unknowns, values, bar, fmt="o-", color=BLUE, capsize=3)
+    if estimate.extrapolated is not None:
+        right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":")
+    right.set(xscale="log", ylabel=estimate.quantity, title="value, with the estimated error")
+    # all values are shown, and of the error bars those from the second half of the meshes
+    late = slice(len(values) // 2, None)
+    low = min(values.min(), (values - bar)[late].min())
+    high = max(values.max(), (values + bar)[late].max())
+    margin = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+    right.set_ylim(low - margin, high + margin)
+    for axes in (left, right):
+        axes.set_xlabel("unknowns [-]")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    return figure

@@ -4,6 +4,7 @@ what is known exactly.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from inspect import Parameter, getdoc, signature
 from typing import Any
@@ -11,6 +12,9 @@ from typing import Any
 import numpy as np
 
 from contactopt.cards import count
+from contactopt.figures.pieces import pieces, surface, triangles
+from contactopt.figures.solids import nearest
+from contactopt.meshes.cells import elements_of
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
 from contactopt.scenes.scene import HalfSpace, Part, Plate, Scene, Traction
 
@@ -46,36 +50,26 @@ def describe(name: str, changes: dict[str, Any]) -> str:
         head, arguments = [f"{name}: {SCENES[name][2]}"], _argument_lines(name)
     scene = states[-1]
     length, stress = scene.units
-    lines = [
-        *head,
-        f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}",
-        "",
-    ]
+    kind = f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}"
+    lines = [*head, kind, ""]
     meshes = {
         part.name: part.build_mesh(min(scene.elements, 8), scene.zone)
         for part in scene.parts
         if isinstance(part, Part)
     }
     if meshes:
-        lines += [*sketch(list(meshes.values())), ""]
-        lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(
-            scene
-        )
-        lines.append("")
+        legend = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes))
+        lines += [*sketch(list(meshes.values())), "", legend + _section(scene), ""]
     for part in scene.parts:
         lines += _part_lines(scene, part, meshes.get(part.name))
     images = f"; {scene.copies} mirror images make the whole" if scene.copies > 1 else ""
-    lines.append(
-        f"{count(len(scene.pairs), 'pair')} of surfaces:"
-        f" {', '.join(pair.name for pair in scene.pairs)}{images}"
-    )
+    names = ", ".join(pair.name for pair in scene.pairs)
+    lines.append(f"{count(len(scene.pairs), 'pair')} of surfaces: {names}{images}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states")
-    exact = (
-        "nothing is known exactly"
-        if scene.reference is None
-        else f"known exactly: {scene.reference.label}"
-    )
+    exact = "nothing is known exactly"
+    if scene.reference is not None:
+        exact = f"known exactly: {scene.reference.label}"
     return "\n".join([*lines, exact, *arguments])
 
 
@@ -85,9 +79,10 @@ def _argument_lines(name: str) -> list[str]:
     """
     module = SCENES[name][0]
     fixed = SCENES[name][-1] if isinstance(SCENES[name][-1], dict) else {}
-    entries = [PATHS[name], SCENES[name]] if name in PATHS else [SCENES[name]]
     makers = [
-        getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1]) for entry in entries
+        getattr(import_module(f"contactopt.scenes.{table[name][0]}"), table[name][1])
+        for table in (PATHS, SCENES)
+        if name in table
     ]
     lines = [
         "",
@@ -108,13 +103,9 @@ def _argument_lines(name: str) -> list[str]:
 
 
 def _section(scene: Scene) -> str:
-    if scene.copies == 1 and scene.kind != "axisymmetric":
-        return ""
-    return (
-        "  (one half of the section)"
-        if scene.kind == "axisymmetric"
-        else "  (the part that is modelled)"
-    )
+    if scene.kind == "axisymmetric":
+        return "  (one half of the section)"
+    return "" if scene.copies == 1 else "  (the part that is modelled)"
 
 
 def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
@@ -128,28 +119,27 @@ def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
         lines[0] += f"; {size} {length}"
         for support in part.supports:
             held = support.displacement
-            what = "clamped" if held is None else ", ".join(f"{c} = {v:g}" for c, v in held.items())
+            what = "clamped" if held is None else _components(held)
             lines.append(f"  support '{support.boundary}': {what}")
-        for load in part.loads:
-            lines.append(f"  {_load(load)}")
+        lines += [f"  {_load(load)}" for load in part.loads]
     elif not isinstance(part, HalfSpace):
         lines[0] += ": rigid"
     if getattr(part, "force", None):
-        lines.append("  total force: " + ", ".join(f"{c} = {v:g}" for c, v in part.force.items()))
+        lines.append(f"  total force: {_components(part.force)}")
     return lines
+
+
+def _components(vector: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in vector.items())
 
 
 def _load(load: Any) -> str:
     if isinstance(load, Plate):
-        return f"plate on '{load.boundary}': total force " + ", ".join(
-            f"{c} = {v:g}" for c, v in load.force.items()
-        )
+        return f"plate on '{load.boundary}': total force {_components(load.force)}"
     value = ", ".join(f"{v:g}" for v in load.value)
-    return (
-        f"traction on '{load.boundary}': {value}"
-        if isinstance(load, Traction)
-        else f"force per volume: {value}"
-    )
+    if isinstance(load, Traction):
+        return f"traction on '{load.boundary}': {value}"
+    return f"force per volume: {value}"
 
 
 def sketch(meshes: list[Any]) -> list[str]:
@@ -161,23 +151,20 @@ def sketch(meshes: list[Any]) -> list[str]:
     size = np.maximum(high - low, 1e-300)
     step = max(size[0] / COLUMNS, size[1] / (ROWS * ASPECT))  # of a column
     columns, rows = max(1, round(size[0] / step)), max(1, round(size[1] / (step * ASPECT)))
-    x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
-    y = high[1] - (np.arange(rows) + 0.5) * size[1] / rows
+    scale = np.array([columns, rows]) / size
     picture = np.full((rows, columns), " ")
     for mark, mesh in zip(MARKS * len(meshes), meshes):
-        corners = mesh.p[axes][:, mesh.t]  # (2, c, cells)
+        kind, elements = elements_of(mesh)
         if len(mesh.p) == 3:  # the cells that the section through the least second coordinate meets
-            second = mesh.p[1][mesh.t]
-            corners = corners[:, :, second.min(axis=0) <= second.min() + 1e-9 * np.ptp(mesh.p[1])]
-        least, most = corners.min(axis=1), corners.max(axis=1)
-        for cell in range(corners.shape[2]):
-            inside_x = np.flatnonzero((x >= least[0, cell]) & (x <= most[0, cell]))
-            inside_y = np.flatnonzero((y >= least[1, cell]) & (y <= most[1, cell]))
-            if len(inside_x) and len(inside_y):
-                block = np.ix_(inside_y, inside_x)
-                found = _inside(corners[:, :, cell], *np.meshgrid(x[inside_x], y[inside_y]))
-                picture[block] = np.where(found, mark, picture[block])
-    return ["".join(row).rstrip() for row in picture]
+            second = mesh.p[1][elements]
+            met = second.min(axis=1) <= second.min() + 1e-9 * np.ptp(mesh.p[1])
+            elements = elements[met]
+        kind, faces = surface(kind, elements, mesh.p.T)
+        corners = mesh.p.T[triangles(pieces(kind, faces))]
+        flat = np.zeros((len(corners), 3, 3))
+        flat[..., :2] = (corners[..., axes] - low) * scale
+        picture[nearest(flat, (rows, columns)) >= 0] = mark
+    return ["".join(row).rstrip() for row in picture[::-1]]
 
 
 def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -192,16 +179,3 @@ def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         return low, high
     centre = ends[small].mean(axis=0)
     return np.maximum(low, centre - extent[small]), np.minimum(high, centre + extent[small])
-
-
-def _inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether points lie in the convex hull of the corners (2, c) of a cell, seen along the axis
-    that is left out.
-    """
-    centre = corners.mean(axis=1, keepdims=True)
-    around = corners[:, np.argsort(np.arctan2(*(corners - centre)[::-1]))]
-    after = np.roll(around, -1, axis=1)
-    sides = (after[0] - around[0]) * (y[..., None] - around[1]) - (after[1] - around[1]) * (
-        x[..., None] - around[0]
-    )
-    return np.asarray(np.all(sides >= -1e-9 * np.abs(sides).max(initial=0.0), axis=-1))

@@ -8,7 +8,6 @@ small ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,47 +20,30 @@ EDGE = 1e-6  # pixels by which triangles are enlarged, so that nothing shows bet
 BLOCK = 1_000_000  # pixels of triangles that are looked at together
 
 
-@dataclass(frozen=True)
-class View:
-    """A direction from which bodies are seen, with the axes of the picture.
+def seen_from(elevation: float, azimuth: float) -> np.ndarray:
+    """The axes of a picture, as unit vectors in the columns (3, 3): to the right, up, and towards
+    the eye. Points (..., 3) @ axes are places in the picture and distances towards the eye.
 
     Angles are in degrees as in Matplotlib: of the eye above the x-y plane, and from the x axis
     towards the y axis.
     """
-
-    elevation: float
-    azimuth: float
-
-    @property
-    def axes(self) -> np.ndarray:
-        """(3, 3) unit vectors, one per row: to the right, up, and towards the eye."""
-        e, a = np.radians(self.elevation), np.radians(self.azimuth)
-        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        right = np.array([-np.sin(a), np.cos(a), 0.0])
-        return np.stack([right, np.cross(eye, right), eye])
-
-    def project(self, points: np.ndarray) -> np.ndarray:
-        """Places (..., 3) in the picture and the distance towards the eye, for points (..., 3)."""
-        return points @ self.axes.T
+    e, a = np.radians(elevation), np.radians(azimuth)
+    eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    return np.stack([right, np.cross(eye, right), eye], axis=1)
 
 
 def picture(
     corners: np.ndarray, values: np.ndarray, lined: np.ndarray, colours: Any, pixels: int
 ) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Triangles as an image, coloured by values that are linear on each of them.
+    """Triangles as an image (h, w, 4), coloured by values that are linear on each of them, and its
+    extent (left, right, bottom, top) in the units of the corners. Its first row is below.
 
-    Parameters
-    ----------
-    corners : (m, 3, 3) corners of the triangles after View.project
-    values : (m, 3) at the corners
-    lined : (m, 3) whether the edge opposite to a corner is an edge of the mesh, which gets a line
-    colours : values (n,) -> colours (n, 4)
-    pixels : of the longer side of the image
-
-    Returns
-    -------
-    The image (h, w, 4), its first row below, and its extent (left, right, bottom, top) in the units
-    of the corners
+    corners  (m, 3, 3) of the triangles as they are seen
+    values   (m, 3) at the corners
+    lined    (m, 3) whether the edge opposite to a corner is an edge of the mesh, which gets a line
+    colours  values (n,) -> colours (n, 4)
+    pixels   of the longer side of the image
     """
     low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
     scale = (pixels - 2) / float((high - low).max())
@@ -126,9 +108,8 @@ def _pixels(
         (x, y), (other_x, other_y) = corners[triangle, i].T, corners[triangle, i - 1].T
         with np.errstate(all="ignore"):
             share = (height - y) / (other_y - y)
-            ends.append(
-                np.where((share >= -EDGE) & (share <= 1 + EDGE), x + share * (other_x - x), np.nan)
-            )
+            within = (share >= -EDGE) & (share <= 1 + EDGE)
+            ends.append(np.where(within, x + share * (other_x - x), np.nan))
     left = np.fmin(np.fmin(ends[0], ends[1]), ends[2])
     right = np.fmax(np.fmax(ends[0], ends[1]), ends[2])
     met = np.isfinite(left)
@@ -153,22 +134,17 @@ def _shares(corners: np.ndarray, own: np.ndarray, x: np.ndarray, y: np.ndarray) 
     each place in one of them.
     """
     after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
+    normals = np.stack([after[..., 1] - before[..., 1], before[..., 0] - after[..., 0]])
     with np.errstate(all="ignore"):  # triangles seen from the side own no pixel
-        slopes = (
-            np.stack([after[..., 1] - before[..., 1], before[..., 0] - after[..., 0]])
-            / _twice_area(corners)[:, None]
-        )
+        slopes = normals / _twice_area(corners)[:, None]
     across, up = slopes[:, own]
     foot = after[own]  # on the edge opposite to each corner
     return np.asarray(across * (x[:, None] - foot[..., 0]) + up * (y[:, None] - foot[..., 1]))
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
 def _twice_area(corners: np.ndarray) -> np.ndarray:
-    return _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _heights(corners: np.ndarray) -> np.ndarray:
@@ -185,7 +161,7 @@ def _light(corners: np.ndarray) -> np.ndarray:
 
 
 def draw_frame(
-    ax: Any, view: View, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
+    ax: Any, view: np.ndarray, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
 ) -> None:
     """Three edges of the box between `low` and `high` (3,) as axes with ticks and labels, those
     that stand free of the bodies.
@@ -193,28 +169,21 @@ def draw_frame(
     from matplotlib.ticker import MaxNLocator
 
     left = np.array([low[0], high[1], low[2]])  # the foot of the upright edge furthest to the left
-    for axis, (foot, shift, align) in enumerate(
-        ((low, (6, -8), "left"), (low, (-6, -8), "right"), (left, (-6, 0), "right"))
-    ):
+    places = ((low, (6, -8), "left"), (low, (-6, -8), "right"), (left, (-6, 0), "right"))
+    line = {"color": "black", "zorder": 3}
+    for axis, (foot, shift, align) in enumerate(places):
         end = foot.copy()
         end[axis] = high[axis]
-        ends = view.project(np.stack([foot, end]))
-        ax.plot(ends[:, 0], ends[:, 1], color="black", lw=0.8, zorder=3)
+        ends = np.stack([foot, end]) @ view
+        ax.plot(ends[:, 0], ends[:, 1], lw=0.8, **line)
         options = {"textcoords": "offset points", "ha": align, "va": "center"}
+        mark = {"marker": "_" if axis == 2 else "|", "ms": 5, "mew": 0.8}
         for value in MaxNLocator(TICKS, steps=[1, 2, 5, 10]).tick_values(low[axis], high[axis]):
             if low[axis] <= value <= high[axis]:
                 place = foot.copy()
                 place[axis] = value
-                x, y, _ = view.project(place)
-                ax.plot(
-                    [x],
-                    [y],
-                    marker="_" if axis == 2 else "|",
-                    color="black",
-                    ms=5,
-                    mew=0.8,
-                    zorder=3,
-                )
+                x, y, _ = place @ view
+                ax.plot([x], [y], **mark, **line)
                 ax.annotate(f"{value:.6g}", (x, y), shift, fontsize=8, **options)
         middle = ends[:, :2].mean(axis=0)
         ax.annotate(labels[axis], middle, (5 * shift[0], 3 * shift[1]), fontsize=10, **options)
