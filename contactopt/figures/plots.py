@@ -327,11 +327,18 @@ def refinement_figure(estimate: Estimate) -> Any:
     unknowns = np.array([level.unknowns for level in estimate.levels])
     errors = np.array([np.nan if level.error is None else level.error for level in estimate.levels])
     energy = np.array([level.energy_error for level in estimate.levels])
-    left.loglog(unknowns, errors, "o-", color=BLUE, label=f"of {estimate.quantity}")
+    known = np.isfinite(errors)
+    if known.any():
+        left.plot(unknowns[known], errors[known], "o-", color=BLUE, label=f"of {estimate.quantity}")
     if np.any(energy > 0):
-        left.loglog(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
+        left.plot(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
     left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
-    left.set(ylabel="estimated relative error [-]", title=f"{len(unknowns)} meshes")
+    left.set(
+        xscale="log",
+        yscale="log",
+        ylabel="estimated relative error [-]",
+        title=f"{len(unknowns)} meshes",
+    )
     left.legend(frameon=False)
     values = np.array([level.value for level in estimate.levels])
     bar = np.nan_to_num(errors) * np.abs(values)
