@@ -293,7 +293,7 @@ def test_lines_of_all_ways_to_write_toml():
 
 def test_the_comments_of_the_example_are_valid_too(tmp_path):
     """Entries that stand behind a comment sign are read as the others."""
-    text = EXAMPLE.format(name="a.toml")
+    text = EXAMPLE
     for entry in ("move", "tractions", "body_force", "curve"):
         text = text.replace(f"# {entry} =", f"{entry} =")
     scene = read_scene_file(written(tmp_path, text)).states[0]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.figures.style import FORMATS, save_figure
+from contactopt.outcome import Outcome, squeeze
 from contactopt.problem import alone, part_of
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.contact_fields import contact_fields, on_nodes
@@ -20,7 +21,6 @@ from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
     from contactopt.coupling.back_to_bodies import Fields
-    from contactopt.runner import Result
     from contactopt.solving.paths import PathResult
 
 PAGE = "view.html"
@@ -35,21 +35,7 @@ RUN_FILES = (
 )  # fmt: skip
 
 
-def squeeze(t: np.ndarray) -> np.ndarray:
-    """Drop the second axis of an array (k, d) where d is one, as in 2D.
-
-    Parameters
-    ----------
-    t : (k, d) tangential components.
-
-    Returns
-    -------
-    (k,) or (k, d).
-    """
-    return t[:, 0] if t.shape[1] == 1 else t
-
-
-def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
+def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
     """Draw the figures of a result: bodies, pressure and traction of every pair, maps, load path.
 
     Parameters
@@ -85,7 +71,7 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
         save(refinement_figure(result.estimate), "refinement")
 
 
-def write(result: Result, folder: Path, states: bool) -> None:
+def write(result: Outcome, folder: Path, states: bool) -> None:
     """Write the fields of a result as VTU files, its contact forces and its load path as arrays.
 
     Parameters
