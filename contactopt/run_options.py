@@ -10,10 +10,12 @@ import inspect
 import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
-from typing import Any
+from typing import Any, TypeVar
 
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _option(kind: type, value: str, what: str, default: Any = None, in_file: bool = True) -> Any:
@@ -128,7 +130,7 @@ class RunOptions:
         return self._given("normal", "tangential", "preconditioner")
 
     @property
-    def bounds(self) -> dict[str, float]:
+    def bounds(self) -> dict[str, Any]:
         """Those that end the search for an accuracy."""
         return self._given("max_unknowns", "time_limit", "max_memory")
 
@@ -180,7 +182,7 @@ def explained(only: str = "") -> str:
     )
 
 
-def takes_options(function: Callable[..., Any]) -> Any:
+def takes_options(function: F) -> F:
     """Write the options into the signature of a function that takes them as keywords, and into its
     docstring, instead of the line OPTIONS.
 
@@ -195,7 +197,9 @@ def takes_options(function: Callable[..., Any]) -> Any:
     signature = inspect.signature(function, eval_str=False)
     *own, keywords = signature.parameters.values()
     options = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=one.type)
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=one.default, annotation=one.type
+        )
         for name, one in OPTIONS.items()
     ]
     made: Any = function
