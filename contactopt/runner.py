@@ -27,7 +27,7 @@ from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.paths import solve_states
 from contactopt.solving.progress import resident_memory
@@ -231,7 +231,7 @@ def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...
 
 def _dealt(states: tuple[Scene, ...], team: Team, note: Note) -> tuple[Scene, ...]:
     """The states with their elastic bodies on the ranks of a team."""
-    idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
+    idle = team.size - sum(part.meshed for part in states[-1].parts)
     if idle > 0:
         note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
     return tuple(spread(state, team) for state in states)

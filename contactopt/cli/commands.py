@@ -278,9 +278,8 @@ def _print_table(title: str, table: Mapping[str, tuple[str, str, str]]) -> None:
 def completion(options: argparse.Namespace) -> int:
     """Print the completion script of a shell."""
     from contactopt.cli.completion import script
-    from contactopt.cli.parser import make_parser
 
-    print(script(make_parser(), options.shell))
+    print(script(options.parser, options.shell))
     return 0
 
 

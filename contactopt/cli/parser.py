@@ -92,6 +92,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="name of the file, which must end in .toml; an existing file is not overwritten",
     )
     made["completion"].add_argument("shell", choices=SHELLS)
+    made["completion"].set_defaults(parser=parser)
     return parser
 
 

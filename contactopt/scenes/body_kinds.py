@@ -90,6 +90,7 @@ class Part:
     contact: str = "contact"
     curve: Function | Mapping[str, Function] | None = None
     elastic = True
+    meshed = True
 
     def __post_init__(self) -> None:
         check_name("the body's name", self.name)  # of its VTU file
@@ -196,6 +197,7 @@ class Rigid:
     displacement: Mapping[str, float] | None = None
 
     elastic = False
+    meshed = False
     given = False
 
     def __post_init__(self) -> None:
@@ -249,6 +251,7 @@ class HalfSpace:
     periodic: bool = False
     depth: float | None = None
     elastic = True
+    meshed = False
 
     def __post_init__(self) -> None:
         check_name("the body's name", self.name)

@@ -12,7 +12,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.scenes.scene import Part, Rigid, Scene
+from contactopt.scenes.scene import Scene
 
 RUBBER = Material(E=5.0, nu=0.3)  # MPa, the material of all the paper's bodies
 UNITS = ("mm", "MPa")
@@ -75,8 +75,8 @@ def check_shear(shear: float, mu: float, force: float) -> None:
 
 def upper_of(scene: Scene, **changes: Any) -> Scene:
     """The scene with other fields of its upper body."""
-    assert isinstance(scene.upper, (Part, Rigid))
-    return replace(scene, upper=replace(scene.upper, **changes))
+    upper: Any = scene.upper
+    return replace(scene, upper=replace(upper, **changes))
 
 
 def circle(radius: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -99,7 +99,7 @@ def with_elements(scene: Scene, degree: int | None = None, simplices: bool = Fal
     """
 
     def cut(part: Any) -> Any:
-        if not simplices or not isinstance(part, Part):
+        if not simplices or not part.meshed:
             return part
 
         def mesh(elements: int, zone: float | None) -> Any:

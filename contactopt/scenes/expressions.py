@@ -66,7 +66,8 @@ def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
     none grows without end.
     """
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        return np.float64(node.value) if abs(node.value) < 1e300 else np.float64(np.inf)
+        number: Any = node.value
+        return np.float64(number if abs(number) < 1e300 else np.inf)
     if isinstance(node, ast.Name) and node.id in names:
         return names[node.id]
     function, parts = None, []

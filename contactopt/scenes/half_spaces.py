@@ -5,6 +5,7 @@ and sheared.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -190,9 +191,10 @@ def rough_sliding(
     check_count("steps", steps)
     first = rough(**changes)  # type: ignore[arg-type]
     if shift is None:
-        (pair,), surface, half_space = first.pairs, *first.parts
-        assert isinstance(surface, Rigid) and isinstance(half_space, HalfSpace)
-        mu, nu = float(np.max(pair.mu)), half_space.material.nu
+        given: Any = first.mu
+        surface: Any = first.upper
+        half_space: Any = first.lower
+        mu, nu = 0.0 if callable(given) else float(np.max(given)), half_space.material.nu
         shift = 1.5 * mu * (2 - nu) / (2 - 2 * nu) * float(np.mean(surface.gap))
     at = np.linspace(0.0, shift, steps + 1)
     return tuple(upper_of(first, displacement={"x": float(x)}) for x in at)

@@ -214,8 +214,8 @@ def growing_indentation(*, steps: int = 100, **changes: object) -> tuple[Scene, 
     """
     check_count("steps", steps)
     last = indentation(**changes)  # type: ignore[arg-type]
-    assert isinstance(last.upper, Rigid) and last.upper.force is not None
-    forces = last.upper.force["z"] * (np.arange(1, steps + 1) / steps) ** 3  # a ~ P^(1/3)
+    sphere: Any = last.upper
+    forces = sphere.force["z"] * (np.arange(1, steps + 1) / steps) ** 3  # a ~ P^(1/3)
     return tuple(upper_of(last, force={"z": float(force)}) for force in forces)
 
 

@@ -178,7 +178,7 @@ def _scene(
             "there are no contacts; add a table [[contacts]] for each pair of surfaces that may"
             " touch."
         )
-    meshes = [part.mesh for part in parts if isinstance(part, Part)]
+    meshes = reading.meshes.values()
     curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
     changes = {
         "contacts": tuple(_contact(pair, parts, reading) for pair in pairs),
@@ -352,8 +352,8 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
         body, _, surface = table.text(side, needed=True).partition(":")
         if body not in named:
             raise table.fail(f"there is no body '{body}'; the bodies are {', '.join(named)}.", side)
-        part = named[body]
-        if isinstance(part, Part):
+        part: Any = named[body]
+        if part.meshed:
             boundaries = part.mesh.boundaries or {}
             if (surface or part.contact) not in boundaries:
                 raise table.fail(

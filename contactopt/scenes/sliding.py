@@ -141,8 +141,8 @@ def shear_cycle(dim: int = 2, *, steps: int = 8, **changes: object) -> tuple[Sce
 
 def _sheared(scene: Scene, share: float) -> Scene:
     """The scene at a share of its shear."""
-    assert isinstance(scene.upper, Part) and isinstance(scene.upper.loads[0], Plate)
-    force = scene.upper.loads[0].force
+    upper: Any = scene.upper
+    force = upper.loads[0].force
     return upper_of(scene, loads=(Plate("far", {**force, "x": share * force["x"]}),))
 
 
