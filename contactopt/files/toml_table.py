@@ -22,6 +22,15 @@ TOKEN = re.compile(
     |(?P<mark>[\[\]{}=,])|(?P<bare>[^\s\#"'\[\]{}=,]+)""",
     re.VERBOSE,
 )
+# type of an entry -> the types of its value, and how a message names them
+KINDS: dict[type, tuple[tuple[type, ...], str]] = {
+    str: ((str,), "a text in quotation marks"),
+    float: ((int, float), "a number"),
+    int: ((int,), "a whole number"),
+    bool: ((bool,), "true or false"),
+    dict: ((dict,), "a table, { name = value, ... }"),
+    list: ((list,), "an array"),
+}
 Place = tuple[str | int, ...]
 
 
@@ -90,64 +99,37 @@ class Table:
     def take(
         self,
         key: str,
-        kind: type | tuple[type, ...],
-        what: str,
+        kind: type,
         default: Any = None,
         needed: bool = False,
+        what: str = "",
+        **limits: Any,
     ) -> Any:
         """Take an entry, which must be of one type.
 
         Parameters
         ----------
-        key : name of the entry
-        kind, what : its type, and how a message names that
-        default : what is returned where there is no entry
-        needed : whether that is an error instead
+        key, kind : the name of the entry, and a type of KINDS
+        default, needed : what is returned where there is no entry, or whether that is an error
+        what : how a message names the type, if not in the words of KINDS
+        limits : of a number, as for contactopt.checks.check_number
 
         Returns
         -------
         The value.
         """
+        types, usual = KINDS[kind]
+        what = what or usual
         if not self.has(key):
             if needed:
                 raise self.fail(f"{key!r} is missing{self._here()}; it is {what}.")
             return default
-        value = self.data[key]
-        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+        value: Any = self.data[key]
+        if not isinstance(value, types) or isinstance(value, bool) != (kind is bool):
             raise self.fail(f"{key!r} must be {what}; got {short(value)}.", key)
-        return value
-
-    def text(self, key: str, default: str | None = None, needed: bool = False) -> Any:
-        """Take a text.
-
-        Parameters
-        ----------
-        key, default, needed : as for take()
-
-        Returns
-        -------
-        str
-        """
-        return self.take(key, str, "a text in quotation marks", default, needed)
-
-    def number(
-        self, key: str, default: float | None = None, needed: bool = False, **limits: Any
-    ) -> Any:
-        """Take a finite number.
-
-        Parameters
-        ----------
-        key, default, needed : as for take()
-        limits : as for contactopt.checks.check_number
-
-        Returns
-        -------
-        float
-        """
-        value = self.take(key, (int, float), "a number", default, needed)
-        if key in self.data:
+        if kind is float:
             with self.about(key):
-                check_number(key, value, **limits)
+                check_number(key, self.data[key], **limits)
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:
@@ -163,7 +145,7 @@ class Table:
         -------
         list of float
         """
-        values = self.take(key, list, what, needed=True)
+        values = self.take(key, list, needed=True, what=what)
         if count is not None and len(values) != count:
             raise self.fail(f"{key!r} must be {what}; got {len(values)} values.", key)
         for i, value in enumerate(values):
@@ -171,7 +153,7 @@ class Table:
                 check_number(f"every value of {key}", value)
         return values
 
-    def table(self, key: str) -> Table | None:
+    def table(self, key: str) -> Any:
         """Take the table below an entry.
 
         Parameters
@@ -182,7 +164,7 @@ class Table:
         -------
         Table : None if there is no such entry
         """
-        data = self.take(key, dict, "a table, { name = value, ... }")
+        data = self.take(key, dict)
         return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
 
     def tables(self, key: str) -> list[Table]:
@@ -196,15 +178,11 @@ class Table:
         -------
         list of Table
         """
-        found = self.take(key, list, "an array of tables, [{ name = value, ... }, ...]", [])
+        found = self.take(key, list, [], what="an array of tables, [{ name = value, ... }, ...]")
         for i, data in enumerate(found):
             if not isinstance(data, dict):
-                raise self.fail(
-                    f"every entry of {key!r} must be a table, {{ name = value, ... }}; got"
-                    f" {short(data)}.",
-                    key,
-                    i,
-                )
+                must = f"every entry of {key!r} must be {KINDS[dict][1]}"
+                raise self.fail(f"{must}; got {short(data)}.", key, i)
         place = (*self.place, key)
         return [Table(self.file, self.lines, data, (*place, i)) for i, data in enumerate(found)]
 

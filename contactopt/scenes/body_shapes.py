@@ -35,8 +35,8 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
     -------
     Mesh : of scikit-fem, or None without a folder
     """
-    group, move, places = body.text("group"), body.table("move"), body.table("boundaries")
-    unit, shapes = body.text("unit"), [shape for shape in SHAPES if body.has(shape)]
+    group, move, places = body.take("group", str), body.table("move"), body.table("boundaries")
+    unit, shapes = body.take("unit", str), [shape for shape in SHAPES if body.has(shape)]
     body.known.append("rigid")
     if folder is None:
         return None
@@ -51,13 +51,12 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         raise body.fail("'group' and 'unit' belong to a mesh file.", "group" if group else "unit")
     else:
         shape = body.table(shapes[0])
-        assert shape is not None
         if shapes[0] != "block" and len(components) != 2:
             raise shape.fail(f"a {shapes[0]} is plane; in space use a block or a mesh file.")
         mesh = {"block": _block, "ring": _ring, "disc": _disc}[shapes[0]](shape, components)
         shape.close()
     if move is not None:
-        step = [move.number(c, 0.0) for c in components]
+        step = [move.take(c, float, 0.0) for c in components]
         move.close()
         mesh = replace(mesh, doflocs=mesh.doflocs + np.array(step)[:, None])
         if np.abs(mesh.doflocs).max() > FAR * np.ptp(mesh.doflocs, axis=1).min():
@@ -88,7 +87,7 @@ def _scale(body: Table, unit: str | None, length: str) -> float:
 def _from_file(body: Table, folder: Path, group: str | None, scale: float) -> Any:
     from contactopt.meshes.mesh_files import load_mesh
 
-    name = body.text("mesh")
+    name = body.take("mesh", str)
     with body.about("group" if group else "mesh"):
         return load_mesh(folder / name, group, scale)
 
@@ -145,11 +144,11 @@ def _ring(table: Table, components: tuple[str, ...]) -> Any:
 def _disc(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.meshes.polar import disc
 
-    radius = table.number("radius", needed=True, low=0.0)
+    radius = table.take("radius", float, needed=True, low=0.0)
     if isinstance(table.data.get("elements"), list):
         (around,) = _counts(table, ("around",))
     else:
-        around = table.take("elements", int, "a whole number", needed=True)
+        around = table.take("elements", int, needed=True)
     if around < 8 or around % 8 or around > 10_000:
         raise table.fail(
             "'elements' around a disc must be a multiple of 8, at most 10000.", "elements"
@@ -163,13 +162,12 @@ def _named(mesh: Any, places: Table, components: tuple[str, ...]) -> Any:
 
     for name in places.data:
         place = places.table(name)
-        assert place is not None
         limits = {}
         for axis, c in enumerate(components):
             if isinstance(place.data.get(c), list):
                 limits[axis] = _grid(place, c, f"one {c}, or two, [least, largest]")
             elif place.has(c):
-                value = place.number(c)
+                value = place.take(c, float)
                 limits[axis] = (value, value)
         place.close()
         with place.about():

@@ -33,13 +33,6 @@ from contactopt.scenes.scene import (
     Traction,
 )
 
-# type of an option of a run -> the arguments of Table.take
-KINDS = {
-    str: (str, "a text in quotation marks"),
-    int: (int, "a whole number"),
-    bool: (bool, "true or false"),
-}
-
 
 @dataclass(frozen=True)
 class SceneFile:
@@ -159,13 +152,13 @@ def read_scene_file(path: str | Path) -> SceneFile:
 def _scene(
     path: Path, top: Table, reading: _Reading | None
 ) -> tuple[Scene, dict[str, Any], _Reading]:
-    kind = top.text("kind", "plane-strain")
+    kind = top.take("kind", str, "plane-strain")
     if kind not in COMPONENTS:
         raise top.fail(f"there is no kind {kind!r}; choose from {', '.join(COMPONENTS)}.", "kind")
     units = top.table("units")
     length, stress = "length", "stress"
     if units:
-        length, stress = (units.text(key, needed=True) for key in ("length", "stress"))
+        length, stress = (units.take(key, str, needed=True) for key in ("length", "stress"))
         units.close()
     reading = reading or _Reading(path.parent, kind, length)
     bodies = top.table("bodies")
@@ -182,15 +175,15 @@ def _scene(
     curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
     changes = {
         "contacts": tuple(_contact(pair, parts, reading) for pair in pairs),
-        "thickness": top.number("thickness", 1.0, low=0.0),
-        "name": top.text("name", path.stem),
-        "mirror": top.text("mirror", "") or None,
+        "thickness": top.take("thickness", float, 1.0, low=0.0),
+        "name": top.take("name", str, path.stem),
+        "mirror": top.take("mirror", str, "") or None,
     }
     for key, usual, most, valid in (
         ("copies", 1, 1000, "at least 1"),
         ("degree", 2 if curved else 1, 2, "1 or 2"),
     ):
-        changes[key] = top.take(key, int, "a whole number", usual)
+        changes[key] = top.take(key, int, usual)
         if not 1 <= changes[key] <= most:
             raise top.fail(f"{key} must be {valid}; got {changes[key]}.", key)
     solve = _solve(top.table("solve"))
@@ -202,7 +195,6 @@ def _scene(
 
 def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
     body = bodies.table(name)
-    assert body is not None
     rigid = body.table("rigid")
     if rigid is not None:
         body.close()
@@ -215,7 +207,7 @@ def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
     if material is None:
         raise body.fail(f"body '{name}' has no material; add material = {{ E = ..., nu = ... }}.")
     with material.about():
-        made = Material(material.number("E", needed=True), material.number("nu", needed=True))
+        made = Material(*(material.take(key, float, needed=True) for key in ("E", "nu")))
     material.close()
     supports = tuple(_support(table, mesh, reading) for table in body.tables("supports"))
     loads: list[Any] = [_traction(table, mesh, reading) for table in body.tables("tractions")]
@@ -223,7 +215,7 @@ def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
     force = body.table("body_force")
     if force is not None:
         loads.append(BodyForce(_vector(_components(force, reading, whole=True), reading)))
-    contact = body.text("contact", "contact")
+    contact = body.take("contact", str, "contact")
     if body.has("contact"):
         _boundary(body, "contact", mesh)
     curve = _curve(body.table("curve"), reading)
@@ -234,7 +226,7 @@ def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
 
 def _rigid(name: str, table: Table, reading: _Reading) -> Rigid:
     normal, force = table.table("normal"), table.table("force")
-    values = None if normal is None else _components(normal, reading)
+    values = None if normal is None else _components(normal, reading, whole=True)
     if values is not None and not any(values.values()):
         raise table.fail(
             "the normal is zero; give the direction that points out of the rigid body.", "normal"
@@ -272,7 +264,7 @@ def _plate(table: Table, mesh: Any, reading: _Reading) -> Plate:
             f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the"
             " whole body."
         )
-    glued = table.take("glued", bool, "true or false", True)
+    glued = table.take("glued", bool, True)
     table.close()
     return Plate(boundary, _components(force, reading, whole=True), glued)
 
@@ -299,14 +291,14 @@ def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[st
                 reading.lengths.append((len(values), table, key))
             found[key] = values[min(reading.state, len(values) - 1)]
         elif table.has(key):
-            found[key] = table.number(key)
+            found[key] = table.take(key, float)
     if whole:
         table.close()
     return found
 
 
 def _boundary(table: Table, key: str, mesh: Any) -> str:
-    name = table.text(key, needed=True)
+    name = table.take(key, str, needed=True)
     known = mesh.boundaries or {}
     if name not in known:
         raise table.fail(
@@ -319,7 +311,7 @@ def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.
     """Projection on the circle or sphere around a centre; with fewer components, on a cylinder."""
     if table is None:
         return None
-    radius, place = table.number("radius", needed=True, low=0.0), table.table("centre")
+    radius, place = table.take("radius", float, needed=True, low=0.0), table.table("centre")
     centre = dict.fromkeys(reading.components, 0.0)
     if place is not None:
         centre = _components(place, reading, whole=True)
@@ -339,17 +331,16 @@ def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.
 def _function(table: Table, key: str, reading: _Reading, needed: bool = False) -> Any:
     """A number, or a function of the place from an expression; None if there is none."""
     what = 'a number, or a text like "0.3 + 0.1 * x"'
-    value = table.take(key, (int, float, str), what, needed=needed)
-    if isinstance(value, str):
+    if isinstance(table.data.get(key), str):
         with table.about(key):
-            return Expression(value, reading.components)
-    return table.number(key)
+            return Expression(table.take(key, str), reading.components)
+    return table.take(key, float, needed=needed, what=what)
 
 
 def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Contact:
     named = {part.name: part for part in parts}
     for side in ("upper", "lower"):
-        body, _, surface = table.text(side, needed=True).partition(":")
+        body, _, surface = table.take(side, str, needed=True).partition(":")
         if body not in named:
             raise table.fail(f"there is no body '{body}'; the bodies are {', '.join(named)}.", side)
         part: Any = named[body]
@@ -362,10 +353,10 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
                     side,
                 )
     mu = _function(table, "mu", reading, needed=True)
-    texts = {key: table.text(key) for key in ("law", "coupling", "carrier")}
+    texts = {key: table.take(key, str) for key in ("law", "coupling", "carrier")}
     given = {key: value for key, value in texts.items() if value is not None}
     with table.about():
-        made = Contact(table.text("upper"), table.text("lower"), mu, **given)
+        made = Contact(table.take("upper", str), table.take("lower", str), mu, **given)
     table.close()
     return made
 
@@ -377,9 +368,9 @@ def _solve(table: Table | None) -> dict[str, Any]:
         return found
     for key in IN_FILES:
         kind = OPTIONS[key].metadata["kind"]
-        if not table.has(key):
-            continue
-        found[key] = table.number(key, low=0.0) if kind is float else table.take(key, *KINDS[kind])
+        limits: dict[str, Any] = {"low": 0.0} if kind is float else {}
+        if table.has(key):
+            found[key] = table.take(key, kind, **limits)
     table.close()
     with table.about():
         RunOptions(**found)
