@@ -18,7 +18,9 @@ from contactopt.errors import InputError
 MOST_BYTES = 1_000_000  # bytes of a file that people write
 TOKEN = re.compile(
     r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
-    |(?P<text>\"{3}(?:\\[\s\S]|(?!\"{3})[^\\])*\"{3,5}|'{3}(?:(?!'{3})[\s\S])*'{3,5}|"(?:\\.|[^"\\\n])*"|'[^'\n]*')
+    |(?P<text>\"{3}(?:\\[\s\S]|(?!\"{3})[^\\])*\"{3,5}
+        |'{3}(?:(?!'{3})[\s\S])*'{3,5}
+        |"(?:\\.|[^"\\\n])*"|'[^'\n]*')
     |(?P<mark>[\[\]{}=,])|(?P<bare>[^\s\#"'\[\]{}=,]+)""",
     re.VERBOSE,
 )
