@@ -16,7 +16,7 @@ from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.meshes.polar import even, right_half_disc, ring
 from contactopt.meshes.structured import rename, tensor_mesh
-from contactopt.scenes.common import RUBBER, UNITS, check_choice, circle, explained
+from contactopt.scenes.common import RUBBER, check_choice, circle, explained, model
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Rigid, Scene, Support
 
@@ -91,10 +91,8 @@ def pin_in_bush(
         Part("pin", pin, material, axis, (weight,), curve=circle(radius - clearance)),
         Part("bush", bush, material, held, curve=circle(radius)),
         mu,
-        thickness=depth,
-        copies=2,
         elements=elements,
-        units=UNITS,
+        **model("plane-strain", depth, 2),
         reference=exact if mu == 0 and outside is None else None,
     )
 
@@ -162,11 +160,8 @@ def press_fit(
         part("shaft", shaft, bore, radius + half, "outer"),
         part("hub", hub, radius - half, outside, "inner"),
         mu,
-        kind=kind,
-        thickness=depth if plane else 1.0,
-        copies=4 if plane else 1,
         elements=elements,
-        units=UNITS,
+        **model(kind, depth, 4 if plane else 1),
         reference=exact,
     )
 
@@ -231,9 +226,8 @@ def stack(
         "stack",
         bodies=(Rigid("floor"), *(block(name, i) for i, name in enumerate(names))),
         contacts=tuple(Contact(upper, lower, mu) for upper, lower in zip(names, below)),
-        thickness=depth,
         elements=elements,
-        units=UNITS,
+        **model("plane-strain", depth),
     )
 
 
@@ -298,7 +292,6 @@ def arch(
         "arch",
         bodies=(Rigid("right"), Rigid("left"), *bodies),
         contacts=tuple(joints),
-        thickness=depth,
         elements=elements,
-        units=UNITS,
+        **model("plane-strain", depth),
     )

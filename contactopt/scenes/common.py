@@ -12,10 +12,11 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import Part, Rigid, Scene
 
 RUBBER = Material(E=5.0, nu=0.3)  # MPa, the material of all the paper's bodies
 UNITS = ("mm", "MPa")
+KINDS = {2: "plane-strain", 3: "solid"}  # by dimension
 GROWTH = {2: 1.2, 3: 1.3}  # ratio of neighbouring elements away from the contact, by dimension
 MARGIN = 1.25  # candidate contact zone of round bodies, over the half-width its mesh resolves
 # what arguments of many scenes are
@@ -71,6 +72,24 @@ def check_shear(shear: float, mu: float, force: float) -> None:
             f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies slide"
             " off."
         )
+
+
+def model(
+    kind: str, depth: float = 1.0, copies: int = 1, bilateral: bool = False
+) -> dict[str, Any]:
+    """The fields of a scene that say what its bodies stand for, and whether contact can open."""
+    return {
+        "kind": kind,
+        "thickness": depth if kind == "plane-strain" else 1.0,
+        "copies": copies,
+        "law": "bilateral" if bilateral else "coulomb",
+        "units": UNITS,
+    }
+
+
+def one_of(rigid: str | None, stiff: Rigid, elastic: Part) -> Part | Rigid:
+    """The rigid form of a body if its name is asked for, or else the elastic one."""
+    return stiff if rigid == stiff.name else elastic
 
 
 def upper_of(scene: Scene, **changes: Any) -> Scene:

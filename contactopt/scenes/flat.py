@@ -18,7 +18,7 @@ from contactopt.checks import check_positive
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.meshes.structured import contact_grid, graded, patch, rename, tensor_mesh
-from contactopt.scenes.common import GROWTH, RUBBER, UNITS, check_choice, explained
+from contactopt.scenes.common import GROWTH, KINDS, RUBBER, check_choice, explained, model, one_of
 from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 
 EDGE = 1e-3  # first element at the edge of the rigid punch, over its half-width
@@ -68,44 +68,38 @@ def flat_punch(
             f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch"
             f" ({width:g})."
         )
-    a, across, up = width / 2, "xy"[: dim - 1], "xyz"[dim - 1]
-
-    def block(elements: int, half_width: float, height: float) -> Any:
-        """A block above the contact, or with a negative height beneath it."""
-        rise = graded(abs(height), a / elements, GROWTH[dim])
-        grid = contact_grid(a, elements, half_width, GROWTH[dim])
-        mesh = tensor_mesh(*[grid] * (dim - 1), rise if height > 0 else -rise[::-1])
-        return rename(mesh, **{f"symmetry {c}": f"{c}-" for c in across})
+    a, up = width / 2, "xyz"[dim - 1]
 
     def punch(elements: int, zone: float | None) -> Any:
-        return rename(block(elements, a, height), contact=f"{up}-", top=f"{up}+")
+        mesh = _block(dim, a, elements, a, height)
+        return rename(mesh, contact=f"{up}-", top=f"{up}+")
 
     def foundation(elements: int, zone: float | None) -> Any:
-        mesh = block(elements, foundation_width / 2, -foundation_height)
+        mesh = _block(dim, a, elements, foundation_width / 2, -foundation_height)
         mesh = rename(mesh, top=f"{up}+", bottom=f"{up}-")
         return patch(mesh, "top", "contact", [a] * (dim - 1))
 
-    symmetry = tuple(Support(f"symmetry {c}", {c: 0.0}) for c in across)
+    symmetry = tuple(Support(f"symmetry {c}", {c: 0.0}) for c in "xy"[: dim - 1])
     load = {up: -force}
-    top: Part | Rigid = Rigid("punch", force=load)
-    if rigid != "punch":
-        top = Part("punch", punch, upper, symmetry, (Plate("top", load),))
-    bottom: Part | Rigid = Rigid("foundation")
-    if rigid != "foundation":
-        bottom = Part("foundation", foundation, lower, (*symmetry, Support("bottom")))
+    top = Part("punch", punch, upper, symmetry, (Plate("top", load),))
+    bottom = Part("foundation", foundation, lower, (*symmetry, Support("bottom")))
     return Scene(
         f"punch-{dim}d",
-        top,
-        bottom,
+        one_of(rigid, Rigid("punch", force=load), top),
+        one_of(rigid, Rigid("foundation"), bottom),
         mu,
-        kind="plane-strain" if dim == 2 else "solid",
-        thickness=depth if dim == 2 else 1.0,
-        copies=2 ** (dim - 1),
-        law="bilateral" if bilateral else "coulomb",
         elements=elements,
-        units=UNITS,
+        **model(KINDS[dim], depth, 2 ** (dim - 1), bilateral),
         reference=flat_punch_line(force / depth, a) if dim == 2 and rigid == "punch" else None,
     )
+
+
+def _block(dim: int, a: float, elements: int, half_width: float, height: float) -> Any:
+    """A block above a contact of half-width a, or with a negative height beneath it."""
+    rise = graded(abs(height), a / elements, GROWTH[dim])
+    grid = contact_grid(a, elements, half_width, GROWTH[dim])
+    mesh = tensor_mesh(*[grid] * (dim - 1), rise if height > 0 else -rise[::-1])
+    return rename(mesh, **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
 
 
 @explained
@@ -166,13 +160,9 @@ def rigid_punch(
         Rigid("punch", force={up: -force}),
         Part("foundation", mesh, lower, (Support("axis", {across: 0.0}), Support("bottom"))),
         mu,
-        kind=kind,
-        thickness=depth if plane else 1.0,
-        copies=2 if plane else 1,
-        law="bilateral" if bilateral else "coulomb",
         elements=elements,
         degree=2,
-        units=UNITS,
+        **model(kind, depth, 2 if plane else 1, bilateral),
         reference=None if bilateral else _exact(kind, force, half_width, depth, lower, mu),
     )
 

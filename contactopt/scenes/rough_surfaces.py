@@ -60,6 +60,28 @@ def self_affine(
         check_count(f"the number of points along {axis}", count)
     check_positive(**{"length along x": lengths[0], "length along y": lengths[1], "slope": slope})
     check_number("Hurst's exponent", hurst, low=0.0, high=1.0 + ROUND)
+    longest, shortest, roll_off = _wavelengths(points, lengths, longest, shortest, roll_off)
+    reach = [math.floor(size / shortest * (1 + ROUND)) for size in lengths]
+    orders = np.meshgrid(*[np.arange(-m, m + 1) for m in reach], indexing="ij")
+    k = np.hypot(orders[0] / lengths[0], orders[1] / lengths[1])
+    passed = (k >= (1 - ROUND) / longest) & (k <= (1 + ROUND) / shortest)
+    if not passed.any():
+        raise InputError(
+            "no wave of the period lies between the shortest and the longest wavelength; widen the"
+            " band."
+        )
+    size = np.where(passed, np.maximum(k, 1 / roll_off) ** -(1 + hurst), 0.0)
+    return slope * _of_unit_slope(size, k, points, seed)
+
+
+def _wavelengths(
+    points: tuple[int, int],
+    lengths: tuple[float, float],
+    longest: float | None,
+    shortest: float | None,
+    roll_off: float | None,
+) -> tuple[float, float, float]:
+    """The three wavelengths, usual ones where none are given; InputError for what is no band."""
     spacing = max(size / count for size, count in zip(lengths, points))
     longest = min(lengths) if longest is None else longest
     shortest = 8 * spacing if shortest is None else shortest
@@ -71,22 +93,12 @@ def self_affine(
             f"the wavelengths must grow from two spacings ({2 * spacing:g}) to shortest, roll_off"
             f" and longest; got {shortest:g}, {roll_off:g} and {longest:g}."
         )
-    reach = [math.floor(size / shortest * (1 + ROUND)) for size in lengths]
-    if any(2 * m >= n for m, n in zip(reach, points)):
+    if any(2 * math.floor(L / shortest * (1 + ROUND)) >= n for L, n in zip(lengths, points)):
         raise InputError(
             f"the shortest wavelength ({shortest:g}) must be longer than two spacings"
             f" ({2 * spacing:g})."
         )
-    orders = np.meshgrid(*[np.arange(-m, m + 1) for m in reach], indexing="ij")
-    k = np.hypot(orders[0] / lengths[0], orders[1] / lengths[1])
-    passed = (k >= (1 - ROUND) / longest) & (k <= (1 + ROUND) / shortest)
-    if not passed.any():
-        raise InputError(
-            "no wave of the period lies between the shortest and the longest wavelength; widen the"
-            " band."
-        )
-    size = np.where(passed, np.maximum(k, 1 / roll_off) ** -(1 + hurst), 0.0)
-    return slope * _of_unit_slope(size, k, points, seed)
+    return longest, shortest, roll_off
 
 
 def _of_unit_slope(

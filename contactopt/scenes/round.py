@@ -31,9 +31,10 @@ from contactopt.scenes.common import (
     GROWTH,
     MARGIN,
     RUBBER,
-    UNITS,
     check_choice,
     explained,
+    model,
+    one_of,
     upper_of,
 )
 from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
@@ -81,11 +82,9 @@ def sphere(
         "sphere",
         *_round_bodies("sphere", rigid, hertz, size, (upper, lower), load),
         mu,
-        kind="axisymmetric",
-        law="bilateral" if bilateral else "coulomb",
         elements=elements,
         zone=MARGIN * hertz.half_width,
-        units=UNITS,
+        **model("axisymmetric", bilateral=bilateral),
         reference=hertz,
     )
 
@@ -129,12 +128,9 @@ def cylinder(
         "cylinder-2d",
         *_round_bodies("cylinder", rigid, hertz, size, (upper, lower), load),
         mu,
-        thickness=depth,
-        copies=2,
-        law="bilateral" if bilateral else "coulomb",
         elements=elements,
         zone=MARGIN * hertz.half_width,
-        units=UNITS,
+        **model("plane-strain", depth, 2, bilateral),
         reference=hertz,
     )
 
@@ -186,10 +182,9 @@ def indentation(
         Rigid("sphere", (0.0, 1.0), lambda x: x[0] ** 2 / (2 * radius), {"z": -force}),
         Part("foundation", mesh, lower, (axis, Support("bottom"))),
         mu,
-        kind="axisymmetric",
         elements=elements,
         zone=hertz.half_width,
-        units=UNITS,
+        **model("axisymmetric"),
         reference=hertz,
     )
 
@@ -264,13 +259,12 @@ def _round_bodies(
         return np.stack([x[0], gap(x)])
 
     axis = Support("axis", {"r" if "z" in load.force else "x": 0.0})
-    top: Part | Rigid = Rigid(name, gap=gap, force=load.force)
-    if rigid != name:
-        top = Part(name, upper_mesh, materials[0], (axis,), (load,), curve=arc)
-    bottom: Part | Rigid = Rigid("foundation", normal=(0.0, 1.0), gap=lambda x: x[1])
-    if rigid != "foundation":
-        bottom = Part("foundation", lower_mesh, materials[1], (axis, Support("bottom")))
-    return top, bottom
+    top = Part(name, upper_mesh, materials[0], (axis,), (load,), curve=arc)
+    bottom = Part("foundation", lower_mesh, materials[1], (axis, Support("bottom")))
+    return (
+        one_of(rigid, Rigid(name, gap=gap, force=load.force), top),
+        one_of(rigid, Rigid("foundation", normal=(0.0, 1.0), gap=lambda x: x[1]), bottom),
+    )
 
 
 def _candidates(elements: int, zone: float) -> np.ndarray:

@@ -4,6 +4,7 @@ fro.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,13 @@ from contactopt.material import Material
 from contactopt.meshes.discs import extrude, half_disc
 from contactopt.meshes.structured import graded, tensor_mesh
 from contactopt.scenes.common import (
+    KINDS,
     MARGIN,
     RUBBER,
-    UNITS,
     check_choice,
     check_shear,
     explained,
+    model,
     upper_of,
 )
 from contactopt.scenes.scene import Part, Plate, Scene, Support
@@ -93,15 +95,13 @@ def cattaneo(
             f" size {size:g}; lower the force or take stiffer or larger bodies."
         )
 
-    def upper(elements: int, zone: float | None) -> Any:
-        return _block(dim, exact, elements, size, radius)
-
-    def lower(elements: int, zone: float | None) -> Any:
-        return _block(dim, exact, elements, size, None)
-
     def paraboloid(x: np.ndarray) -> np.ndarray:
         return np.concatenate([x[:-1], np.sum(x[:-1] ** 2, axis=0, keepdims=True) / (2 * radius)])
 
+    upper, lower = (
+        partial(_block, exact, dim, size, radius),
+        partial(_block, exact, dim, size, None),
+    )
     symmetry = (Support("symmetry", {"y": 0.0}),) if dim == 3 else ()
     plate = Plate("far", {"x": shear, up: -force})
     return Scene(
@@ -109,11 +109,8 @@ def cattaneo(
         Part("upper", upper, material, symmetry, (plate,), curve=paraboloid),
         Part("lower", lower, material, (*symmetry, Support("far"))),
         mu,
-        kind="plane-strain" if dim == 2 else "solid",
-        thickness=depth if dim == 2 else 1.0,
-        copies=dim - 1,
         elements=ELEMENTS[dim] if elements is None else elements,
-        units=UNITS,
+        **model(KINDS[dim], depth, dim - 1),
         reference=exact,
     )
 
@@ -161,7 +158,14 @@ def _exact(
     return hertz_point_tangential(force, radius, modulus, along, mu, [shear])
 
 
-def _block(dim: int, exact: Reference, elements: int, size: float, radius: float | None) -> Any:
+def _block(
+    exact: Reference,
+    dim: int,
+    size: float,
+    radius: float | None,
+    elements: int,
+    zone: float | None,
+) -> Any:
     """The mesh of the upper body with its radius, or of the lower one, which has none."""
     a, growth = exact.half_width, GROWTH[dim]
     contact = _towards_edges(exact.stick_half_width or a, a, elements, growth)
