@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
 
+TOGETHER = "accuracy and quantity belong together: the bound, and the name of what it bounds."
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -113,9 +114,7 @@ class RunOptions:
                 " one of them."
             )
         if (self.accuracy is None) != (self.quantity is None):
-            raise InputError(
-                "accuracy and quantity belong together: the bound, and the name of what it bounds."
-            )
+            raise InputError(TOGETHER)
         if self.accuracy is None and self.adaptive:
             raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
         if self.accuracy is None and self.bounds:

@@ -82,6 +82,17 @@ def test_a_file_says_what_python_says(tmp_path):
         contactopt.run(tmp_path / "small.toml", mu=0.1)
 
 
+def test_options_of_the_command_line_join_those_of_the_file(tmp_path):
+    """A file may bound a search whose accuracy the command line gives; what is given there wins."""
+    file = written(tmp_path, SMALL.replace("tol = 1e-10", "max_unknowns = 2000\nadaptive = true"))
+    with pytest.raises(InputError, match="adaptive refinement needs an aim"):
+        contactopt.run(file)
+    aim = {"accuracy": 0.5, "quantity": "approach"}
+    assert contactopt.run(file, adaptive=False, **aim).estimate.target == 0.5
+    with pytest.raises(InputError, match="did you mean .max_unknowns."):
+        contactopt.run(file, max_unknwns=9, **aim)
+
+
 def test_every_entry_reaches_the_scene(tmp_path):
     plane = skfem.MeshTri2.init_circle(2)
     meshio.write(

@@ -18,7 +18,7 @@ from contactopt.checks import meant
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
 from contactopt.material import Material
-from contactopt.run_options import IN_FILES, OPTIONS, RunOptions
+from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.expressions import Expression
@@ -372,6 +372,6 @@ def _solve(table: Table | None) -> dict[str, Any]:
         if table.has(key):
             found[key] = table.take(key, kind, **limits)
     table.close()
-    with table.about():
-        RunOptions(**found)
+    if ("accuracy" in found) != ("quantity" in found):  # the other options may stand alone here
+        raise table.fail(TOGETHER)
     return found
