@@ -38,8 +38,7 @@ if TYPE_CHECKING:
         siconos_residual,
     )
     from contactopt.problem.transfer import transfer
-    from contactopt.result import Result
-    from contactopt.runner import run
+    from contactopt.runner import Result, run
     from contactopt.scenes.contact import Contact
     from contactopt.scenes.scene import (
         BodyForce,
@@ -55,45 +54,29 @@ if TYPE_CHECKING:
     from contactopt.simplification.search import simplify
     from contactopt.solving.paths import PathResult, follow
 
-# name -> the module that it stands in
+# module -> the names that stand in it
 _HOMES = {
-    "analytic": ("Reference",),
-    "methods.diagnosis": ("Diagnosis", "diagnose"),
-    "methods.enumeration": ("all_solutions",),
-    "solving.paths": ("PathResult", "follow"),
-    "simplification.findings": ("Simplification", "Simplified"),
-    "simplification.search": ("simplify",),
-    "derivatives.design": ("Design", "design"),
-    "derivatives.fit": ("Fit", "fit"),
-    "derivatives.gradient": ("gradient",),
-    "derivatives.interface": ("sensitivity",),
-    "errors": ("BackendError", "InputError"),
-    "bodies.fields": ("Fields",),
-    "coupling.reduction": ("reduce", "reduce_bodies"),
-    "problem": (
-        "InterfaceProblem",
-        "Solution",
-        "Status",
-        "natural_map_residual",
-        "siconos_residual",
-    ),
-    "problem.transfer": ("transfer",),
-    "result": ("Result",),
-    "runner": ("run",),
-    "material": ("Material",),
-    "scenes.contact": ("Contact",),
-    "meshes.mesh_files": ("load_mesh",),
-    "scenes.scene": (
-        "BodyForce",
-        "HalfSpace",
-        "Part",
-        "Plate",
-        "Rigid",
-        "Scene",
-        "Support",
-        "Traction",
-    ),
-    "methods.driver": ("solve",),
+    "analytic": "Reference",
+    "bodies.fields": "Fields",
+    "coupling.reduction": "reduce reduce_bodies",
+    "derivatives.design": "Design design",
+    "derivatives.fit": "Fit fit",
+    "derivatives.gradient": "gradient",
+    "derivatives.interface": "sensitivity",
+    "errors": "BackendError InputError",
+    "material": "Material",
+    "meshes.mesh_files": "load_mesh",
+    "methods.diagnosis": "Diagnosis diagnose",
+    "methods.driver": "solve",
+    "methods.enumeration": "all_solutions",
+    "problem": "InterfaceProblem Solution Status natural_map_residual siconos_residual",
+    "problem.transfer": "transfer",
+    "runner": "Result run",
+    "scenes.contact": "Contact",
+    "scenes.scene": "BodyForce HalfSpace Part Plate Rigid Scene Support Traction",
+    "simplification.findings": "Simplification Simplified",
+    "simplification.search": "simplify",
+    "solving.paths": "PathResult follow",
 }
 _MODULES = {
     "analytic": "analytic",
@@ -104,14 +87,14 @@ _MODULES = {
     "plots": "figures.plots",
     "scenes": "scenes",
 }
-__all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
+__all__ = sorted([*(name for names in _HOMES.values() for name in names.split()), *_MODULES])
 
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"contactopt.{_MODULES[name]}")
     for module, names in _HOMES.items():
-        if name in names:
+        if name in names.split():
             return getattr(import_module(f"contactopt.{module}"), name)
     raise AttributeError(f"module 'contactopt' has no attribute {name!r}")
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from contextlib import suppress
+from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
@@ -225,3 +227,19 @@ def short(value: object, most: int = 60) -> str:
     """
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """Ask whether one of the known names was meant by one that is not known.
+
+    Parameters
+    ----------
+    name : the unknown name
+    known : those that there are
+
+    Returns
+    -------
+    str : the end of a sentence: '; did you mean ...?' where one is nearly the same, or a full stop
+    """
+    near = get_close_matches(name, known, 1)
+    return f"; did you mean {near[0]!r}?" if near else "."

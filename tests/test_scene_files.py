@@ -82,6 +82,17 @@ def test_a_file_says_what_python_says(tmp_path):
         contactopt.run(tmp_path / "small.toml", mu=0.1)
 
 
+def test_options_of_the_command_line_join_those_of_the_file(tmp_path):
+    """A file may bound a search whose accuracy the command line gives; what is given there wins."""
+    file = written(tmp_path, SMALL.replace("tol = 1e-10", "max_unknowns = 2000\nadaptive = true"))
+    with pytest.raises(InputError, match="adaptive refinement needs an aim"):
+        contactopt.run(file)
+    aim = {"accuracy": 0.5, "quantity": "approach"}
+    assert contactopt.run(file, adaptive=False, **aim).estimate.target == 0.5
+    with pytest.raises(InputError, match=r"did you mean .max_unknowns."):
+        contactopt.run(file, max_unknwns=9, **aim)
+
+
 def test_every_entry_reaches_the_scene(tmp_path):
     plane = skfem.MeshTri2.init_circle(2)
     meshio.write(
@@ -220,6 +231,9 @@ MISTAKES = [
     ("x = 1.0, y", "x = [], y", 9, "empty array"),
     ("force = { x = 1.0, y = -10.0 }", "glued = 1", 9, "a plate needs force"),
     ("rigid = {}", "rigid = { normal = { x = 0 } }", 13, "the normal is zero"),
+    ("rigid = {}", "rigid = { normal = { y = 1, z = 1 } }", 13, "no 'z' in .*normal; valid names are x, y"),
+    ("tol = 1e-10", "tolerance = 1e-10", 21, "no 'tolerance' in solve; valid names are method"),
+    ("[solve]", "[slove]", 20, "there is no 'slove'; .*did you mean 'solve'"),
     ("rigid = {}", 'rigid = { gap = "x +" }', 13, "cannot be computed"),
     ("[[contacts]]", "[contacts]", 15, "'contacts' must be an array of tables"),
     ('upper = "block"', 'upper = "blok"', 16, "there is no body 'blok'; the bodies are block, floor"),
@@ -293,7 +307,7 @@ def test_lines_of_all_ways_to_write_toml():
 
 def test_the_comments_of_the_example_are_valid_too(tmp_path):
     """Entries that stand behind a comment sign are read as the others."""
-    text = EXAMPLE.format(name="a.toml")
+    text = EXAMPLE
     for entry in ("move", "tractions", "body_force", "curve"):
         text = text.replace(f"# {entry} =", f"{entry} =")
     scene = read_scene_file(written(tmp_path, text)).states[0]

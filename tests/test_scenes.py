@@ -172,7 +172,7 @@ def test_paths_are_states_of_one_scene():
         (lambda: scenes.cattaneo(2, shear=50.0), "the bodies slide off"),
         (lambda: scenes.cattaneo(2, mu=0.0), "the bodies slide off"),
         (lambda: scenes.cattaneo(2, force=1e9), "too much for bodies|larger bodies"),
-        (lambda: scenes.rigid_punch("solid"), "kind must be one of plane-strain, axisymmetric"),
+        (lambda: scenes.rigid_punch("solid"), "kind must be .plane-strain. or .axisymmetric."),
         (lambda: scenes.rigid_punch(foundation=30.0), "at least two half-widths"),
         (lambda: scenes.indentation(foundation=3.0), "at least two contact radii"),
         (lambda: scenes.cylinder(rigid="sphere"), "rigid must be None, 'cylinder' or 'foundation'"),

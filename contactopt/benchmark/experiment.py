@@ -164,7 +164,7 @@ def _check(table: Table) -> None:
         if not data.get(key):
             raise table.fail(f"an experiment needs '{key}'.", key)
     for key, (kind, what) in TYPES.items():
-        table.take(key, kind, what)
+        table.take(key, kind, what=what)
     if not re.fullmatch(r"[\w.-]+", data["name"]):
         raise table.fail(
             "'name' becomes a directory: letters, digits, '-', '_' and '.' only.", "name"
@@ -175,13 +175,13 @@ def _check(table: Table) -> None:
         if not all(isinstance(value, str) for value in data.get(key, ())):
             raise table.fail(f"'{key}' must be a list of texts.", key)
     for key, (least, most) in WHOLE.items():
-        value = table.take(key, int, f"a whole number from {least} to {most}", 1)
+        value = table.take(key, int, 1, what=f"a whole number from {least} to {most}")
         if not least <= value <= most:
             raise table.fail(
                 f"'{key}' must be a whole number from {least} to {most}; got {short(value)}.", key
             )
     for key, (low, high) in BOUNDS.items():
-        table.number(key, low=low, high=high)
+        table.take(key, float, low=low, high=high)
     for key, choices, more in (("settings", SETTINGS, " or a number"), ("starts", STARTS, "")):
         values = data.get(key, ())
         for value in values:

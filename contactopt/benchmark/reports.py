@@ -91,11 +91,11 @@ def read_layout(path: str | Path) -> Layout:
     """
     path = Path(path)
     root = read_table(path, "experiment")
-    name = root.text("name", path.stem)
+    name = root.take("name", str, path.stem)
     with root.about("name"):
         check_name("'name'", name)
-    title, text, findings = (root.text(key, "") for key in ("title", "text", "findings"))
-    columns = root.take("columns", list, "a list of texts", [])
+    title, text, findings = (root.take(key, str, "") for key in ("title", "text", "findings"))
+    columns = root.take("columns", list, [], what="a list of texts")
     if not all(isinstance(column, str) for column in columns):
         raise root.fail("'columns' must be a list of texts.", "columns")
     for number, entry in enumerate(root.tables("figures"), 1):

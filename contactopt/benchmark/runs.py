@@ -14,10 +14,10 @@ from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
 from contactopt.methods import METHODS, find_method
 from contactopt.methods.backends import CONIC, QP
+from contactopt.methods.driver import TOL
 from contactopt.methods.method import NATIVE
 
-DEFAULT_TOL = 1e-8  # by which the setting "default" is judged: that of contactopt.solve
-SETTINGS = {"default": DEFAULT_TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
+SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
 STARTS = ("cold", "warm")
 # to a plug-in, if it has such an argument
 PASSED = ("tol", "time_limit", "max_iterations", "start")

@@ -26,12 +26,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Parameters
     ----------
-    arguments : The arguments after the name of the program; by default those of the process.
+    arguments : those after the name of the program; by default those of the process
 
     Returns
     -------
-    The exit code: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that
-    cannot be used, 130 interrupted.
+    int : the exit code
     """
     told = sys.argv[1:] if arguments is None else list(arguments)
     options = make_parser().parse_args(told, argparse.Namespace(team=None, ranks=None))
@@ -44,26 +43,21 @@ def _answered(command: Callable[[], int]) -> int:
     try:
         return int(command())
     except InputError as error:
-        print(f"contactopt: {error}", file=sys.stderr)
-        return 2
+        return _refused(str(error))
     except MemoryError as error:
         why = f" ({error})" if str(error) else ""
-        print(
-            f"contactopt: this needs more memory than there is{why}; take fewer elements.",
-            file=sys.stderr,
-        )
-        return 2
+        return _refused(f"this needs more memory than there is{why}; take fewer elements.")
     except BrokenPipeError:
         raise
     except OSError as error:  # a name that no file can have, a disk that is gone
-        print(
-            f"contactopt: cannot use '{error.filename}': {error.strerror or error}.",
-            file=sys.stderr,
-        )
-        return 2
+        return _refused(f"cannot use '{error.filename}': {error.strerror or error}.")
     except KeyboardInterrupt:
-        print("contactopt: interrupted", file=sys.stderr)
-        return 130
+        return _refused("interrupted", 130)
+
+
+def _refused(why: str, code: int = 2) -> int:
+    print(f"contactopt: {why}", file=sys.stderr)
+    return code
 
 
 def _execute(options: argparse.Namespace, told: list[str]) -> int:
@@ -71,11 +65,9 @@ def _execute(options: argparse.Namespace, told: list[str]) -> int:
     if (comm := world()) is None:
         if options.ranks is not None:
             check_bodies(scene_asked(options), options.ranks)  # before any of them is started
-        return (
-            int(options.command(options))
-            if options.ranks in (None, 1)
-            else launch(options.ranks, told)
-        )
+        if options.ranks not in (None, 1):
+            return launch(options.ranks, told)
+        return int(options.command(options))
     if comm.rank:
         serve(comm)
         return 0

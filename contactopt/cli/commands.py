@@ -1,4 +1,4 @@
-"""What each command does with its options; returns the exit code."""
+"""What each command does with its options: each function returns the exit code."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,7 @@ Command = Callable[[argparse.Namespace], int]
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
-    """The values of NAME=VALUE texts.
-
-    A value is a number, true, false or a list as in TOML; anything else is a text.
-    """
+    """The values of NAME=VALUE texts: numbers, true, false and lists as in TOML, all else texts."""
     found: dict[str, Any] = {}
     for text in texts:
         name, sign, value = text.partition("=")
@@ -60,11 +57,11 @@ def scene_asked(options: argparse.Namespace) -> Any:
 
     Parameters
     ----------
-    options : The options of the command.
+    options : of the command
 
     Returns
     -------
-    The scene; of a load path its last state.
+    Scene : of a load path its last state
     """
     from contactopt.runner import scene_of
 
@@ -76,16 +73,13 @@ def run(options: argparse.Namespace) -> int:
 
     Parameters
     ----------
-    options : The options of the command `run`.
+    options : of the command `run`
 
     Returns
     -------
-    The exit code: 0 if it is solved, to the accuracy asked for, else 1.
-
-    Raises
-    ------
-    InputError : If an argument of the scene is given twice, or as `contactopt.run` raises it.
+    int : the exit code, 0 if it is solved, to the accuracy asked for, else 1
     """
+    from contactopt.run_options import OPTIONS
     from contactopt.runner import run
 
     out = options.out or f"out/{Path(options.scene).stem}"
@@ -93,24 +87,9 @@ def run(options: argparse.Namespace) -> int:
     result = run(
         options.scene,
         out,
-        method=options.method,
-        normal=options.normal,
-        tangential=options.tangential,
-        preconditioner=options.preconditioner,
-        Q=options.q,
-        solver=options.solver,
-        tol=options.tol,
-        accuracy=options.accuracy,
-        quantity=options.quantity,
-        adaptive=options.adaptive,
-        simplest=options.simplest,
-        max_unknowns=options.max_unknowns,
-        time_limit=options.time_limit,
-        max_memory=options.max_memory,
-        figures=tuple(options.figures),
-        html=options.html,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
         team=options.team,
+        **{name: getattr(options, name) for name in OPTIONS},
         **_changes(options),
     )
     if options.json:
@@ -118,13 +97,10 @@ def run(options: argparse.Namespace) -> int:
     else:
         _print_result(result, out)
         if options.team is not None:
-            print(
-                f"{options.team.size} ranks, {options.team.traffic.messages} messages,"
-                f" {options.team.traffic.length} bytes"
-            )
-    return (
-        0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
-    )
+            sent = options.team.traffic
+            print(f"{options.team.size} ranks, {sent.messages} messages, {sent.length} bytes")
+    reached = result.estimate is None or result.estimate.reached
+    return 0 if result.solution.solved and reached else 1
 
 
 def _print_result(result: Any, out: str) -> None:
@@ -156,11 +132,8 @@ def _print_result(result: Any, out: str) -> None:
         print(f"note: {remark}")
     if result.estimate is not None:
         _print_estimate(result.estimate)
-    seconds = s["seconds"]
-    print(
-        f"{seconds['total']:.1f} s: "
-        + ", ".join(f"{k} {v:.2f}" for k, v in seconds.items() if k != "total")
-    )
+    phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
+    print(f"{s['seconds']['total']:.1f} s: {phases}")
     print(f"files in {out}: {', '.join(sorted(file.name for file in Path(out).iterdir()))}")
 
 
@@ -178,7 +151,7 @@ def _print_estimate(estimate: Any) -> None:
 
 
 def view(options: argparse.Namespace) -> int:
-    """Write the page of a run and open it in the browser; returns the exit code 0."""
+    """Write the page of a run and open it in the browser."""
     import webbrowser
 
     from contactopt.figures.view_page import write_page
@@ -191,7 +164,7 @@ def view(options: argparse.Namespace) -> int:
 
 
 def show(options: argparse.Namespace) -> int:
-    """Print what a scene is: sketch, sizes, arguments and source; returns the exit code 0."""
+    """Print what a scene is: sketch, sizes, arguments and source."""
     from contactopt.figures.sheet import describe
 
     print(describe(options.scene, _arguments_of(options.set)))
@@ -202,14 +175,13 @@ def simplify(options: argparse.Namespace) -> int:
     from contactopt.runner import scene_of
     from contactopt.simplification import simplify
 
-    print(
-        simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve)
-    )
+    scene = scene_of(options.scene, **_arguments_of(options.set))
+    print(simplify(scene, solve=not options.no_solve))
     return 0
 
 
 def new(options: argparse.Namespace) -> int:
-    """Write an example of a scene file; returns the exit code 0."""
+    """Write an example of a scene file."""
     from contactopt.scenes.example import write_example
 
     write_example(Path(options.file))
@@ -218,9 +190,7 @@ def new(options: argparse.Namespace) -> int:
 
 
 def bench(options: argparse.Namespace) -> int:
-    """Execute the runs of an experiment file and write their report; returns the exit code, 130 if
-    it was interrupted.
-    """
+    """Execute the runs of an experiment file and write their report."""
     from contactopt.benchmark.campaign import run_campaign
     from contactopt.benchmark.report_page import refusals, report_campaign
     from contactopt.benchmark.store import load
@@ -241,33 +211,24 @@ def bench(options: argparse.Namespace) -> int:
         return 130
     table = load(folder)
     runs = count(len(table), "run")
-    print(
-        f"{runs}: "
-        + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items())
-    )
+    counted = table["status"].value_counts().items()
+    print(f"{runs}: {', '.join(f'{n} {status}' for status, n in counted)}")
     for sentence in refusals(table):
         print(f"  {sentence}")
     print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
     page = report_campaign(folder, options.file)
-    more = (
-        ""
-        if page.suffix == ".html"
-        else "; a page to explore needs: pip install 'contactopt[view]'"
-    )
-    print(f"report: {page}{more}")
+    more = "; a page to explore needs: pip install 'contactopt[view]'"
+    print(f"report: {page}{'' if page.suffix == '.html' else more}")
     return 0
 
 
 def report(options: argparse.Namespace) -> int:
-    """Rebuild the reports of benchmarks from their tables; returns the exit code 0."""
+    """Rebuild the reports of benchmarks from their tables."""
     from contactopt.benchmark.campaign import run_reports
     from contactopt.benchmark.report_page import report_campaign
 
-    folders = [
-        Path(name)
-        for name in options.names
-        if Path(name).is_dir() and any(Path(name).glob("rows.*"))
-    ]
+    given = [Path(name) for name in options.names]
+    folders = [path for path in given if path.is_dir() and any(path.glob("rows.*"))]
     if folders and len(folders) == len(options.names) and not options.run:
         for folder in folders:
             print(f"report: {report_campaign(folder)}")
@@ -279,17 +240,56 @@ def report(options: argparse.Namespace) -> int:
 
 
 def listing(options: argparse.Namespace) -> int:
-    """Print everything that can be chosen by its name; returns the exit code 0."""
-    from contactopt.cli.lists import print_lists
+    """Print everything that can be chosen by its name."""
+    from contactopt.bodies.solvers import SOLVERS
+    from contactopt.linear.operators import FORMS
+    from contactopt.methods import METHODS
+    from contactopt.methods.backends import CONIC, QP
+    from contactopt.methods.preconditioners import PRECONDITIONERS
+    from contactopt.problem.laws import LAWS
+    from contactopt.scenes import PATHS, SCENES
 
-    print_lists()
+    print("scenes")
+    for name, (_, _, what, *_) in SCENES.items():
+        print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
+    _print_table("laws of contact", LAWS)
+    _print_table("methods", METHODS)
+    print("forms of the interface operator Q: " + ", ".join(FORMS))
+    print("solvers of the bodies: auto, " + ", ".join(SOLVERS))
+    _print_table("preconditioners of the interface operator", PRECONDITIONERS)
+    for title, backends in (
+        ("QP backends (normal; tangential in 2D)", QP),
+        ("conic backends (tangential in 3D)", CONIC),
+    ):
+        print(title)
+        for backend in backends.values():
+            here = f"installed, {backend.version}" if backend.installed else ""
+            print(f"  {backend.name:12} {here or f'not installed: pip install {backend.package}'}")
     return 0
+
+
+def _print_table(title: str, table: Mapping[str, tuple[str, str, str]]) -> None:
+    print(title)
+    for name, (_, _, what) in table.items():
+        print(f"  {name:20} {what}")
 
 
 def completion(options: argparse.Namespace) -> int:
-    """Print the completion script of a shell; returns the exit code 0."""
+    """Print the completion script of a shell."""
     from contactopt.cli.completion import script
-    from contactopt.cli.parser import make_parser
 
-    print(script(make_parser(), options.shell))
+    print(script(options.parser, options.shell))
     return 0
+
+
+COMMANDS: dict[str, Command] = {
+    "run": run,
+    "view": view,
+    "show": show,
+    "simplify": simplify,
+    "new": new,
+    "bench": bench,
+    "report": report,
+    "list": listing,
+    "completion": completion,
+}

@@ -1,5 +1,5 @@
-"""Scripts that complete commands, options and names of scenes in a shell, made from the parser
-itself by shtab.
+"""The names that options take, and scripts that complete them, commands and options in a shell,
+made from the parser itself by shtab.
 
 bash:  contactopt completion bash > ~/.local/share/bash-completion/completions/contactopt
 zsh:   contactopt completion zsh >> ~/.zshrc
@@ -11,22 +11,27 @@ from __future__ import annotations
 import argparse
 
 from contactopt.bodies.solvers import SOLVERS
+from contactopt.figures.style import FORMATS
 from contactopt.linear.operators import FORMS
 from contactopt.methods import METHODS
 from contactopt.methods.backends import CONIC, QP
 from contactopt.methods.preconditioners import PRECONDITIONERS
+from contactopt.readings.places import PLACED
+from contactopt.readings.quantities import READINGS
 from contactopt.scenes import SCENES
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
-# what an argument takes besides what the parser knows: names, of which some are files
-VALUES = {
+# argument -> the names that it takes; a scene may be a file, too, and a quantity is of a place
+NAMES = {
     "scene": tuple(SCENES),
     "method": tuple(METHODS),
     "normal": tuple(QP),
     "tangential": (*QP, *(name for name in CONIC if name not in QP)),
-    "q": tuple(FORMS),
+    "Q": tuple(FORMS),
     "preconditioner": (*PRECONDITIONERS, "none"),
     "solver": ("auto", *SOLVERS),
+    "quantity": (*READINGS, *PLACED),
+    "figures": FORMATS,
 }
 
 
@@ -35,20 +40,19 @@ def script(parser: argparse.ArgumentParser, shell: str) -> str:
 
     Parameters
     ----------
-    parser : The parser of the command line. It is changed, and completes names afterwards where it
-        also takes files.
-    shell : One of SHELLS.
+    parser : the parser of the command line; it is changed, and takes none but the known names
+        afterwards
+    shell : one of SHELLS
 
     Returns
     -------
-    The text of the script.
+    str : the text of the script
     """
     import shtab
 
     for commands in parser._actions:
-        for made in (
-            commands.choices.values() if isinstance(commands, argparse._SubParsersAction) else ()
-        ):
-            for action in made._actions:
-                action.choices = VALUES.get(action.dest, action.choices)
+        if isinstance(commands, argparse._SubParsersAction):
+            for made in commands.choices.values():
+                for action in made._actions:
+                    action.choices = NAMES.get(action.dest, action.choices)
     return str(shtab.complete(parser, shell))

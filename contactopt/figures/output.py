@@ -13,16 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.figures.style import FORMATS, save_figure
+from contactopt.outcome import Outcome, squeeze
 from contactopt.problem import alone, part_of
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.contact_fields import contact_fields, on_nodes
 from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
-    from contactopt.accuracy.estimate import Estimate
     from contactopt.coupling.back_to_bodies import Fields
     from contactopt.solving.paths import PathResult
-    from contactopt.solving.solve_scene import Solved
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
@@ -36,33 +35,12 @@ RUN_FILES = (
 )  # fmt: skip
 
 
-def squeeze(t: np.ndarray) -> np.ndarray:
-    """Drop the second axis of an array (k, d) where d is one, as in 2D.
+def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
+    """Draw the figures of a result: bodies, pressure and traction of every pair, maps, load path.
 
     Parameters
     ----------
-    t : (k, d) tangential components.
-
-    Returns
-    -------
-    (k,) or (k, d).
-    """
-    return t[:, 0] if t.shape[1] == 1 else t
-
-
-def draw(
-    solved: Solved,
-    fields: tuple[Fields, ...],
-    estimate: Estimate | None,
-    folder: Path,
-    formats: Sequence[str],
-) -> None:
-    """Draw the figures of a solved scene: bodies, pressure and traction of every pair, maps, load
-    path.
-
-    Parameters
-    ----------
-    solved, fields, estimate : The solution, the fields of its bodies, and what refinement found.
+    result : The solved scene.
     folder : Where the files go.
     formats : Endings of the files, each figure in every one of them.
     """
@@ -72,63 +50,64 @@ def draw(
         for ending in formats:
             save_figure(figure, folder / f"{name}.{ending}")
 
-    scene, problem, solution = solved.reduction.scene, solved.reduction.problem, solved.solution
-    if fields:
-        picture = plots.deformed(scene, part_of(problem, problem.pairs[0]), fields)
+    problem, solution = result.problem, result.solution
+    if result.fields:
+        picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
         save(picture.figure, "deformed")
-    if any(isinstance(part, HalfSpace) for part in scene.parts):
+    if any(isinstance(part, HalfSpace) for part in result.scene.parts):
         from contactopt.figures.maps import maps_figure
 
-        save(maps_figure(solved.reduction, solution), "maps")
+        save(maps_figure(result.reduction, result.solution), "maps")
     for pair in problem.pairs:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
-        save(plots.contact_figure(scene, *alone(problem, solution, pair)), name)
-    if solved.path is not None:
+        save(plots.contact_figure(result.scene, *alone(problem, solution, pair)), name)
+    if result.path is not None:
         from contactopt.figures.animation import path_figure
 
-        save(path_figure(solved.path), "path")
-    if estimate is not None:
-        save(plots.refinement_figure(estimate), "refinement")
+        save(path_figure(result.path), "path")
+    if result.estimate is not None:
+        save(plots.refinement_figure(result.estimate), "refinement")
 
 
-def write(solved: Solved, fields: tuple[Fields, ...], folder: Path, states: bool) -> None:
-    """Write the fields of a solution as VTU files, its contact forces and its load path as arrays.
+def write(result: Outcome, folder: Path, states: bool) -> None:
+    """Write the fields of a result as VTU files, its contact forces and its load path as arrays.
 
     Parameters
     ----------
-    solved, fields : The solution, and the fields of its bodies.
+    result : The solved scene.
     folder : Where the files go.
     states : Whether to write the bodies at all states of the path, too, for a page on which they
         move.
     """
-    surfaces = contact_fields(solved.reduction, solved.solution)
-    for body in on_nodes(solved.reduction, fields, surfaces):
-        body.write_vtu(folder / f"{body.name}.vtu")
+    surfaces = contact_fields(result.reduction, result.solution)
+    for fields in on_nodes(result.reduction, result.fields, surfaces):
+        fields.write_vtu(folder / f"{fields.name}.vtu")
     for surface in surfaces:
         surface.write_vtu(folder / f"contact-{surface.name}.vtu")
-    problem, r = solved.reduction.problem, solved.solution.reactions
+    problem, r = result.problem, result.solution.reactions
     places = np.concatenate([pair.chart.places for pair in problem.pairs], axis=1)
+    x = places.T if problem.dim == 3 else places[0]
     status, bound = contact_status(problem, r), problem.law.bound(r[:, 0])
-    areas, loaded = problem.areas, problem.areas > 0
     np.savez(
         folder / "interface.npz",
-        x=places.T if problem.dim == 3 else places[0],  # along the contact surface
+        x=x,  # along the contact surface
         coordinates=problem.coordinates,
         r_n=r[:, 0],
         r_t=squeeze(r[:, 1:]),
-        pressure=r[:, 0] / areas,
-        traction=squeeze(r[:, 1:] / areas[:, None]),
-        # of friction [stress]
-        bound=np.divide(bound, areas, out=np.zeros_like(bound), where=loaded),
+        pressure=result.pressure,
+        traction=result.traction,
+        bound=np.divide(
+            bound, problem.areas, out=np.zeros_like(bound), where=problem.areas > 0
+        ),  # of friction [stress]
         status=status.stick + 2 * status.slip,  # 0 open, 1 stick, 2 slip
     )
-    if solved.path is not None:
-        solved.path.write(folder)
-        if states and (found := _body_states(solved.path, fields)):
+    if result.path is not None:
+        result.path.write(folder)
+        if states and (found := body_states(result.path, result.fields)):
             np.savez(folder / STATES, **found)
 
 
-def _body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
+def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
     """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and
     von_mises (n, nodes).
 
@@ -140,9 +119,10 @@ def _body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
         return {}
     made = {}
     for own in zip(*(path.fields(step) for step in range(len(path.states)))):
-        name = own[0].name
-        made[f"displacement/{name}"] = np.array([f.displacement.T for f in own], np.float32)
-        made[f"von_mises/{name}"] = np.array([f.von_mises for f in own], np.float32)
+        made[f"displacement/{own[0].name}"] = np.array(
+            [f.displacement.T for f in own], dtype=np.float32
+        )
+        made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
     return made
 
 

@@ -12,23 +12,32 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from contactopt.checks import check_number, short
+from contactopt.checks import check_number, meant, short
 from contactopt.errors import InputError
 
 MOST_BYTES = 1_000_000  # bytes of a file that people write
 TOKEN = re.compile(
     r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
-    |(?P<text>\"{3}(?:\\[\s\S]|(?!\"{3})[^\\])*\"{3,5}|'{3}(?:(?!'{3})[\s\S])*'{3,5}|"(?:\\.|[^"\\\n])*"|'[^'\n]*')
+    |(?P<text>\"{3}(?:\\[\s\S]|(?!\"{3})[^\\])*\"{3,5}
+        |'{3}(?:(?!'{3})[\s\S])*'{3,5}
+        |"(?:\\.|[^"\\\n])*"|'[^'\n]*')
     |(?P<mark>[\[\]{}=,])|(?P<bare>[^\s\#"'\[\]{}=,]+)""",
     re.VERBOSE,
 )
+# type of an entry -> the types of its value, and how a message names them
+KINDS: dict[type, tuple[tuple[type, ...], str]] = {
+    str: ((str,), "a text in quotation marks"),
+    float: ((int, float), "a number"),
+    int: ((int,), "a whole number"),
+    bool: ((bool,), "true or false"),
+    dict: ((dict,), "a table, { name = value, ... }"),
+    list: ((list,), "an array"),
+}
 Place = tuple[str | int, ...]
 
 
 class Table:
-    """A table of the file.
-
-    Each entry is taken once, by name and type; close() then refuses those that are left.
+    """A table of the file, whose entries are taken by name and type; close() refuses the others.
 
     file   name of the file, for messages
     lines  place of every entry -> line
@@ -43,12 +52,12 @@ class Table:
 
         Parameters
         ----------
-        message : One sentence.
-        *below : The place of the entry below this table.
+        message : one sentence
+        below : keys and numbers that lead from this table to the entry
 
         Returns
         -------
-        The sentence after the name of the file and the line.
+        InputError : the sentence after the name of the file and the line
         """
         place: Place = (*self.place, *below)
         while place and place not in self.lines:
@@ -62,11 +71,11 @@ class Table:
 
         Parameters
         ----------
-        below : keys and numbers that lead from this table to the entry
+        below : as for fail()
 
         Yields
         ------
-        Nothing; the block runs in between.
+        None
         """
         try:
             yield
@@ -76,7 +85,7 @@ class Table:
             raise self.fail(str(error), *below) from error
 
     def has(self, key: str) -> bool:
-        """Say whether an entry is there.
+        """Say whether an entry is there, which close() takes as known from now on.
 
         Parameters
         ----------
@@ -84,7 +93,7 @@ class Table:
 
         Returns
         -------
-        True if it is.
+        bool
         """
         self.known.append(key)
         return key in self.data
@@ -92,68 +101,41 @@ class Table:
     def take(
         self,
         key: str,
-        kind: type | tuple[type, ...],
-        what: str,
+        kind: type,
         default: Any = None,
         needed: bool = False,
+        what: str = "",
+        **limits: Any,
     ) -> Any:
         """Take an entry, which must be of one type.
 
         Parameters
         ----------
-        key : The name of the entry.
-        kind, what : Its type, and how a message names that.
-        default : What is returned where there is no entry.
-        needed : Whether that is an error instead.
+        key, kind : the name of the entry, and a type of KINDS
+        default, needed : what is returned where there is no entry, or whether that is an error
+        what : how a message names the type, if not in the words of KINDS
+        limits : of a number, as for contactopt.checks.check_number
 
         Returns
         -------
         The value.
         """
+        types, usual = KINDS[kind]
+        what = what or usual
         if not self.has(key):
             if needed:
                 raise self.fail(f"{key!r} is missing{self._here()}; it is {what}.")
             return default
-        value = self.data[key]
-        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+        value: Any = self.data[key]
+        if not isinstance(value, types) or isinstance(value, bool) != (kind is bool):
             raise self.fail(f"{key!r} must be {what}; got {short(value)}.", key)
-        return value
-
-    def text(self, key: str, default: str | None = None, needed: bool = False) -> Any:
-        """Take a text.
-
-        Parameters
-        ----------
-        key, default, needed : As for `take`.
-
-        Returns
-        -------
-        The text.
-        """
-        return self.take(key, str, "a text in quotation marks", default, needed)
-
-    def number(
-        self, key: str, default: float | None = None, needed: bool = False, **limits: Any
-    ) -> Any:
-        """Take a finite number.
-
-        Parameters
-        ----------
-        key, default, needed : As for `take`.
-        **limits : As for contactopt.checks.check_number.
-
-        Returns
-        -------
-        The number.
-        """
-        value = self.take(key, (int, float), "a number", default, needed)
-        if key in self.data:
+        if kind is float:
             with self.about(key):
-                check_number(key, value, **limits)
+                check_number(key, self.data[key], **limits)
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:
-        """An array of `count` finite numbers, which must be there.
+        """Take an array of finite numbers, which must be there.
 
         Parameters
         ----------
@@ -163,9 +145,9 @@ class Table:
 
         Returns
         -------
-        The numbers.
+        list of float
         """
-        values = self.take(key, list, what, needed=True)
+        values = self.take(key, list, needed=True, what=what)
         if count is not None and len(values) != count:
             raise self.fail(f"{key!r} must be {what}; got {len(values)} values.", key)
         for i, value in enumerate(values):
@@ -173,22 +155,8 @@ class Table:
                 check_number(f"every value of {key}", value)
         return values
 
-    def table(self, key: str) -> Table | None:
+    def table(self, key: str) -> Any:
         """Take the table below an entry.
-
-        Parameters
-        ----------
-        key : The name of the entry.
-
-        Returns
-        -------
-        None if there is no such entry.
-        """
-        data = self.take(key, dict, "a table, { name = value, ... }")
-        return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
-
-    def tables(self, key: str) -> list[Table]:
-        """The tables of an array, none if it is not there.
 
         Parameters
         ----------
@@ -196,28 +164,36 @@ class Table:
 
         Returns
         -------
-        The tables, each of which knows where it stands.
+        Table : None if there is no such entry
         """
-        found = self.take(key, list, "an array of tables, [{ name = value, ... }, ...]", [])
+        data = self.take(key, dict)
+        return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
+
+    def tables(self, key: str) -> list[Table]:
+        """Take an array of tables, none if it is not there.
+
+        Parameters
+        ----------
+        key : name of the entry
+
+        Returns
+        -------
+        list of Table
+        """
+        found = self.take(key, list, [], what="an array of tables, [{ name = value, ... }, ...]")
         for i, data in enumerate(found):
             if not isinstance(data, dict):
-                raise self.fail(
-                    f"every entry of {key!r} must be a table, {{ name = value, ... }}; got"
-                    f" {short(data)}.",
-                    key,
-                    i,
-                )
-        return [
-            Table(self.file, self.lines, data, (*self.place, key, i))
-            for i, data in enumerate(found)
-        ]
+                must = f"every entry of {key!r} must be {KINDS[dict][1]}"
+                raise self.fail(f"{must}; got {short(data)}.", key, i)
+        place = (*self.place, key)
+        return [Table(self.file, self.lines, data, (*place, i)) for i, data in enumerate(found)]
 
     def close(self) -> None:
         """Refuse entries that nothing has asked for."""
         for key in self.data:
             if key not in self.known:
-                valid = ", ".join(dict.fromkeys(self.known))
-                raise self.fail(f"there is no {key!r}{self._here()}; valid names are {valid}.", key)
+                valid = ", ".join(dict.fromkeys(self.known)) + meant(key, self.known)
+                raise self.fail(f"there is no {key!r}{self._here()}; valid names are {valid}", key)
 
     def _here(self) -> str:
         names = [str(part) if isinstance(part, str) else f"[{part + 1}]" for part in self.place]
@@ -229,16 +205,16 @@ def read_table(path: Path, what: str = "scene file") -> Table:
 
     Parameters
     ----------
-    path : The file.
-    what : What it is, in the words of a message.
+    path : the file
+    what : what it is, in the words of a message
 
     Returns
     -------
-    Its table, in which every entry knows its line.
+    Table : every entry knows its line
 
     Raises
     ------
-    InputError : If there is no such file, if it is too long, or, with the line, if it is not TOML.
+    InputError : if there is no such file, if it is too long, or, with the line, if it is not TOML
     """
     if not os.path.isfile(path):  # unlike Path.is_file, it answers for names that no file can have
         why = "does not exist" if not os.path.exists(path) else "is no file that can be read"
@@ -250,7 +226,8 @@ def read_table(path: Path, what: str = "scene file") -> Table:
         )
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")
-        return Table(path.name, lines_of(text) if tomllib.loads(text) else {}, tomllib.loads(text))
+        data = tomllib.loads(text)
+        return Table(path.name, lines_of(text), data)
     except UnicodeDecodeError as error:
         raise InputError(f"{what} '{path}' is no text in UTF-8.") from error
     except tomllib.TOMLDecodeError as error:
@@ -263,16 +240,7 @@ def read_table(path: Path, what: str = "scene file") -> Table:
 
 
 def lines_of(text: str) -> dict[Place, int]:
-    """Find the lines of the entries of a TOML text.
-
-    Parameters
-    ----------
-    text : A valid text.
-
-    Returns
-    -------
-    For the place of every entry its line, from 1.
-    """
+    """The line, from 1, of the place of every entry of a valid TOML text."""
     tokens, line = [], 1
     for match in TOKEN.finditer(text):
         if match.lastgroup != "space":

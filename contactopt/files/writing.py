@@ -31,11 +31,11 @@ def check_folder(out: Path) -> None:
 
     Parameters
     ----------
-    out : The folder.
+    out : the folder
 
     Raises
     ------
-    InputError : If the folder cannot be made or written to.
+    InputError : if the folder cannot be made or written to
     """
     existing = out
     try:
@@ -52,23 +52,22 @@ def check_folder(out: Path) -> None:
 @contextmanager
 def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     """Give an empty folder to write files into, which move to the folder `out` together when the
-    block ends without an
-    error.
+    block ends without an error.
 
     After an error `out` holds what it held before, and a folder that was made for it is gone.
 
     Parameters
     ----------
-    out : The folder where the files shall be in the end. It is made if it does not exist.
-    stale : Names of files that are removed from `out` unless the block wrote them anew.
+    out : where the files shall be in the end; it is made if it does not exist
+    stale : names of files that are removed from `out` unless the block wrote them anew
 
     Yields
     ------
-    The empty folder, inside `out`.
+    Path : of the empty folder, inside `out`
 
     Raises
     ------
-    InputError : Where the operating system refuses to write.
+    InputError : where the operating system refuses to write
     """
     out = Path(out)
     made: list[Path] = []
@@ -83,7 +82,9 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     except OSError as error:
         raise _unwritable(out, error) from error
     finally:
-        _remove_empty(made)
+        for folder in made:
+            with suppress(OSError):  # it holds something
+                folder.rmdir()
 
 
 @contextmanager
@@ -92,16 +93,15 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
     Parameters
     ----------
-    path : Where the file shall be in the end.
+    path : where the file shall be in the end
 
     Yields
     ------
-    The path to write to. It has the name of `path`, from whose ending many writers take their
-    format.
+    Path : to write to, with the same name, from whose ending many writers take their format
 
     Raises
     ------
-    InputError : Where the operating system refuses to write.
+    InputError : where the operating system refuses to write
     """
     path = Path(path)
     with whole_folder(path.parent) as staging:
@@ -109,17 +109,15 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` fill a temporary file in a hidden folder beside `path`, then give it the name
-    `path`.
+    """Replace a file by one that `write` wrote beside it.
 
-    A symbolic link at `path` is replaced, not followed. When writing fails, the error goes on and
-    nothing is left behind.
+    An error of writing goes on, and nothing is left behind. A symbolic link is replaced, not
+    followed.
 
     Parameters
     ----------
-    path : Where the file shall be in the end. Its folder is made if it does not exist.
-    write : A function of a path that writes the file there. The path has the ending of `path`, from
-        which many writers take their format.
+    path : where the file shall be in the end; its folder is made if it does not exist
+    write : a function of a path that writes the file there; the path has the name of `path`
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with _staging(path.parent) as staging:
@@ -172,19 +170,10 @@ def _unwritable(out: Path, error: OSError) -> InputError:
 
 
 def _make_folder(folder: Path) -> list[Path]:
-    """Make the folder and those above it; the ones that were missing, innermost first, for
-    remove_empty.
-    """
+    """Make the folder and those above it; the ones that were missing, innermost first."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
-
-
-def _remove_empty(folders: Iterable[Path]) -> None:
-    """Remove those of the folders that hold nothing."""
-    for folder in folders:
-        with suppress(OSError):
-            folder.rmdir()
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:
@@ -195,12 +184,11 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
 
     Parameters
     ----------
-    folder : The folder.
-    names : The names of the files, without any folder.
+    folder, names : the folder, and the names of the files
 
     Raises
     ------
-    InputError : On a name that could lead to another folder.
+    InputError : on a name that could lead to another folder
     """
     for name in names:
         check_name("the file", name)

@@ -13,7 +13,9 @@ from importlib import import_module
 from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Any
 
+from contactopt.checks import meant
 from contactopt.errors import InputError
+from contactopt.run_options import OPTIONS
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.scene import Scene
 
@@ -32,44 +34,14 @@ if TYPE_CHECKING:
 # name -> (module, function that makes the scene from keyword arguments, what it is[, arguments that
 # the name fixes])
 SCENES: dict[str, tuple[Any, ...]] = {
-    "punch-2d": (
-        "flat",
-        "flat_punch",
-        "flat punch on a foundation, plane strain, half model",
-        {"dim": 2},
-    ),
-    "punch-3d": (
-        "flat",
-        "flat_punch",
-        "square flat punch on a foundation, quarter model",
-        {"dim": 3},
-    ),
-    "sphere": ("round", "sphere", "half sphere on a foundation, axisymmetric, contact-zone loop"),
-    "cylinder-2d": (
-        "round",
-        "cylinder",
-        "half cylinder on a foundation, plane strain, contact-zone loop",
-    ),
-    "pin-in-bush": (
-        "assemblies",
-        "pin_in_bush",
-        "pin in a bush with clearance, held by contact alone, half model",
-    ),
-    "press-fit": (
-        "assemblies",
-        "press_fit",
-        "hollow shaft in a hub that is too narrow for it, quarter model",
-    ),
-    "stack": (
-        "assemblies",
-        "stack",
-        "blocks that rest on each other, tilted, under their weight, plane strain",
-    ),
-    "arch": (
-        "assemblies",
-        "arch",
-        "half circle of stones that rest on each other, under its weight, plane strain",
-    ),
+    "punch-2d": ("flat", "flat_punch", "flat punch on a foundation, plane strain", {"dim": 2}),
+    "punch-3d": ("flat", "flat_punch", "square flat punch on a foundation", {"dim": 3}),
+    "sphere": ("round", "sphere", "half sphere on a foundation, axisymmetric"),
+    "cylinder-2d": ("round", "cylinder", "half cylinder on a foundation, plane strain"),
+    "pin-in-bush": ("assemblies", "pin_in_bush", "pin in a bush, held by contact alone"),
+    "press-fit": ("assemblies", "press_fit", "hollow shaft in a hub that is too narrow for it"),
+    "stack": ("assemblies", "stack", "tilted blocks that rest on each other under their weight"),
+    "arch": ("assemblies", "arch", "half circle of stones that rest on each other"),
     "rigid-punch-2d": (
         "flat",
         "rigid_punch",
@@ -82,42 +54,15 @@ SCENES: dict[str, tuple[Any, ...]] = {
         "rigid flat disc on a half-space",
         {"kind": "axisymmetric"},
     ),
-    "hertz-dissimilar": (
-        "round",
-        "indentation",
-        "rigid sphere on a half-space, axisymmetric; path: growing force",
-    ),
-    "cattaneo-2d": (
-        "sliding",
-        "cattaneo",
-        "two cylinders pressed and sheared; path: shear cycle",
-        {"dim": 2},
-    ),
-    "cattaneo-3d": (
-        "sliding",
-        "cattaneo",
-        "two spheres pressed and sheared; path: shear cycle",
-        {"dim": 3},
-    ),
-    "hertz-half-space": (
-        "half_spaces",
-        "hertz_half_space",
-        "rigid sphere on a half-space without a mesh, frictionless",
-    ),
-    "cattaneo-half-space": (
-        "half_spaces",
-        "cattaneo_half_space",
-        "two spheres as half-spaces, pressed and sheared",
-    ),
-    "rough": (
-        "half_spaces",
-        "rough",
-        "rigid rough surface on a half-space; path: shear to full sliding",
-    ),
+    "hertz-dissimilar": ("round", "indentation", "rigid sphere on a half-space; growing force"),
+    "cattaneo-2d": ("sliding", "cattaneo", "two cylinders pressed; cycle of shear", {"dim": 2}),
+    "cattaneo-3d": ("sliding", "cattaneo", "two spheres pressed; cycle of shear", {"dim": 3}),
+    "hertz-half-space": ("half_spaces", "hertz_half_space", "as sphere, rigid and without a mesh"),
+    "cattaneo-half-space": ("half_spaces", "cattaneo_half_space", "as cattaneo-3d, without a mesh"),
+    "rough": ("half_spaces", "rough", "rigid rough surface on a half-space; shear to sliding"),
 }
 # the scenes whose answer depends on how the load is applied: name -> (module, function that makes
-# the states in their
-# order[, arguments that the name fixes])
+# the states in their order[, arguments that the name fixes])
 PATHS: dict[str, tuple[Any, ...]] = {
     "hertz-dissimilar": ("round", "growing_indentation"),
     "cattaneo-2d": ("sliding", "shear_cycle", {"dim": 2}),
@@ -153,7 +98,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """The functions of the tables, whose modules are imported when one of them is asked for."""
     if name in _MODULES:
-        return getattr(import_module(f"contactopt.scenes.{_MODULES[name]}"), name)
+        return _maker((_MODULES[name], name))
     raise AttributeError(f"module 'contactopt.scenes' has no attribute {name!r}")
 
 
@@ -179,8 +124,9 @@ def make_scene(
     InputError : for an unknown name or argument, and for values that the scene refuses
     """
     if name not in SCENES:
-        raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
-    return with_elements(_made(name, SCENES[name], changes), degree, simplices)
+        known = ", ".join(SCENES)
+        raise InputError(f"unknown scene {name!r}; choose from {known}{meant(name, SCENES)}")
+    return with_elements(_made(name, SCENES, changes), degree, simplices)
 
 
 def make_path(
@@ -195,7 +141,7 @@ def make_path(
 
     Returns
     -------
-    The states of the scene, in their order.
+    tuple of Scene : the states of the scene, in their order
 
     Raises
     ------
@@ -203,39 +149,33 @@ def make_path(
     """
     if name not in PATHS:
         raise InputError(f"scene {name!r} has no load path; choose from {', '.join(PATHS)}.")
-    return tuple(
-        with_elements(scene, degree, simplices) for scene in _made(name, PATHS[name], changes)
-    )
+    return tuple(with_elements(scene, degree, simplices) for scene in _made(name, PATHS, changes))
 
 
-def _arguments(name: str, make: Callable[..., Any]) -> list[str]:
-    """The arguments of a function that makes a scene; one that hands `**changes` on takes those of
-    the scene's own function.
+def _made(name: str, table: dict[str, tuple[Any, ...]], changes: dict[str, object]) -> Any:
+    """What the function of a table's entry makes; InputError for arguments that it does not take.
+
+    A function of a load path hands what it does not know on to that of the scene.
     """
-    parameters = signature(make).parameters.values()
-    own = [
-        parameter.name for parameter in parameters if parameter.kind is not Parameter.VAR_KEYWORD
-    ]
-    if len(own) == len(parameters):
-        return own
-    module, function = SCENES[name][:2]
-    scene = signature(getattr(import_module(f"contactopt.scenes.{module}"), function)).parameters
-    return [*own, *(argument for argument in scene if argument not in own)]
-
-
-def _made(name: str, entry: tuple[Any, ...], changes: dict[str, object]) -> Any:
-    """What the function of a table's entry makes; InputError for arguments that it does not take."""
-    module, function = entry[:2]
-    fixed = entry[-1] if isinstance(entry[-1], dict) else {}
-    make = getattr(import_module(f"contactopt.scenes.{module}"), function)
-    known = [argument for argument in _arguments(name, make) if argument not in fixed]
+    make = _maker(table[name])
+    fixed = table[name][-1] if isinstance(table[name][-1], dict) else {}
+    taken = {**signature(make).parameters, **signature(_maker(SCENES[name])).parameters}
+    named = [one.name for one in taken.values() if one.kind is not Parameter.VAR_KEYWORD]
+    known = [argument for argument in named if argument not in fixed]
     for argument in changes:
         if argument not in known:
+            near = meant(argument, [*known, "degree", "simplices", *OPTIONS])
             raise InputError(
                 f"scene '{name}' has no argument {argument!r}; its arguments are"
-                f" {', '.join(known)}, and degree and simplices of every scene."
+                f" {', '.join(known)}, and degree and simplices of every scene{near}"
             )
     try:
         return make(**fixed, **changes)
     except TypeError as error:
         raise InputError(f"scene '{name}': {error}.") from error
+
+
+def _maker(entry: tuple[Any, ...]) -> Callable[..., Any]:
+    """The function of a table's entry."""
+    make: Callable[..., Any] = getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1])
+    return make

@@ -12,15 +12,8 @@ from contactopt.files.toml_table import Table
 
 # names of units of length -> metres
 LENGTHS = {
-    "nm": 1e-9,
-    "um": 1e-6,
-    "mm": 1e-3,
-    "cm": 1e-2,
-    "m": 1.0,
-    "km": 1e3,
-    "in": 0.0254,
-    "ft": 0.3048,
-}
+    "nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048,
+}  # fmt: skip
 SHAPES = ("mesh", "block", "ring", "disc")
 # distance from the origin over the size of a body, beyond which rounding deforms its elements
 FAR = 1e6
@@ -32,22 +25,18 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
 
     Parameters
     ----------
-    body : The table of the body in a scene file.
-    folder : The folder to which names of mesh files are relative. Without one no mesh is made, and
-        the entries are only marked as known.
-    components : Names of the components of the scene, such as ('x', 'y').
-    length : The scene's unit of length, to which a mesh file's unit is converted.
+    body : the table of the body in a scene file
+    folder : to which names of mesh files are relative; without one no mesh is made, and the entries
+        are only marked as known
+    components : names of the components of the scene, such as ('x', 'y')
+    length : the scene's unit of length, to which a mesh file's unit is converted
 
     Returns
     -------
-    The scikit-fem mesh, or None without a folder.
-
-    Raises
-    ------
-    InputError : With the line of the table, where the shape is missing or does not fit the scene.
+    Mesh : of scikit-fem, or None without a folder
     """
-    group, move, places = body.text("group"), body.table("move"), body.table("boundaries")
-    unit, shapes = body.text("unit"), [shape for shape in SHAPES if body.has(shape)]
+    group, move, places = body.take("group", str), body.table("move"), body.table("boundaries")
+    unit, shapes = body.take("unit", str), [shape for shape in SHAPES if body.has(shape)]
     body.known.append("rigid")
     if folder is None:
         return None
@@ -62,13 +51,12 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         raise body.fail("'group' and 'unit' belong to a mesh file.", "group" if group else "unit")
     else:
         shape = body.table(shapes[0])
-        assert shape is not None
         if shapes[0] != "block" and len(components) != 2:
             raise shape.fail(f"a {shapes[0]} is plane; in space use a block or a mesh file.")
         mesh = {"block": _block, "ring": _ring, "disc": _disc}[shapes[0]](shape, components)
         shape.close()
     if move is not None:
-        step = [move.number(c, 0.0) for c in components]
+        step = [move.take(c, float, 0.0) for c in components]
         move.close()
         mesh = replace(mesh, doflocs=mesh.doflocs + np.array(step)[:, None])
         if np.abs(mesh.doflocs).max() > FAR * np.ptp(mesh.doflocs, axis=1).min():
@@ -99,7 +87,7 @@ def _scale(body: Table, unit: str | None, length: str) -> float:
 def _from_file(body: Table, folder: Path, group: str | None, scale: float) -> Any:
     from contactopt.meshes.mesh_files import load_mesh
 
-    name = body.text("mesh")
+    name = body.take("mesh", str)
     with body.about("group" if group else "mesh"):
         return load_mesh(folder / name, group, scale)
 
@@ -126,29 +114,23 @@ def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
 
 
 def _block(table: Table, components: tuple[str, ...]) -> Any:
-    from contactopt.meshes.structured import rename, tensor_mesh
+    from contactopt.meshes.structured import tensor_mesh
 
     sides = [_grid(table, c, f"two coordinates, [least {c}, largest {c}]") for c in components]
     counts = _counts(table, tuple(f"along {c}" for c in components))
     mesh = tensor_mesh(*(np.linspace(*side, count + 1) for side, count in zip(sides, counts)))
     own = {f"{new}{sign}": f"{old}{sign}" for new, old in zip(components, "xyz") for sign in "-+"}
     boundaries = {new: mesh.boundaries[old] for new, old in own.items()}
-    return (
-        replace(mesh, _boundaries=boundaries)
-        if boundaries.keys() != mesh.boundaries.keys()
-        else rename(mesh)
-    )
+    return replace(mesh, _boundaries=boundaries)
 
 
 def _ring(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.meshes.polar import ring
 
     radii = _grid(table, "radii", "two radii, [inner, outer]")
-    first, last = (
-        _grid(table, "angles", "two angles in degrees, [first, last]")
-        if table.has("angles")
-        else (0.0, 360.0)
-    )
+    first, last = 0.0, 360.0
+    if table.has("angles"):
+        first, last = _grid(table, "angles", "two angles in degrees, [first, last]")
     if radii[0] <= 0 or last - first > 360:
         raise table.fail(
             "the inner radius must be positive, and the angles at most 360 degrees apart."
@@ -162,12 +144,11 @@ def _ring(table: Table, components: tuple[str, ...]) -> Any:
 def _disc(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.meshes.polar import disc
 
-    radius = table.number("radius", needed=True, low=0.0)
-    (around,) = (
-        _counts(table, ("around",))
-        if isinstance(table.data.get("elements"), list)
-        else [table.take("elements", int, "a whole number", needed=True)]
-    )
+    radius = table.take("radius", float, needed=True, low=0.0)
+    if isinstance(table.data.get("elements"), list):
+        (around,) = _counts(table, ("around",))
+    else:
+        around = table.take("elements", int, needed=True)
     if around < 8 or around % 8 or around > 10_000:
         raise table.fail(
             "'elements' around a disc must be a multiple of 8, at most 10000.", "elements"
@@ -181,13 +162,12 @@ def _named(mesh: Any, places: Table, components: tuple[str, ...]) -> Any:
 
     for name in places.data:
         place = places.table(name)
-        assert place is not None
         limits = {}
         for axis, c in enumerate(components):
             if isinstance(place.data.get(c), list):
                 limits[axis] = _grid(place, c, f"one {c}, or two, [least, largest]")
             elif place.has(c):
-                value = place.number(c)
+                value = place.take(c, float)
                 limits[axis] = (value, value)
         place.close()
         with place.about():

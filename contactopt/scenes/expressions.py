@@ -16,25 +16,13 @@ from contactopt.errors import InputError
 
 LONGEST = 500  # characters
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    name: getattr(np, name)
-    for name in (
-        "sqrt",
-        "exp",
-        "log",
-        "sin",
-        "cos",
-        "tan",
-        "arctan2",
-        "abs",
-        "minimum",
-        "maximum",
-        "where",
-        "hypot",
-    )
-}
+    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "arctan2": np.arctan2, "abs": np.abs, "minimum": np.minimum, "maximum": np.maximum,
+    "where": np.where, "hypot": np.hypot,
+}  # fmt: skip
 OPERATORS: dict[type, Callable[..., Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: operator.pow,
-    ast.USub: operator.neg, ast.UAdd: operator.pos,
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos,
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
 
@@ -42,9 +30,7 @@ OPERATORS: dict[type, Callable[..., Any]] = {
 @dataclass(frozen=True)
 class Expression:
     """A function of points (dim, k) -> (k,), written in the names of their components, numbers, pi
-    and FUNCTIONS.
-
-    Raises InputError for text that is anything else.
+    and FUNCTIONS; InputError for text that is anything else.
     """
 
     text: str
@@ -58,13 +44,10 @@ class Expression:
             if len(self.text) > LONGEST:
                 raise SyntaxError(f"it has more than {LONGEST} characters")
             tree = ast.parse(self.text, mode="eval").body
+            names = dict(zip(self.components, np.array(points, dtype=float)))
             with np.errstate(all="ignore"):
-                names = dict(zip(self.components, np.array(points, dtype=float))) | {
-                    "pi": np.float64(np.pi)
-                }
-                value = np.broadcast_to(
-                    np.asarray(_value(tree, names), dtype=float), points.shape[1:]
-                )
+                made = np.asarray(_value(tree, names | {"pi": np.float64(np.pi)}), dtype=float)
+            value = np.broadcast_to(made, points.shape[1:])
         except (SyntaxError, TypeError, ValueError, RecursionError, MemoryError) as error:
             said = error.msg if isinstance(error, SyntaxError) else str(error)
             raise InputError(
@@ -82,27 +65,20 @@ def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
     """The value of a part of the expression; numbers are floating-point from the start, so that
     none grows without end.
     """
-    if (
-        isinstance(node, ast.Constant)
-        and isinstance(node.value, (int, float))
-        and not isinstance(node.value, bool)
-    ):
-        return np.float64(node.value) if abs(node.value) < 1e300 else np.float64(np.inf)
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        number: Any = node.value
+        return np.float64(number if abs(number) < 1e300 else np.inf)
     if isinstance(node, ast.Name) and node.id in names:
         return names[node.id]
-    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](_value(node.left, names), _value(node.right, names))
-    if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](_value(node.operand, names))
-    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in OPERATORS:
-        return OPERATORS[type(node.ops[0])](
-            _value(node.left, names), _value(node.comparators[0], names)
-        )
-    if (
-        isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Name)
-        and node.func.id in FUNCTIONS
-        and not node.keywords
-    ):
-        return FUNCTIONS[node.func.id](*(_value(part, names) for part in node.args))
-    raise SyntaxError(f"{ast.unparse(node)[:40]!r} is not known")
+    function, parts = None, []
+    if isinstance(node, ast.BinOp):
+        function, parts = OPERATORS.get(type(node.op)), [node.left, node.right]
+    elif isinstance(node, ast.UnaryOp):
+        function, parts = OPERATORS.get(type(node.op)), [node.operand]
+    elif isinstance(node, ast.Compare) and len(node.ops) == 1:
+        function, parts = OPERATORS.get(type(node.ops[0])), [node.left, *node.comparators]
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        function, parts = FUNCTIONS.get(node.func.id), node.args
+    if function is None:
+        raise SyntaxError(f"{ast.unparse(node)[:40]!r} is not known")
+    return function(*(_value(part, names) for part in parts))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from contactopt.analytic import (
@@ -12,10 +14,11 @@ from contactopt.analytic import (
     flat_punch_line,
     flat_punch_line_friction,
 )
-from contactopt.checks import check_number, check_positive
+from contactopt.checks import check_positive
 from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.scenes.common import GROWTH, RUBBER, UNITS
+from contactopt.meshes.structured import contact_grid, graded, patch, rename, tensor_mesh
+from contactopt.scenes.common import GROWTH, KINDS, RUBBER, check_choice, explained, model, one_of
 from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 
 EDGE = 1e-3  # first element at the edge of the rigid punch, over its half-width
@@ -24,6 +27,7 @@ RATIO = 1.4  # of its neighbouring elements: a mesh for quadratic displacements
 LARGE = {"plane-strain": 10000.0, "axisymmetric": 1000.0}
 
 
+@explained
 def flat_punch(
     dim: int = 2,
     *,
@@ -42,103 +46,63 @@ def flat_punch(
 ) -> Scene:
     """A block pressed on a foundation by a rigid plate glued to its top.
 
-    The foundation is clamped below.
-
-    Lengths are in mm, forces in N and Young's moduli in MPa.
-
     Parameters
     ----------
     dim : 2 for plane strain, of which half is modelled; 3 for a square block on a square
-        foundation, of which a quarter is modelled.
-    width, height : Of the block.
-    foundation_width, foundation_height : Of the foundation.
-    depth : Length of both bodies along the direction without strain, in plane strain.
-    upper, lower : Materials of the block and of the foundation.
-    mu : Friction coefficient.
-    force : Total force on the plate, positive in compression.
-    elements : Number of elements across the contact half-width.
-    rigid : None, 'punch' or 'foundation': that body is rigid.
-    bilateral : Whether contact cannot open.
+        foundation, of which a quarter is modelled
+    width, height : of the block [mm]
+    foundation_width, foundation_height : of the foundation, which is clamped below [mm]
+    rigid : None, 'punch' or 'foundation': that body is rigid
 
     Returns
     -------
-    Named 'punch-2d' or 'punch-3d'. In plane strain with a rigid punch it carries the frictionless
-    solution for a half-plane.
-
-    Raises
-    ------
-    InputError : If a size is not positive, the foundation is narrower than the block, or a choice
-        is unknown.
+    Scene : 'punch-2d' or 'punch-3d'. In plane strain with a rigid punch it carries the frictionless
+        solution for a half-plane
     """
-    if dim not in (2, 3):
-        raise InputError(f"dim must be 2 or 3; got {dim!r}.")
-    if rigid not in (None, "punch", "foundation"):
-        raise InputError(f"rigid must be None, 'punch' or 'foundation'; got {rigid!r}.")
-    check_positive(
-        width=width,
-        height=height,
-        foundation_width=foundation_width,
-        foundation_height=foundation_height,
-        depth=depth,
-    )
-    check_number("force", force, low=0.0)
+    check_choice("dim", dim, 2, 3)
+    check_choice("rigid", rigid, None, "punch", "foundation")
+    check_positive(width=width, height=height, depth=depth, force=force)
+    check_positive(foundation_width=foundation_width, foundation_height=foundation_height)
     if foundation_width < width:
         raise InputError(
             f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch"
             f" ({width:g})."
         )
-    a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
+    a, up = width / 2, "xyz"[dim - 1]
 
-    def punch_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.meshes.structured import contact_grid, graded, rename, tensor_mesh
+    def punch(elements: int, zone: float | None) -> Any:
+        mesh = _block(dim, a, elements, a, height)
+        return rename(mesh, contact=f"{up}-", top=f"{up}+")
 
-        rise = graded(height, a / elements, growth)
-        across = contact_grid(a, elements, a, growth)
-        mesh = tensor_mesh(*[across] * (dim - 1), rise)
-        return rename(
-            mesh,
-            contact=f"{up}-",
-            top=f"{up}+",
-            **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]},
-        )
-
-    def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.meshes.structured import contact_grid, graded, patch, rename, tensor_mesh
-
-        depth_grid = -graded(foundation_height, a / elements, growth)[::-1]
-        across = contact_grid(a, elements, foundation_width / 2, growth)
-        mesh = tensor_mesh(*[across] * (dim - 1), depth_grid)
-        mesh = rename(
-            mesh,
-            top=f"{up}+",
-            bottom=f"{up}-",
-            **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]},
-        )
+    def foundation(elements: int, zone: float | None) -> Any:
+        mesh = _block(dim, a, elements, foundation_width / 2, -foundation_height)
+        mesh = rename(mesh, top=f"{up}+", bottom=f"{up}-")
         return patch(mesh, "top", "contact", [a] * (dim - 1))
 
     symmetry = tuple(Support(f"symmetry {c}", {c: 0.0}) for c in "xy"[: dim - 1])
     load = {up: -force}
-    top: Part | Rigid = Rigid("punch", force=load)
-    if rigid != "punch":
-        top = Part("punch", punch_mesh, upper, symmetry, (Plate("top", load),))
-    bottom: Part | Rigid = Rigid("foundation")
-    if rigid != "foundation":
-        bottom = Part("foundation", foundation_mesh, lower, (*symmetry, Support("bottom")))
+    top = Part("punch", punch, upper, symmetry, (Plate("top", load),))
+    bottom = Part("foundation", foundation, lower, (*symmetry, Support("bottom")))
     return Scene(
         f"punch-{dim}d",
-        top,
-        bottom,
+        one_of(rigid, Rigid("punch", force=load), top),
+        one_of(rigid, Rigid("foundation"), bottom),
         mu,
-        kind="plane-strain" if dim == 2 else "solid",
-        thickness=depth if dim == 2 else 1.0,
-        copies=2 ** (dim - 1),
-        law="bilateral" if bilateral else "coulomb",
         elements=elements,
-        units=UNITS,
+        **model(KINDS[dim], depth, 2 ** (dim - 1), bilateral),
         reference=flat_punch_line(force / depth, a) if dim == 2 and rigid == "punch" else None,
     )
 
 
+def _block(dim: int, a: float, elements: int, half_width: float, height: float) -> Any:
+    """A block above a contact of half-width a, or with a negative height beneath it."""
+    rise = graded(abs(height), a / elements, GROWTH[dim])
+    grid = contact_grid(a, elements, half_width, GROWTH[dim])
+    mesh = tensor_mesh(*[grid] * (dim - 1), rise if height > 0 else -rise[::-1])
+    return rename(mesh, **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+
+
+@explained
 def rigid_punch(
     kind: str = "plane-strain",
     *,
@@ -151,42 +115,28 @@ def rigid_punch(
     elements: int = 64,
     bilateral: bool = False,
 ) -> Scene:
-    """A rigid flat punch, strip or disc, pressed on a half-space.
-
-    This is Spence's problem where friction acts.
+    """A rigid flat punch, strip or disc, pressed on a half-space: Spence's problem with friction.
 
     The solution is self-similar as the load grows, so that one static step from the unloaded state
     is exact. The half-space is a block that is clamped below. Its elements shrink to 1e-3 of the
     half-width towards the edge of the punch, where the tractions are singular, and displacements
     are quadratic. With linear ones and as many unknowns, the stick zone has three times the error
-    (reports/accuracy/report.md). Lengths are in mm, forces in N and Young's moduli in MPa.
+    (reports/accuracy/report.md).
 
     Parameters
     ----------
-    kind : 'plane-strain' for a strip, 'axisymmetric' for a disc.
-    half_width : Of the strip, or radius of the disc.
-    foundation : Height of the block and its width from the axis. By default 10,000 half-widths in
+    kind : 'plane-strain' for a strip, 'axisymmetric' for a disc
+    half_width : of the strip, or radius of the disc [mm]
+    foundation : height of the block and its width from the axis. By default 10,000 half-widths in
         plane strain, where the size stretches the contact by a strain of about half_width /
-        foundation, and 1,000 radii of a disc, which makes the approach .2 % too small.
-    depth : Length of the strip.
-    lower : Material of the half-space.
-    mu : Friction coefficient.
-    force : Total force on the punch, positive in compression.
-    elements : Number of elements across the half-width.
-    bilateral : Whether contact cannot open.
+        foundation, and 1,000 radii of a disc, which makes the approach .2 % too small
 
     Returns
     -------
-    Named 'rigid-punch-2d' or 'rigid-punch-axisymmetric', with the exact solution unless contact is
-    bilateral.
-
-    Raises
-    ------
-    InputError : If a size is not positive, the foundation is smaller than two half-widths, or the
-        kind is unknown.
+    Scene : 'rigid-punch-2d' or 'rigid-punch-axisymmetric', with the exact solution unless contact
+        is bilateral
     """
-    if kind not in LARGE:
-        raise InputError(f"kind must be one of {', '.join(LARGE)}; got {kind!r}.")
+    check_choice("kind", kind, *LARGE)
     size = LARGE[kind] * half_width if foundation is None else foundation
     check_positive(half_width=half_width, foundation=size, depth=depth, force=force)
     if size < 2 * half_width:
@@ -194,11 +144,10 @@ def rigid_punch(
             f"the foundation ({size:g}) must be at least two half-widths ({2 * half_width:g})"
             " large."
         )
-    across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
+    plane = kind == "plane-strain"
+    across, up = ("x", "y") if plane else ("r", "z")
 
-    def mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
-
+    def mesh(elements: int, zone: float | None) -> Any:
         first = EDGE * half_width
         contact = _towards_edge(half_width, elements, first)
         beyond = half_width + graded(size - half_width, first, RATIO)[1:]
@@ -206,19 +155,14 @@ def rigid_punch(
         block = rename(block, axis="x-", bottom="y-", top="y+")
         return patch(block, "top", "contact", [half_width])
 
-    plane = kind == "plane-strain"
     return Scene(
         "rigid-punch-2d" if plane else "rigid-punch-axisymmetric",
         Rigid("punch", force={up: -force}),
         Part("foundation", mesh, lower, (Support("axis", {across: 0.0}), Support("bottom"))),
         mu,
-        kind=kind,
-        thickness=depth if plane else 1.0,
-        copies=2 if plane else 1,
-        law="bilateral" if bilateral else "coulomb",
         elements=elements,
         degree=2,
-        units=UNITS,
+        **model(kind, depth, 2 if plane else 1, bilateral),
         reference=None if bilateral else _exact(kind, force, half_width, depth, lower, mu),
     )
 

@@ -5,7 +5,7 @@ and sheared.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,15 +16,15 @@ from contactopt.analytic import (
     tangential_modulus,
 )
 from contactopt.checks import check_count, check_number, check_positive
-from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.scenes.common import RUBBER, UNITS
+from contactopt.scenes.common import RUBBER, UNITS, check_shear, explained, upper_of
 from contactopt.scenes.rough_surfaces import self_affine
 from contactopt.scenes.scene import HalfSpace, Rigid, Scene
 
 WIDE = 1.25  # half side of the square of points, over the contact radius of Hertz
 
 
+@explained
 def hertz_half_space(
     *,
     radius: float = 400.0,
@@ -36,32 +36,22 @@ def hertz_half_space(
     """A rigid sphere, in Hertz's approximation a paraboloid, pressed on a half-space without a
     mesh.
 
-    Lengths are in mm, forces in N and stresses in MPa.
-
     Parameters
     ----------
-    radius : Of the sphere.
-    material : Of the half-space.
-    mu : Friction coefficient.
-    force : Total force on the sphere, positive in compression.
-    elements : Number of points across the contact radius.
+    radius : of the sphere [mm]
+    elements : number of points across the contact radius
 
     Returns
     -------
-    With Hertz's solution, which is exact for mu = 0.
-
-    Raises
-    ------
-    InputError : If a size is not positive.
+    Scene : 'hertz-half-space', with Hertz's solution, which is exact for mu = 0
     """
     check_positive(radius=radius, force=force)
     hertz = hertz_point(force, radius, contact_modulus(material))
+    points = _square(WIDE * hertz.half_width, hertz.half_width)
     return Scene(
         "hertz-half-space",
-        Rigid(
-            "sphere", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / (2 * radius), force={"z": -force}
-        ),
-        HalfSpace("half-space", material, _square(WIDE * hertz.half_width, hertz.half_width)),
+        Rigid("sphere", gap=_paraboloid(radius), force={"z": -force}),
+        HalfSpace("half-space", material, points),
         mu,
         kind="solid",
         law="coulomb" if mu else "frictionless",
@@ -71,6 +61,7 @@ def hertz_half_space(
     )
 
 
+@explained
 def cattaneo_half_space(
     *,
     radius: float = 400.0,
@@ -84,49 +75,37 @@ def cattaneo_half_space(
     pushed sideways.
 
     Normal and tangential tractions do not disturb each other because the materials are the same.
-    Put on at once, the loads give the same answer as one after the other. Lengths are in mm, forces
-    in N and stresses in MPa.
+    Put on at once, the loads give the same answer as one after the other.
 
     Parameters
     ----------
-    radius : Of the sphere.
-    material : Of both bodies. With nu = 0 the solution of Cattaneo and Mindlin is exact; otherwise
-        slip is not everywhere along the shear.
-    mu : Friction coefficient.
-    force : Total normal force, positive in compression.
-    shear : Total tangential force.
-    elements : Number of points across the contact radius.
+    radius : of the sphere [mm]
+    material : of both bodies. With nu = 0 the solution of Cattaneo and Mindlin is exact; otherwise
+        slip is not everywhere along the shear
+    shear : total tangential force [N]
+    elements : number of points across the contact radius
 
     Returns
     -------
-    With the solution of Cattaneo and Mindlin.
-
-    Raises
-    ------
-    InputError : If a size is not positive, or the shear is beyond the friction bound.
+    Scene : 'cattaneo-half-space', with the solution of Cattaneo and Mindlin
     """
     check_positive(radius=radius, force=force)
     check_number("shear", shear)
-    if abs(shear) >= mu * force:
-        raise InputError(
-            f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies slide"
-            " off."
-        )
+    check_shear(shear, mu, force)
     modulus = contact_modulus(material, material)
     hertz = hertz_point(force, radius, modulus)
     points = _square(WIDE * hertz.half_width, hertz.half_width)
-    reference = hertz
+    paraboloid, reference = _paraboloid(radius), hertz
     if shear:
-        reference = hertz_point_tangential(
-            force, radius, modulus, tangential_modulus(material, material), mu, [shear]
-        )
+        along = tangential_modulus(material, material)
+        reference = hertz_point_tangential(force, radius, modulus, along, mu, [shear])
     return Scene(
         "cattaneo-half-space",
         HalfSpace(
             "sphere",
             material,
             points,
-            height=lambda x: -np.sum(x**2, axis=0) / (2 * radius),
+            height=lambda x: -paraboloid(x),
             force={"x": shear, "z": -force},
         ),
         HalfSpace("flat", material, points),
@@ -138,6 +117,7 @@ def cattaneo_half_space(
     )
 
 
+@explained
 def rough(
     *,
     points: int = 128,
@@ -153,30 +133,23 @@ def rough(
     periodic: bool = True,
 ) -> Scene:
     """A rigid self-affine rough surface pressed on a half-space by a mean pressure, then displaced
-    along x.
+    along x: 'rough'.
 
-    rough_sliding() makes the path on which the shift grows until all contacts slip. Lengths are in
-    mm, forces in N and stresses in MPa.
+    rough_sliding() makes the path on which the shift grows until all contacts slip.
 
     Parameters
     ----------
-    points : Number of points along each side of the square.
-    length : Of each side.
-    hurst, shortest, slope, seed : As for contactopt.scenes.rough_surfaces.self_affine(); by default
-        `shortest` is a sixteenth of the length.
-    material : Of the half-space.
-    mu : Friction coefficient.
-    pressure : Mean pressure on the square.
-    shift : Displacement of the rough surface along x.
-    periodic : Whether surface and tractions repeat themselves beyond the square.
+    points : number of points along each side of the square
+    length : of each side [mm]
+    hurst, shortest, slope, seed : as for contactopt.scenes.rough_surfaces.self_affine(); by default
+        `shortest` is a sixteenth of the length
+    pressure : mean pressure on the square [MPa]
+    shift : displacement of the rough surface along x [mm]
+    periodic : whether surface and tractions repeat themselves beyond the square
 
     Returns
     -------
-    On a square grid of points.
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
+    Scene : on a square grid of points
     """
     check_count("points", points)
     check_positive(length=length, pressure=pressure)
@@ -186,15 +159,10 @@ def rough(
         (points, points), (length, length), hurst=hurst, shortest=shortest, slope=slope, seed=seed
     )
     ticks = (np.arange(points) + 0.5) * (length / points) - length / 2
-    force = -pressure * length**2
+    force = {"z": -pressure * length**2}
     return Scene(
         "rough",
-        Rigid(
-            "rough surface",
-            gap=heights.max() - heights,
-            force={"z": force},
-            displacement={"x": shift},
-        ),
+        Rigid("rough surface", None, heights.max() - heights, force, {"x": shift}),
         HalfSpace("half-space", material, (ticks, ticks), periodic=periodic),
         mu,
         kind="solid",
@@ -210,34 +178,37 @@ def rough_sliding(
 
     Parameters
     ----------
-    steps : Number of states after the first one.
-    shift : Of the last state. By default 1.5 times the shift at which contacts slip everywhere if
+    steps : number of states after the first one
+    shift : of the last state. By default 1.5 times the shift at which contacts slip everywhere if
         the highest summit is flattened to the mean height: tangential and normal displacements at
-        full sliding are about as mu (2 - nu) to 2 (1 - nu) (Ciavarella 1998, Jaeger 1998).
-    changes : Arguments of rough().
+        full sliding are about as mu (2 - nu) to 2 (1 - nu) (Ciavarella 1998, Jaeger 1998)
+    changes : arguments of rough()
 
     Returns
     -------
-    The states in their order.
+    tuple of Scene : the states in their order
     """
     check_count("steps", steps)
     first = rough(**changes)  # type: ignore[arg-type]
-    upper, lower = first.upper, first.lower
-    assert isinstance(upper, Rigid) and isinstance(lower, HalfSpace)
     if shift is None:
-        nu, mu = (
-            lower.material.nu,
-            0.0 if callable(first.mu) or first.mu is None else float(np.max(first.mu)),
-        )
-        shift = 1.5 * mu * (2 - nu) / (2 - 2 * nu) * float(np.mean(upper.gap))  # type: ignore[arg-type]
+        given: Any = first.mu
+        surface: Any = first.upper
+        half_space: Any = first.lower
+        mu, nu = 0.0 if callable(given) else float(np.max(given)), half_space.material.nu
+        shift = 1.5 * mu * (2 - nu) / (2 - 2 * nu) * float(np.mean(surface.gap))
     at = np.linspace(0.0, shift, steps + 1)
-    return tuple(replace(first, upper=replace(upper, displacement={"x": float(x)})) for x in at)
+    return tuple(upper_of(first, displacement={"x": float(x)}) for x in at)
+
+
+def _paraboloid(radius: float) -> Callable[[np.ndarray], np.ndarray]:
+    """The height of a sphere's surface over its lowest point, at points (dim, k)."""
+    return lambda x: np.sum(x[:2] ** 2, axis=0) / (2 * radius)
 
 
 def _square(
     reach: float, radius: float
 ) -> Callable[[int, float | None], tuple[np.ndarray, np.ndarray]]:
-    """Points on a square |x|, |y| < reach about the origin, `elements` of them across the radius."""
+    """Points on a square |x|, |y| < reach about the origin, `elements` across the radius."""
 
     def points(elements: int, zone: float | None) -> tuple[np.ndarray, np.ndarray]:
         half = max(2, int(np.ceil(reach / radius * elements)))

@@ -20,17 +20,17 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
 
     Parameters
     ----------
-    scene : The scene, which stays as it is.
-    elements : Number across the contact half-width, for which the meshes are made.
-    splits : How often they are halved.
+    scene : the scene, which stays as it is
+    elements : number across the contact half-width, for which the meshes are made
+    splits : how often they are halved
 
     Returns
     -------
-    The scene with these meshes, whatever number of elements it is asked for.
+    Scene : with these meshes, whatever number of elements it is asked for
     """
 
     def finer(part: Any) -> Any:
-        if not isinstance(part, Part):
+        if not part.meshed:
             return part
 
         def mesh(_: int, zone: float | None) -> Any:
@@ -55,13 +55,12 @@ def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
 
     Parameters
     ----------
-    part : The part.
-    mesh : Its mesh.
+    part, mesh : the part and its mesh
 
     Returns
     -------
-    By the name of a boundary its curve: the one that the part gives, or that of the mesh. The name
-    '' stands for what has no name.
+    dict : by the name of a boundary, or '' for what has no name, the curve that the part gives, or
+        that of the mesh
     """
     found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
     return {name: curve for name, curve in found.items() if curve is not None}

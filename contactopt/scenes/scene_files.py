@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.checks import meant
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
 from contactopt.material import Material
+from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.expressions import Expression
@@ -30,11 +32,6 @@ from contactopt.scenes.scene import (
     Support,
     Traction,
 )
-
-# texts, as for contactopt.run
-SOLVE = ("method", "normal", "tangential", "preconditioner", "Q", "solver", "quantity")
-
-BOUNDS = ("tol", "accuracy", "time_limit", "max_memory")  # positive numbers, as for contactopt.run
 
 
 @dataclass(frozen=True)
@@ -57,16 +54,39 @@ class SceneFile:
 
         Parameters
         ----------
-        error : An error that may name a body or contact.
+        error : an error that may name a body or contact
 
         Returns
         -------
-        The error with the name of the file, and with the line of the body or contact that it names.
+        InputError : with the name of the file, and the line of the body or contact that it names
         """
         for name, line in self.lines.items():
             if f"'{name}'" in str(error):
                 return InputError(f"{self.name}, line {line}: {error}")
         return InputError(f"{self.name}: {error}")
+
+    def changed(self, changes: dict[str, Any]) -> tuple[Scene, ...]:
+        """Give the states another degree of the displacement.
+
+        Parameters
+        ----------
+        changes : {'degree': 1 or 2}, or nothing
+
+        Returns
+        -------
+        tuple of Scene
+
+        Raises
+        ------
+        InputError : for any other change: a scene file says everything itself
+        """
+        for key in changes:
+            if key != "degree":
+                raise InputError(
+                    f"a scene file says everything itself; change {key!r} there, or give the"
+                    f" degree alone{meant(key, OPTIONS)}"
+                )
+        return tuple(replace(state, **changes) for state in self.states)
 
 
 @dataclass
@@ -95,15 +115,15 @@ def read_scene_file(path: str | Path) -> SceneFile:
 
     Parameters
     ----------
-    path : A TOML file. The names of mesh files in it are relative to its folder.
+    path : a TOML file; the names of mesh files in it are relative to its folder
 
     Returns
     -------
-    The states of the scene, one unless it is a load path, and how they are solved.
+    SceneFile : the states of the scene, one unless it is a load path, and how they are solved
 
     Raises
     ------
-    InputError : With the line of the first mistake and what to write instead.
+    InputError : with the line of the first mistake and what to write instead
     """
     path = Path(path)
     table = read_table(path)
@@ -132,16 +152,13 @@ def read_scene_file(path: str | Path) -> SceneFile:
 def _scene(
     path: Path, top: Table, reading: _Reading | None
 ) -> tuple[Scene, dict[str, Any], _Reading]:
-    kind = top.text("kind", "plane-strain")
+    kind = top.take("kind", str, "plane-strain")
     if kind not in COMPONENTS:
         raise top.fail(f"there is no kind {kind!r}; choose from {', '.join(COMPONENTS)}.", "kind")
     units = top.table("units")
-    length, stress = (
-        (units.text(key, needed=True) for key in ("length", "stress"))
-        if units
-        else ("length", "stress")
-    )
+    length, stress = "length", "stress"
     if units:
+        length, stress = (units.take(key, str, needed=True) for key in ("length", "stress"))
         units.close()
     reading = reading or _Reading(path.parent, kind, length)
     bodies = top.table("bodies")
@@ -154,60 +171,51 @@ def _scene(
             "there are no contacts; add a table [[contacts]] for each pair of surfaces that may"
             " touch."
         )
-    contacts = tuple(_contact(pair, parts, reading) for pair in pairs)
-    curved = any(
-        isinstance(part, Part) and part.mesh.p.shape[1] != part.mesh.nvertices for part in parts
-    )
+    meshes = reading.meshes.values()
+    curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
     changes = {
-        "thickness": top.number("thickness", 1.0, low=0.0),
-        "name": top.text("name", path.stem),
+        "contacts": tuple(_contact(pair, parts, reading) for pair in pairs),
+        "thickness": top.take("thickness", float, 1.0, low=0.0),
+        "name": top.take("name", str, path.stem),
+        "mirror": top.take("mirror", str, "") or None,
     }
-    for key, usual in (("copies", 1), ("degree", 2 if curved else 1)):
-        changes[key] = top.take(key, int, "a whole number", usual)
-        if not 1 <= changes[key] <= (2 if key == "degree" else 1000):
-            raise top.fail(
-                f"{key} must be {'1 or 2' if key == 'degree' else 'at least 1'}; got"
-                f" {changes[key]}.",
-                key,
-            )
-    changes["mirror"] = top.text("mirror", "") or None
+    for key, usual, most, valid in (
+        ("copies", 1, 1000, "at least 1"),
+        ("degree", 2 if curved else 1, 2, "1 or 2"),
+    ):
+        changes[key] = top.take(key, int, usual)
+        if not 1 <= changes[key] <= most:
+            raise top.fail(f"{key} must be {valid}; got {changes[key]}.", key)
     solve = _solve(top.table("solve"))
     top.close()
     with top.about():
-        scene = Scene(
-            kind=kind, units=(length, stress), bodies=tuple(parts), contacts=contacts, **changes
-        )
+        scene = Scene(kind=kind, units=(length, stress), bodies=tuple(parts), **changes)
     return scene, solve, reading
 
 
 def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
     body = bodies.table(name)
-    assert body is not None
     rigid = body.table("rigid")
     if rigid is not None:
         body.close()
         with rigid.about():
             return _rigid(name, rigid, reading)
-    if name not in reading.meshes:
-        reading.meshes[name] = make_mesh(body, reading.folder, reading.components, reading.length)
-    else:
-        make_mesh(body, None, reading.components, reading.length)
-    mesh = reading.meshes[name]
+    folder = None if name in reading.meshes else reading.folder
+    made_mesh = make_mesh(body, folder, reading.components, reading.length)
+    mesh = reading.meshes.setdefault(name, made_mesh)
     material = body.table("material")
     if material is None:
         raise body.fail(f"body '{name}' has no material; add material = {{ E = ..., nu = ... }}.")
     with material.about():
-        made = Material(material.number("E", needed=True), material.number("nu", needed=True))
+        made = Material(*(material.take(key, float, needed=True) for key in ("E", "nu")))
     material.close()
     supports = tuple(_support(table, mesh, reading) for table in body.tables("supports"))
     loads: list[Any] = [_traction(table, mesh, reading) for table in body.tables("tractions")]
     loads += [_plate(table, mesh, reading) for table in body.tables("plates")]
     force = body.table("body_force")
     if force is not None:
-        values = _components(force, reading)
-        force.close()
-        loads.append(BodyForce(tuple(values.get(c, 0.0) for c in reading.components)))
-    contact = body.text("contact", "contact")
+        loads.append(BodyForce(_vector(_components(force, reading, whole=True), reading)))
+    contact = body.take("contact", str, "contact")
     if body.has("contact"):
         _boundary(body, "contact", mesh)
     curve = _curve(body.table("curve"), reading)
@@ -218,7 +226,7 @@ def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
 
 def _rigid(name: str, table: Table, reading: _Reading) -> Rigid:
     normal, force = table.table("normal"), table.table("force")
-    values = None if normal is None else _components(normal, reading)
+    values = None if normal is None else _components(normal, reading, whole=True)
     if values is not None and not any(values.values()):
         raise table.fail(
             "the normal is zero; give the direction that points out of the rigid body.", "normal"
@@ -227,41 +235,42 @@ def _rigid(name: str, table: Table, reading: _Reading) -> Rigid:
     table.close()
     return Rigid(
         name,
-        None if values is None else tuple(values.get(c, 0.0) for c in reading.components),
+        None if values is None else _vector(values, reading),
         (lambda x: np.full(x.shape[1], gap)) if isinstance(gap, (int, float)) else gap,
         None if force is None else _components(force, reading, whole=True),
     )
 
 
 def _support(table: Table, mesh: Any, reading: _Reading) -> Support:
-    boundary = _boundary(table, "boundary", mesh)
-    values = _components(table, reading)
+    boundary, values = _boundary(table, "boundary", mesh), _components(table, reading)
     table.close()
     return Support(boundary, values or None)
 
 
 def _traction(table: Table, mesh: Any, reading: _Reading) -> Traction:
-    boundary = _boundary(table, "boundary", mesh)
-    values = _components(table, reading)
+    boundary, values = _boundary(table, "boundary", mesh), _components(table, reading)
     if not values:
         raise table.fail(
             f"a traction needs a value for at least one of {', '.join(reading.components)}."
         )
     table.close()
-    return Traction(boundary, tuple(values.get(c, 0.0) for c in reading.components))
+    return Traction(boundary, _vector(values, reading))
 
 
 def _plate(table: Table, mesh: Any, reading: _Reading) -> Plate:
-    boundary = _boundary(table, "boundary", mesh)
-    force = table.table("force")
+    boundary, force = _boundary(table, "boundary", mesh), table.table("force")
     if force is None:
         raise table.fail(
             f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the"
             " whole body."
         )
-    glued = table.take("glued", bool, "true or false", True)
+    glued = table.take("glued", bool, True)
     table.close()
     return Plate(boundary, _components(force, reading, whole=True), glued)
+
+
+def _vector(values: dict[str, float], reading: _Reading) -> tuple[float, ...]:
+    return tuple(values.get(c, 0.0) for c in reading.components)
 
 
 def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[str, float]:
@@ -271,9 +280,8 @@ def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[st
     found = {}
     for key in reading.components:
         if isinstance(table.data.get(key), list):
-            values = table.numbers(
-                key, None, "a number, or an array of the numbers in the states of a load path"
-            )
+            what = "a number, or an array of the numbers in the states of a load path"
+            values = table.numbers(key, None, what)
             if not values:
                 raise table.fail(
                     f"{key!r} is an empty array; give a number for every state of the load path.",
@@ -283,14 +291,14 @@ def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[st
                 reading.lengths.append((len(values), table, key))
             found[key] = values[min(reading.state, len(values) - 1)]
         elif table.has(key):
-            found[key] = table.number(key)
+            found[key] = table.take(key, float)
     if whole:
         table.close()
     return found
 
 
 def _boundary(table: Table, key: str, mesh: Any) -> str:
-    name = table.text(key, needed=True)
+    name = table.take(key, str, needed=True)
     known = mesh.boundaries or {}
     if name not in known:
         raise table.fail(
@@ -300,15 +308,13 @@ def _boundary(table: Table, key: str, mesh: Any) -> str:
 
 
 def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Projection on the circle or sphere around a centre, or, with fewer components, on a cylinder."""
+    """Projection on the circle or sphere around a centre; with fewer components, on a cylinder."""
     if table is None:
         return None
-    radius, place = table.number("radius", needed=True, low=0.0), table.table("centre")
-    centre = (
-        dict.fromkeys(reading.components, 0.0)
-        if place is None
-        else _components(place, reading, whole=True)
-    )
+    radius, place = table.take("radius", float, needed=True, low=0.0), table.table("centre")
+    centre = dict.fromkeys(reading.components, 0.0)
+    if place is not None:
+        centre = _components(place, reading, whole=True)
     table.close()
     axes = [reading.components.index(c) for c in centre]
     middle = np.array(list(centre.values()))[:, None]
@@ -324,23 +330,21 @@ def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.
 
 def _function(table: Table, key: str, reading: _Reading, needed: bool = False) -> Any:
     """A number, or a function of the place from an expression; None if there is none."""
-    value = table.take(
-        key, (int, float, str), 'a number, or a text like "0.3 + 0.1 * x"', needed=needed
-    )
-    if isinstance(value, str):
+    what = 'a number, or a text like "0.3 + 0.1 * x"'
+    if isinstance(table.data.get(key), str):
         with table.about(key):
-            return Expression(value, reading.components)
-    return table.number(key)
+            return Expression(table.take(key, str), reading.components)
+    return table.take(key, float, needed=needed, what=what)
 
 
 def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Contact:
     named = {part.name: part for part in parts}
     for side in ("upper", "lower"):
-        body, _, surface = table.text(side, needed=True).partition(":")
+        body, _, surface = table.take(side, str, needed=True).partition(":")
         if body not in named:
             raise table.fail(f"there is no body '{body}'; the bodies are {', '.join(named)}.", side)
-        part = named[body]
-        if isinstance(part, Part):
+        part: Any = named[body]
+        if part.meshed:
             boundaries = part.mesh.boundaries or {}
             if (surface or part.contact) not in boundaries:
                 raise table.fail(
@@ -349,50 +353,25 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
                     side,
                 )
     mu = _function(table, "mu", reading, needed=True)
-    texts = {key: table.text(key) for key in ("law", "coupling", "carrier")}
+    texts = {key: table.take(key, str) for key in ("law", "coupling", "carrier")}
     given = {key: value for key, value in texts.items() if value is not None}
     with table.about():
-        made = Contact(table.text("upper"), table.text("lower"), mu, **given)
+        made = Contact(table.take("upper", str), table.take("lower", str), mu, **given)
     table.close()
     return made
 
 
 def _solve(table: Table | None) -> dict[str, Any]:
+    """The options of a run that the file gives."""
+    found: dict[str, Any] = {}
     if table is None:
-        return {}
-    found = {key: table.text(key) for key in SOLVE} | {
-        key: table.number(key, low=0.0) for key in BOUNDS
-    }
-    found["max_unknowns"] = table.take("max_unknowns", int, "a whole number")
-    found["adaptive"] = table.take("adaptive", bool, "true or false")
-    if (found["accuracy"] is None) != (found["quantity"] is None):
-        raise table.fail(
-            "'accuracy' and 'quantity' belong together: the bound, and the name of what it bounds."
-        )
+        return found
+    for key in IN_FILES:
+        kind = OPTIONS[key].metadata["kind"]
+        limits: dict[str, Any] = {"low": 0.0} if kind is float else {}
+        if table.has(key):
+            found[key] = table.take(key, kind, **limits)
     table.close()
-    return {key: value for key, value in found.items() if value is not None}
-
-
-def with_degree(file: SceneFile, changes: dict[str, Any]) -> tuple[Scene, ...]:
-    """Give the states of a scene file another degree of the displacement.
-
-    Parameters
-    ----------
-    file : The scene file.
-    changes : {'degree': 1 or 2}, or nothing.
-
-    Returns
-    -------
-    The states with the changes.
-
-    Raises
-    ------
-    InputError : For any other change: a scene file says everything itself.
-    """
-    for key in changes:
-        if key != "degree":
-            raise InputError(
-                f"a scene file says everything itself; change {key!r} there, or give the degree"
-                " alone."
-            )
-    return tuple(replace(state, **changes) for state in file.states)
+    if ("accuracy" in found) != ("quantity" in found):  # the other options may stand alone here
+        raise table.fail(TOGETHER)
+    return found

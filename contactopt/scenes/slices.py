@@ -27,30 +27,27 @@ def sliced(scene: Scene, name: str, count: int, axis: int = -1) -> Scene:
 
     Parameters
     ----------
-    scene : A scene with that body. Its mesh must have layers of elements across the axis, as
-        structured meshes have.
-    name : The name of the body.
-    count : Number of slices.
-    axis : Number of the coordinate, from 0; -1 is the last one. Every surface of the body that
-        contacts or plates use must lie in one slice.
+    scene, name : a scene, and the name of the body. Its mesh must have layers of elements across
+        the axis, as structured meshes have
+    count : number of slices
+    axis : number of the coordinate, from 0; -1 is the last one. Every surface of the body that
+        contacts or plates use must lie in one slice
 
     Raises
     ------
-    InputError : For a body that is not there, not elastic, or cannot be cut like this.
+    InputError : for a body that is not there, not elastic, or cannot be cut like this
     """
     check_count("the number of slices", count)
-    part = next(
-        (part for part in scene.parts if part.name == name and isinstance(part, Part)), None
-    )
-    if part is None:
+    found: list[Any] = [part for part in scene.parts if part.name == name and part.meshed]
+    if not found:
         raise InputError(f"scene '{scene.name}' has no elastic body named '{name}' to be sliced.")
+    (part,) = found
     if count == 1:
         return scene
     meshes = [_slice(part, count, axis, i)(scene.elements, scene.zone) for i in range(count)]
     slices = tuple(_sliced_part(part, count, axis, i, mesh) for i, mesh in enumerate(meshes))
-    used = {load.boundary for load in part.loads if isinstance(load, Plate)} | set(
-        scene.surfaces_of(part)
-    )
+    plates = {load.boundary for load in part.loads if isinstance(load, Plate)}
+    used = plates | set(scene.surfaces_of(part))
     home = {boundary: _home(name, boundary, meshes) for boundary in used}
 
     def renamed(side: str) -> str:
@@ -58,25 +55,15 @@ def sliced(scene: Scene, name: str, count: int, axis: int = -1) -> Scene:
         boundary = surface or part.contact
         return side if body != name else f"{slices[home[boundary]].name}:{boundary}"
 
-    pairs = tuple(
+    pairs = [
         replace(pair, upper=renamed(pair.upper), lower=renamed(pair.lower)) for pair in scene.pairs
-    )
-    ties = tuple(
-        Contact(
-            f"{slices[i].name}:cut {i}", f"{slices[i - 1].name}:cut {i}", 0.0, "tied", "matching"
-        )
-        for i in range(1, count)
-    )
+    ]
+    for i in range(1, count):
+        upper, lower = (f"{slices[side].name}:cut {i}" for side in (i, i - 1))
+        pairs.append(Contact(upper, lower, 0.0, "tied", "matching"))
     bodies = [own for other in scene.parts for own in (slices if other is part else (other,))]
-    return replace(
-        scene,
-        upper=None,
-        lower=None,
-        mu=None,
-        law="coulomb",
-        bodies=tuple(bodies),
-        contacts=(*pairs, *ties),
-    )
+    long: dict[str, Any] = {"bodies": tuple(bodies), "contacts": tuple(pairs)}
+    return replace(scene, upper=None, lower=None, mu=None, law="coulomb", **long)
 
 
 def _home(body: str, boundary: str, meshes: list[Any]) -> int:
@@ -96,17 +83,14 @@ def _sliced_part(part: Part, count: int, axis: int, number: int, mesh: Any) -> P
 
     supports = tuple(item for item in part.supports if there(item))
     loads = tuple(item for item in part.loads if there(item))
-    name = f"{part.name}-{number + 1}"
-    contact = (
-        part.contact if len(mesh.boundaries.get(part.contact, ())) else f"cut {max(number, 1)}"
-    )
+    here = len(mesh.boundaries.get(part.contact, ())) > 0
     return replace(
         part,
-        name=name,
+        name=f"{part.name}-{number + 1}",
         mesh=_slice(part, count, axis, number),
         supports=supports,
         loads=loads,
-        contact=contact,
+        contact=part.contact if here else f"cut {max(number, 1)}",
     )
 
 

@@ -37,6 +37,7 @@ from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.files.writing import whole_folder
+from contactopt.methods.driver import TOL
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_edge, stick_edge
@@ -233,7 +234,7 @@ def follow(
     """
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
-    method, tol = settings.pop("method", None), settings.pop("tol", 1e-8)
+    method, tol = settings.pop("method", None), settings.pop("tol", TOL)
     return _follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
 
 

@@ -21,7 +21,7 @@ from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.errors import InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
-from contactopt.methods.driver import solve
+from contactopt.methods.driver import TOL, solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.transfer import transfer
@@ -56,7 +56,7 @@ class Options:
     Q: str = "auto"
     solver: str = "auto"
     method: str | Method | None = None
-    tol: float = 1e-8
+    tol: float = TOL
     settings: Mapping[str, Any] = field(default_factory=dict)
     note: Note = lambda text: None
 

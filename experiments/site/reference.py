@@ -37,6 +37,8 @@ ROOMS = {
         " reports."
     ),
     "figures": "Results are drawn here.",
+    "outcome": "What a run found, before anything is drawn of it.",
+    "run_options": "The options of a run are declared once, for Python, command line and files.",
     "simplification": (
         "What may be left out of a scene is found here, and proved by the whole scene."
     ),

@@ -1,12 +1,8 @@
-"""The result of a run: the solution with its interface problem, the fields of the bodies, and a
-summary.
-"""
+"""What a run found, before anything is drawn of it."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,18 +10,16 @@ import numpy as np
 from contactopt.cards import card, count, line
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
-from contactopt.figures.output import PAGE, squeeze, write
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
-from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Outcome:
     """A solved scene.
 
     `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
@@ -34,8 +28,8 @@ class Result:
     contactopt.solving.solve_scene), `recover` of the fields, `figures` and `files` where some were
     asked for, and `total` of the whole run.
 
-    `path` holds all states of a scene that has a load path; the rest of the result is then that of
-    the last state. `estimate` is what refinement to an asked accuracy found.
+    `path` holds all states of a scene that has a load path; the rest is then that of the last
+    state. `estimate` is what refinement to an asked accuracy found.
     """
 
     scene: Scene
@@ -50,17 +44,9 @@ class Result:
     def __repr__(self) -> str:
         s = self.summary
         states = "" if self.path is None else count(len(self.path.states), "state")
-        contacts = count(s["contact_nodes"], "contact")
+        contacts, residual = count(s["contact_nodes"], "contact"), f"residual {s['residual']:.1e}"
         aim = "" if self.estimate is None else repr(self.estimate)
-        return line(
-            "Result",
-            self.scene.name,
-            s["status"],
-            f"residual {s['residual']:.1e}",
-            contacts,
-            states,
-            aim,
-        )
+        return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
 
     def _repr_html_(self) -> str:
         s, (length, stress) = self.summary, self.scene.units
@@ -76,46 +62,9 @@ class Result:
                 rows[key.replace("_", " ")] = f"{s[key]:.6g} {length}"
         if self.estimate is not None:
             rows[self.estimate.quantity] = f"{self.estimate.value:.6g}; {self.estimate.message}"
-            rows["meshes"] = "; ".join(
-                f"{level.unknowns}: {level.value:.6g}" for level in self.estimate.levels
-            )
+            levels = self.estimate.levels
+            rows["meshes"] = "; ".join(f"{one.unknowns}: {one.value:.6g}" for one in levels)
         return card(f"{self.scene.name}, {self.scene.friction}", rows)
-
-    def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
-
-        The page needs no network and nothing but the browser (contactopt.figures.view_page says
-        what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
-        """
-        import tempfile
-        import webbrowser
-
-        from contactopt.figures.view_page import write_page
-
-        if file is None:
-            file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
-        with tempfile.TemporaryDirectory() as folder:
-            solved = Solved(self.reduction, self.solution, self.zones, self.path)
-            write(solved, self.fields, Path(folder), states=True)
-            (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
-            made = write_page(folder, file)
-        if show:
-            webbrowser.open(made.resolve().as_uri())
-        return made
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -130,3 +79,17 @@ class Result:
     def traction(self) -> np.ndarray:
         """Tangential traction on the upper body, (k,) or in 3D (k, 2) [stress]."""
         return squeeze(self.solution.reactions[:, 1:] / self.problem.areas[:, None])
+
+
+def squeeze(t: np.ndarray) -> np.ndarray:
+    """Drop the second axis of an array (k, d) where d is one, as in 2D.
+
+    Parameters
+    ----------
+    t : (k, d) tangential components
+
+    Returns
+    -------
+    ndarray : (k,) or (k, d)
+    """
+    return t[:, 0] if t.shape[1] == 1 else t

@@ -1,0 +1,347 @@
+"""The bodies of a scene, elastic, rigid or half-spaces, and what holds and loads them.
+
+Everything here is frozen and checked when it is made; what depends on the kind of the scene is
+checked by the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contactopt.checks import check_name, check_number, real_array, short
+from contactopt.errors import InputError
+from contactopt.material import Material
+from contactopt.meshes.given_curves import Curve
+
+LARGEST_VALUE = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
+# The components of a displacement, in the order of the mesh coordinates.
+COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
+Function = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Support:
+    """Prescribed displacement on a named boundary, eq (3) of the paper.
+
+    `displacement` maps components to values [length]; None clamps every component. A symmetry plane
+    is a Support that holds the normal component only.
+    """
+
+    boundary: str
+    displacement: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Traction:
+    """Surface force per area on a named boundary, eq (4): one value [stress] per component."""
+
+    boundary: str
+    value: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """Force per volume: one value [force / length^3] per component."""
+
+    value: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A rigid plate on a named boundary, loaded by a total force.
+
+    `force` maps each component in which the plate may move to the total force [force] on the whole
+    body (all mirror images, the whole ring). The plate never tilts; its unknown displacement is the
+    multiplier of the force balance. In the other components the body is held if the plate is glued
+    to it, and slides freely if not.
+    """
+
+    boundary: str
+    force: Mapping[str, float]
+    glued: bool = True
+
+
+LOADS = (Traction, BodyForce, Plate)
+
+
+@dataclass(frozen=True)
+class Part:
+    """An elastic body.
+
+    mesh     a scikit-fem mesh with named boundaries, or a function (elements, zone) -> mesh, where
+             `elements` counts elements across the contact half-width and `zone` is the half-width
+             the mesh must resolve.
+    contact  the name of the candidate contact boundary; a Contact of the scene can name others.
+    curve    function (dim, k) -> (dim, k) that puts points of the contact boundary on the surface
+             that the mesh stands for: the gap of a curved body at nodes within its edges (degree
+             2). None: the edges are the surface. For a body with several contact boundaries, a
+             mapping from the name of a boundary to its function.
+    """
+
+    name: str
+    mesh: Any
+    material: Material
+    supports: tuple[Support, ...] = ()
+    loads: tuple[Traction | BodyForce | Plate, ...] = ()
+    contact: str = "contact"
+    curve: Function | Mapping[str, Function] | None = None
+    elastic = True
+    meshed = True
+
+    def __post_init__(self) -> None:
+        check_name("the body's name", self.name)  # of its VTU file
+        if not isinstance(self.material, Material):
+            raise self._wrong("its material must be a Material(E, nu)", repr(self.material))
+        if not isinstance(self.contact, str):
+            raise self._wrong("its contact boundary must be a name", short(self.contact))
+        if not (self.curve is None or callable(self.curve) or isinstance(self.curve, Mapping)):
+            must = "its curve must be a function, or a mapping from boundaries to functions"
+            raise self._wrong(must, short(self.curve))
+        for what, items, kinds in (
+            ("supports", self.supports, (Support,)),
+            ("loads", self.loads, LOADS),
+        ):
+            alike = isinstance(items, (tuple, list))
+            if not alike or not all(isinstance(item, kinds) for item in items):
+                names = " or ".join(kind.__name__ for kind in kinds)
+                raise self._wrong(f"its {what} must be a tuple of {names} objects", short(items))
+        for item in (*self.supports, *self.loads):
+            boundary = "" if isinstance(item, BodyForce) else item.boundary
+            if not isinstance(boundary, str):
+                raise self._wrong("a boundary is given by its name", short(boundary))
+
+    def _wrong(self, must: str, got: str) -> InputError:
+        return InputError(f"body '{self.name}': {must}; got {got}.")
+
+    def check_in(self, kind: str) -> None:
+        """Check what depends on the kind of the scene; InputError on values that do not fit it."""
+        for support in self.supports:
+            held = support.displacement
+            check_components(self.name, {} if held is None else held, kind)
+        for load in self.loads:
+            if isinstance(load, Plate):
+                check_components(self.name, load.force, kind)
+                continue
+            what, components, value = type(load).__name__, COMPONENTS[kind], load.value
+            listed = isinstance(value, (tuple, list, np.ndarray)) and np.iterable(value)
+            if not listed or len(value) != len(components):
+                needs = f"a {what} needs a tuple of {len(components)} values"
+                raise self._wrong(f"{needs} ({', '.join(components)})", short(value))
+            for one in value:
+                told = f"every {what} value of body '{self.name}'"
+                check_number(told, one, -LARGEST_VALUE, LARGEST_VALUE)
+
+    @property
+    def given(self) -> bool:
+        """Whether the mesh is given, not made for a number of elements."""
+        return not callable(self.mesh)
+
+    def curve_of(self, boundary: str) -> Curve | None:
+        """Find the function that puts points of a contact boundary on its surface.
+
+        Parameters
+        ----------
+        boundary : its name
+
+        Returns
+        -------
+        Curve : a function of points (dim, m) to points (dim, m) [length], if there is one
+        """
+        if callable(self.curve):
+            found = self.curve if boundary == self.contact else None
+        else:
+            found = (self.curve or {}).get(boundary)
+        if found is None or isinstance(found, Curve):
+            return found
+        return Curve(found, True, f"the curve of boundary {boundary!r} of body '{self.name}'")
+
+    def build_mesh(self, elements: int, zone: float | None) -> Any:
+        """Make the mesh of the body.
+
+        Parameters
+        ----------
+        elements : number across the contact half-width
+        zone : half-width of contact that the mesh resolves [length]; None: the scene's first guess
+
+        Returns
+        -------
+        Mesh : of scikit-fem; the given one, if the part has a mesh and no function
+        """
+        return self.mesh(elements, zone) if callable(self.mesh) else self.mesh
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A rigid body: its compliance is zero.
+
+    normal        the contact normal, one value per component; None: the normals of the other
+                  body's contact boundary. Where that is curved, a gap that is measured along one
+                  direction needs this direction here
+    gap           function of the other body's contact nodes, coordinates (dim, k) -> initial gap
+                  (k,) along the normal [length]; an array of these values, for half-spaces also of
+                  the shape of their grid; None means touching everywhere
+    force         None for an obstacle that does not move; otherwise, as in Plate, the total force
+                  on it by component
+    displacement  of the body by component [length]; components that have neither a force nor a
+                  displacement are held
+    """
+
+    name: str
+    normal: tuple[float, ...] | None = None
+    gap: Function | np.ndarray | None = None
+    force: Mapping[str, float] | None = None
+    displacement: Mapping[str, float] | None = None
+
+    elastic = False
+    meshed = False
+    given = False
+
+    def __post_init__(self) -> None:
+        check_name("the body's name", self.name)
+
+    def check_in(self, kind: str) -> None:
+        """As Part.check_in()."""
+        _check_motion(self, kind)
+        if self.normal is None:
+            return
+        dim = len(COMPONENTS[kind])
+        if len(self.normal) != dim or not np.any(self.normal):
+            raise InputError(
+                f"rigid body '{self.name}': its normal needs {dim} values, not all zero."
+            )
+        for value in self.normal:
+            check_number(f"every value of the normal of rigid body '{self.name}'", value)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """An elastic half-space (half-plane in 2D) without a mesh: what a body is that is large beside
+    its contact.
+
+    The upper body fills the half z >= 0, the lower the half z <= 0 (in 2D: y). It has no support:
+    it deforms under the contact forces alone, and as a whole it is held, displaced or pressed by a
+    total force. Making and solving a problem in 3D takes about 1.2 kB of memory per point without
+    friction and 2.8 kB with it (reports/half_spaces).
+
+    points        places of the contact points along each direction of the surface, evenly spaced:
+                  (x,) in 2D, (x, y) in 3D [length]; or a function (elements, zone) -> such places.
+                  Each point stands for a cell about it
+    height        of the surface above its plane, outwards: function of the points (dim - 1, k) ->
+                  (k,), or an array of the shape of the grid, indexed [x, y] [length]; None: flat
+    force         the total force on the body by component, as in Rigid
+    displacement  of the body as a whole by component [length]; components that have neither a force
+                  nor a displacement are held
+    periodic      whether surface and forces repeat themselves beyond the points. Displacements are
+                  then measured from their mean
+    depth         in 2D, where displacements grow without end: how far beneath each force the point
+                  lies from which the displacements that it makes are measured [length]; by default
+                  ten times the length of the points
+    """
+
+    name: str
+    material: Material
+    points: Any
+    height: Function | np.ndarray | None = None
+    force: Mapping[str, float] | None = None
+    displacement: Mapping[str, float] | None = None
+    periodic: bool = False
+    depth: float | None = None
+    elastic = True
+    meshed = False
+
+    def __post_init__(self) -> None:
+        check_name("the body's name", self.name)
+        if not isinstance(self.material, Material):
+            raise self._wrong(f"its material must be a Material(E, nu); got {self.material!r}.")
+        if self.depth is not None:
+            check_number(f"the depth of half-space '{self.name}'", self.depth, low=0.0)
+        if not isinstance(self.periodic, (bool, np.bool_)):
+            raise self._wrong(f"periodic must be True or False; got {short(self.periodic)}.")
+
+    def _wrong(self, why: str) -> InputError:
+        return InputError(f"half-space '{self.name}': {why}")
+
+    def check_in(self, kind: str) -> None:
+        """As Part.check_in()."""
+        _check_motion(self, kind)
+
+    @property
+    def given(self) -> bool:
+        """Whether the points are given, not made for a number of elements."""
+        return not callable(self.points)
+
+    def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
+        """Compute the places of the points along each of the axes.
+
+        Parameters
+        ----------
+        elements : number across the contact half-width, for points that are given by a function
+        zone : half-width that they resolve [length]
+        axes : number of axes
+
+        Returns
+        -------
+        tuple of ndarray : places (n_i,) along each axis [length]
+
+        Raises
+        ------
+        InputError : unless they are evenly spaced and growing, at least four along each axis
+        """
+        given = self.points(elements, zone) if callable(self.points) else self.points
+        if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:
+            raise self._wrong(
+                f"its points must be given by one row of places per axis; got {short(given)}."
+            )
+        rows = (given,) if np.ndim(given[0]) == 0 else tuple(given)
+        if len(rows) != axes:
+            raise self._wrong(
+                f"its points need {axes} rows of places, one per axis; got {len(rows)}."
+            )
+        name = f"a row of points of half-space '{self.name}'"
+        made = tuple(real_array(name, row) for row in rows)
+        for row in made:
+            steps = np.diff(row)
+            short_row = row.ndim != 1 or len(row) < 4
+            if short_row or steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
+                raise self._wrong(
+                    "its points must be at least 4 growing numbers per axis, evenly spaced."
+                )
+        return made
+
+
+Body = Part | Rigid | HalfSpace
+
+
+def _check_motion(body: Rigid | HalfSpace, kind: str) -> None:
+    """Force and displacement of a body that moves as a whole."""
+    force, displacement = body.force or {}, body.displacement or {}
+    check_components(body.name, force, kind)
+    check_components(body.name, displacement, kind)
+    if set(force) & set(displacement):
+        raise InputError(
+            f"body '{body.name}': a component can have a force or a displacement, not both."
+        )
+
+
+def check_components(body: str, values: Mapping[str, float], kind: str) -> None:
+    """Raise InputError unless values are given by names of the components of a kind of scene."""
+    components = COMPONENTS[kind]
+    if not isinstance(values, Mapping):
+        raise InputError(
+            f"body '{body}': a value is given for each component by its name, as in "
+            f"{{{components[-1]!r}: 0.0}}; got {short(values)}."
+        )
+    for component, value in values.items():
+        if component not in components:
+            others = [other for other, names in COMPONENTS.items() if component in names]
+            remedy = f", or give the scene kind={others[-1]!r}" if others else ""
+            raise InputError(
+                f"body '{body}': there is no component {component!r}; use {', '.join(components)},"
+                f" which are those of kind {kind!r}{remedy}."
+            )
+        what = f"the {component} value of body '{body}'"
+        check_number(what, value, -LARGEST_VALUE, LARGEST_VALUE)
