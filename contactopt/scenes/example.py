@@ -8,12 +8,12 @@ EXAMPLE = """\
 # A scene for contactopt. Run it:   contactopt run {name}
 # A block is pressed on a foundation and pushed to the side. Lines that begin with # are comments.
 
-name = "block-on-foundation"    # of figures; the name of this file without it kind = "plane-strain"
-# or "axisymmetric" (components r, z), "solid" (x, y, z) thickness = 40.0                # depth of
-a plane-strain body copies = 1                      # mirror images that make the whole body: 2 for
-a half model, 4 for a quarter degree = 2                      # of the displacement: 1, linear, or
-2, quadratic units = {{ length = "mm", stress = "MPa" }}    # any consistent units; forces are then
-in N
+name = "block-on-foundation"    # of figures; the name of this file without it
+kind = "plane-strain"           # or "axisymmetric" (components r, z), "solid" (x, y, z)
+thickness = 40.0                # depth of a plane-strain body
+copies = 1                      # mirror images that make the whole body: 2 for a half model, 4 for a quarter
+degree = 2                      # of the displacement: 1, linear, or 2, quadratic
+units = {{ length = "mm", stress = "MPa" }}    # any consistent units; forces are then in N
 
 # Each body has a table of its own. Its mesh is one of
 #   mesh = "file.msh"   any format of Gmsh and meshio; group = "NAME" chooses one of several bodies in the file, unit = "m" says
@@ -25,9 +25,9 @@ in N
 [bodies.block]
 block = {{ x = [-20, 20], y = [0, 40], elements = [16, 16] }}
 # move = {{ x = 10 }}           # puts the mesh somewhere else
-material = {{ E = 5.0, nu = 0.3 }} contact = "y-"                  # the boundary that may touch
-plates = [                      # rigid plates, loaded by total forces; glued = false lets them
-slide
+material = {{ E = 5.0, nu = 0.3 }}
+contact = "y-"                  # the boundary that may touch
+plates = [                      # rigid plates, loaded by total forces; glued = false lets them slide
     # an array of forces is a load path: first pressed, then pushed
     {{ boundary = "y+", force = {{ y = [-100, -100, -100], x = [0, 20, 40] }} }},
 ]
@@ -35,10 +35,12 @@ slide
 # body_force = {{ y = -1e-5 }}                      # force per volume
 # curve = {{ radius = 20, centre = {{ x = 0, y = 20 }} }}   # the circle (sphere) that the contact boundary stands for
 
-[bodies.foundation] block = {{ x = [-80, 80], y = [-80, 0], elements = [64, 32] }} boundaries = {{
-top = {{ x = [-40, 40], y = 0 }} }}   # named by where they are: a coordinate, or [least, largest]
-material = {{ E = 5.0, nu = 0.3 }} contact = "top" supports = [{{ boundary = "y-" }}]      #
-clamped; {{ boundary = "x-", x = 0 }} prescribes one component
+[bodies.foundation]
+block = {{ x = [-80, 80], y = [-80, 0], elements = [64, 32] }}
+boundaries = {{ top = {{ x = [-40, 40], y = 0 }} }}   # named by where they are: a coordinate, or [least, largest]
+material = {{ E = 5.0, nu = 0.3 }}
+contact = "top"
+supports = [{{ boundary = "y-" }}]      # clamped; {{ boundary = "x-", x = 0 }} prescribes one component
 
 # Pairs of surfaces: a body, or "body:boundary" for another surface than its contact.
 [[contacts]]
