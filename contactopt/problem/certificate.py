@@ -126,8 +126,7 @@ def natural_map_residual(
     u = d + w
     measure = yardsticks(problem, r, d, w)
     errors = np.linalg.norm(r - problem.law.project(r - measure.rho[:, None] * u)[0], axis=1)
-    r_n, r_t = split(r)
-    beyond = np.linalg.norm(r_t, axis=1) - problem.law.bound(r_n)
+    beyond = np.linalg.norm(r[:, 1:], axis=1) - problem.law.bound_along(r)
     worst = max(
         float(np.max(errors)) / measure.force,
         float(np.max(beyond)) / measure.force,
@@ -292,9 +291,8 @@ def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndar
     """
     if len(problem.s) == 0:
         return np.zeros(0)
-    r_n, r_t = split(np.asarray(reactions, dtype=float))
-    pressed = np.abs(r_n) > 1e-8 * np.abs(r_n).max(initial=0.0)
-    stuck = pressed & (np.linalg.norm(r_t, axis=1) < (1 - 1e-6) * problem.law.bound(r_n))
+    r = np.asarray(reactions, dtype=float)
+    pressed, stuck = problem.law.pressed(r), problem.law.sticking(r)
     rows = np.concatenate(
         [pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1
     ).ravel()

@@ -23,7 +23,7 @@ import scipy.sparse as sp
 
 from contactopt.linear.operators import InterfaceOperator, asymmetry
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.scaling import dimensionless
+from contactopt.problem.scaling import dimensionless, isotropic
 
 DIRECTIONS = 16  # of the polygon in each cone, in 3D
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
@@ -65,6 +65,7 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     -------
     The proof. None says nothing: the problem may have a solution or not.
     """
+    problem = isotropic(problem)
     if (
         not (problem.law.unilateral and problem.law.proportional)
         or isinstance(problem.Q, InterfaceOperator)

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.scaling import isotropic
 
 DIRECTIONS = 16  # of the polygon inside each cone, in 3D
 # work of the largest load over a motion's displacements from which on the motion counts
@@ -64,6 +65,7 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     """
     if not problem.law.unilateral or not np.any(problem.s):
         return None
+    problem = isotropic(problem)
     s = problem.s / np.abs(problem.s).max()
     if _balanced(problem, s):
         return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.law import Law, Place, Projected
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +48,6 @@ class Frictionless(Law):
         return out
 
     @classmethod
-    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Frictionless:
+    def of_place(cls, values: np.ndarray, place: Place) -> Frictionless:
         """Whatever the value that the scene gives: it has no meaning for this law."""
-        return cls(np.zeros(len(areas)))
+        return cls(np.zeros(len(place.areas)))

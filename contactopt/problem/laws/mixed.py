@@ -60,8 +60,24 @@ class Mixed(Law):
     def rough(self) -> np.ndarray:
         return self._gathered(lambda law, own: law.rough)
 
+    @property
+    def plain(self) -> Law:
+        return join([(law.plain, own) for law, own in zip(self.parts, self.members)])
+
+    def stretch(self, dim: int) -> np.ndarray | None:
+        made = [law.stretch(dim) for law in self.parts]
+        if all(S is None for S in made):
+            return None
+        out = np.tile(np.eye(dim - 1), (self.contacts, 1, 1))
+        for S, own in zip(made, self.members):
+            out[own] = np.eye(dim - 1) if S is None else S
+        return out
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return self._gathered(lambda law, own: law.bound(r_n[own]))
+
+    def bound_along(self, r: np.ndarray) -> np.ndarray:
+        return self._gathered(lambda law, own: law.bound_along(r[own]))
 
     def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
         return self._gathered(lambda law, own: law.nearest(y[own], r_n[own]))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactopt.problem.cones import cylinder_derivative, disc, unit
-from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.law import Law, Place, Projected
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,5 +48,5 @@ class Tresca(Law):
         return replace(self, limit=count * self.limit[first])
 
     @classmethod
-    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Tresca:
-        return cls(values * areas)
+    def of_place(cls, values: np.ndarray, place: Place) -> Law:
+        return super().of_place(values * place.areas, place)
