@@ -59,13 +59,21 @@ __all__ = [
 
 # name -> (module, class, what it is)
 LAWS = {
-    "coulomb": ("contactopt.problem.laws.coulomb", "Coulomb", "contact that may open; Coulomb friction"),
+    "coulomb": (
+        "contactopt.problem.laws.coulomb",
+        "Coulomb",
+        "contact that may open; Coulomb friction",
+    ),
     "orthotropic": (
         "contactopt.problem.laws.orthotropic",
         "Orthotropic",
         "Coulomb friction with two coefficients, along and across a direction",
     ),
-    "bilateral": ("contactopt.problem.laws.bilateral", "Bilateral", "no separation; friction bound mu |r_n|"),
+    "bilateral": (
+        "contactopt.problem.laws.bilateral",
+        "Bilateral",
+        "no separation; friction bound mu |r_n|",
+    ),
     "tresca": (
         "contactopt.problem.laws.tresca",
         "Tresca",
