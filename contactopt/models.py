@@ -93,7 +93,11 @@ def displacements(problem: InterfaceProblem) -> Program:
     Returns
     -------
     Variables u, the gap (k,), and lambda, the approach (p,). Multiplier "reaction", r_n = S (u -
-    q_n - V_n lambda). InputError if Q_nn is singular: displacements do not determine forces then.
+    q_n - V_n lambda).
+
+    Raises
+    ------
+    InputError : If Q_nn is singular, because displacements do not determine forces then.
     """
     dim = problem.dim
     try:
@@ -316,7 +320,11 @@ def as_qp(program: Program) -> Any:
 
     Returns
     -------
-    Its x is ordered as in as_conic(). InputError if the program has second-order cones.
+    Its x is ordered as in as_conic().
+
+    Raises
+    ------
+    InputError : If the program has second-order cones.
     """
     import qpsolvers
 

@@ -146,6 +146,26 @@ class Chart:
         return spacing
 
 
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Consecutive contacts of an interface problem that belong to one pair of surfaces.
+
+    name          of the pair, for messages, tables and files
+    start, stop   numbers of its first contact and of the first one after it
+    chart         places of its contacts on their surface
+    """
+
+    name: str
+    start: int
+    stop: int
+    chart: Chart
+
+    @property
+    def contacts(self) -> slice:
+        """Of arrays with one row per contact."""
+        return slice(self.start, self.stop)
+
+
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
     """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
 
