@@ -379,7 +379,8 @@ def _stick(step: Step, pair: int) -> Seeds:
     reduction, solution = views(replace(step.reduction, problem=step.problem), step.solution)[pair]
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions
     u = problem.displacements(r, solution.multipliers)
-    sticks, slips = problem.law.sticking(r), problem.law.slipping(r)
+    sticks = problem.law.sticking(r)
+    slips = problem.law.pressed(r) & ~sticks
     across = np.stack([-r[:, 2], r[:, 1]], axis=1) if problem.dim == 3 else None
 
     def read(there: np.ndarray, moved: np.ndarray, law: Law) -> float:

@@ -51,8 +51,7 @@ class Chart:
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
         """Lay a chart through bare points, of which nothing else is known, along the directions in
-        which they extend
-        most.
+        which they extend most.
 
         Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
         Otherwise the origin is the middle of the points, the axes are their principal directions,
@@ -90,24 +89,6 @@ class Chart:
         (k,) numbers of the contacts.
         """
         return np.argsort(self.places[0], kind="stable")
-
-    def offsets(self, contact: int) -> np.ndarray:
-        """Compute places relative to one contact; on a closed line the shorter way round.
-
-        Parameters
-        ----------
-        contact : The number of the contact.
-
-        Returns
-        -------
-        (dim - 1, k) [length].
-        """
-        apart = self.places - self.places[:, [contact]]
-        return (
-            apart
-            if self.period is None
-            else (apart + self.period / 2) % self.period - self.period / 2
-        )
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:
         """List the places of the whole surface, with those of all mirror images.

@@ -53,7 +53,7 @@ class Scales:
     def to_dimensionless(
         self, reactions: np.ndarray, multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Take reactions and multipliers to the units of the dimensionless problem.
+        """Take reactions and multipliers to the dimensionless problem, as `to_physical` back.
 
         Parameters
         ----------
@@ -100,8 +100,7 @@ def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
-    columns of V have length
-    one.
+    columns of V have length one.
 
     The force scale is the mean force that the balance asks of a node or, without a balance, the
     force that removes the root-mean-square overlap at one node. Gaps, however wide, do not count.
@@ -151,18 +150,10 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 
 def without_rounding(V: np.ndarray) -> np.ndarray:
-    """Motions without the entries that are rounding beside the largest of their column.
+    """Motions V (n, p) without the entries that are rounding beside the largest of their column.
 
     Normals of a flat surface that are off by rounding would let forces without friction hold a body
     along it: by motions without bound, which the certificate does not see.
-
-    Parameters
-    ----------
-    V : (n, p) motions.
-
-    Returns
-    -------
-    (n, p) motions, with zeros in place of rounding.
     """
     size = np.abs(V)
     return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)

@@ -34,9 +34,10 @@ from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.frictionless import Frictionless
-from contactopt.problem.laws.law import Law, Place
+from contactopt.problem.laws.law import Law
 from contactopt.problem.laws.mixed import Mixed, join
 from contactopt.problem.laws.orthotropic import Orthotropic
+from contactopt.problem.laws.place import Place
 from contactopt.problem.laws.tied import Tied
 from contactopt.problem.laws.tresca import Tresca
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -11,11 +11,11 @@ import numpy as np
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.cones import unit
+from contactopt.problem.laws.place import Place
 
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
 # a tangential force sticks if it is below its bound by more than this, relative to the bound
 BELOW = 1e-6
-ALONG = 1e-6  # least part of a direction of friction that lies in the surface
 
 # points (k, dim) and the generalised derivative (k, dim, dim)
 Projected = tuple[np.ndarray, np.ndarray]
@@ -30,42 +30,6 @@ class Kinks(NamedTuple):
 
     normal: np.ndarray
     tangential: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Where a scene's contacts are, for laws that depend on it.
-
-    areas      (k,) nodal areas [length^2]
-    frames     (k, dim, dim) rows n, t1[, t2] of each contact
-    direction  of friction in space (dim,); None where the scene gives none
-    """
-
-    areas: np.ndarray
-    frames: np.ndarray
-    direction: tuple[float, ...] | None = None
-
-    def angles(self) -> np.ndarray:
-        """(k,) from t1 to the direction of friction, drawn on the surface [rad]; 0 in the plane."""
-        if self.frames.shape[1] == 2:
-            return np.zeros(len(self.areas))
-        if self.direction is None:
-            raise InputError(
-                "friction with two coefficients needs the direction of the first one: give the"
-                " contact a direction in space, such as that of the grooves."
-            )
-        if len(self.direction) != self.frames.shape[1]:
-            raise InputError(
-                f"the direction of friction has {len(self.direction)} components; the scene has"
-                f" {self.frames.shape[1]}."
-            )
-        along = self.frames[:, 1:] @ (np.array(self.direction) / np.linalg.norm(self.direction))
-        if np.any(np.linalg.norm(along, axis=1) < ALONG):
-            raise InputError(
-                "the direction of friction is normal to the surface at a contact; give one that"
-                " lies along the surface."
-            )
-        return np.arctan2(along[:, 1], along[:, 0])
 
 
 class Law:
@@ -177,7 +141,7 @@ class Law:
 
         Returns
         -------
-        (k,) largest |r_t| [force]; in any direction where r_t = 0.
+        (k,) largest |r_t| [force].
         """
         return self.bound(r[:, 0])
 
@@ -334,19 +298,6 @@ class Law:
         return self.pressed(r) & (
             np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound_along(r)
         )
-
-    def slipping(self, r: np.ndarray) -> np.ndarray:
-        """Tell which contacts are pressed and carry a tangential force at its bound.
-
-        Parameters
-        ----------
-        r : (k, dim) contact forces, normal first [force].
-
-        Returns
-        -------
-        (k,) mask.
-        """
-        return self.pressed(r) & ~self.sticking(r)
 
     def scaled(self, force: float) -> Self:
         """The same law with forces in another unit."""

@@ -39,7 +39,8 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.problem.cones import split, unit
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.laws.law import Law, Place, Projected
+from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.place import Place
 
 MOST = 60  # steps of Newton's method for the projection on an ellipse; it takes about five
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.laws.law import Law, Place, Projected
+from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactopt.problem.cones import cylinder_derivative, disc, unit
-from contactopt.problem.laws.law import Law, Place, Projected
+from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)
