@@ -19,7 +19,7 @@ Discs and cones become polygons and pyramids with `facets`, which makes the last
 
 All are convex because Q is positive semidefinite; that is the caller's promise
 (contactopt.methods.backends.conic checks it by Cholesky), since cvxpy's own test of it fails at
-random on large matrices.
+random on large matrices. `program.problem.get_problem_data` of cvxpy gives the arrays to others.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def normal(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : Any interface problem.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def displacements(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : Any interface problem.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def bilateral(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : Any interface problem.
 
     Returns
     -------
@@ -285,62 +285,6 @@ def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dic
         constraints.append(A @ t == parameters["b"])
     objective = cp.Minimize(cp.quad_form(t, cp.psd_wrap(Q)) / 2 + parameters["c"] @ t)
     return cp.Problem(objective, constraints), t, parameters
-
-
-def as_conic(program: Program) -> dict[str, Any]:
-    """The data of min x' P x / 2 + q' x  subject to  A x + y = b,  y in cones: zero, nonnegative,
-    second-order, in this order.
-
-    Parameters
-    ----------
-    program : Its parameters must have values.
-
-    Returns
-    -------
-    Keys P, q, A, b (P and A sparse, P with both triangles), zero and nonneg (numbers of rows), soc
-    (list of dimensions), and columns: name of a variable -> its slice of x.
-    """
-    data, _, _ = program.problem.get_problem_data(cp.CLARABEL)
-    dims, first = data["dims"], data["param_prob"].var_id_to_col
-    made = {key: data[name] for key, name in (("P", "P"), ("q", "c"), ("A", "A"), ("b", "b"))}
-    made |= {"zero": int(dims.zero), "nonneg": int(dims.nonneg)}
-    made["soc"] = [int(d) for d in dims.soc]
-    made["columns"] = {
-        name: slice(first[v.id], first[v.id] + v.size) for name, v in program.variables.items()
-    }
-    return made
-
-
-def as_qp(program: Program) -> Any:
-    """A program without cones for qpsolvers, with dense matrices.
-
-    Parameters
-    ----------
-    program : Its parameters must have values.
-
-    Returns
-    -------
-    Its x is ordered as in as_conic().
-
-    Raises
-    ------
-    InputError : If the program has second-order cones.
-    """
-    import qpsolvers
-
-    conic = as_conic(program)
-    if conic["soc"]:
-        raise InputError(
-            "the program has second-order cones, so it is no QP: use as_conic, or polygons"
-            " (facets=...)."
-        )
-    A, b, zero = conic["A"].toarray(), conic["b"], conic["zero"]
-    equal = {"A": A[:zero], "b": b[:zero]} if zero else {}
-    less = {"G": A[zero:], "h": b[zero:]} if conic["nonneg"] else {}
-    return qpsolvers.Problem(conic["P"].toarray(), conic["q"], **less, **equal)
-
-
-# What the programs share
 
 
 def _components(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:

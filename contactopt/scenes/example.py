@@ -48,6 +48,8 @@ upper = "block"
 lower = "foundation"
 mu = 0.6                        # or an expression of the place: "0.6 + 0.001 * x"
 law = "coulomb"                 # all of them: contactopt list
+# law = "orthotropic"           # machined surfaces: mu = [0.1, 0.3] along and across a direction,
+# direction = {{ x = 1 }}         # such as that of the grooves
 
 [solve]
 method = "auto"
