@@ -1,4 +1,4 @@
-"""Orthotropic friction against its own conditions, cvxpy, Coulomb's law, and a node solved by hand."""
+"""Orthotropic friction against its conditions, cvxpy, Coulomb's law, and a node solved by hand."""
 
 from dataclasses import replace
 
@@ -8,8 +8,7 @@ import pytest
 import scipy.sparse as sp
 
 import contactopt
-from contactopt import InputError, InterfaceProblem, models, solve
-from contactopt import fclib
+from contactopt import InputError, InterfaceProblem, fclib, models, solve
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.material import Material
@@ -17,8 +16,8 @@ from contactopt.problem import isotropic, natural_map_residual
 from contactopt.problem.contact_status import contact_status
 from contactopt.problem.laws import Coulomb, Orthotropic, Tresca, join
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene_files import read_scene_file
 from contactopt.scenes.scene import HalfSpace, Rigid, Scene
+from contactopt.scenes.scene_files import read_scene_file
 
 # beyond what Clarabel promises: it stops where it gets no further, and warns
 TIGHT = {"tol_gap_abs": 1e-13, "tol_gap_rel": 1e-13, "tol_feas": 1e-13}
@@ -166,8 +165,9 @@ def test_all_forms_of_Q_give_the_same_answer(form):
 
 
 def test_a_start_and_other_laws_beside_it():
-    law = join([(Orthotropic([0.2, 0.3], [0.6, 0.4], 0.4).spread(2), [0, 3]), (Coulomb([0.3, 0.5]), [1, 2]),
-                (Tresca([0.2, 0.1]), [4, 5])])  # fmt: skip
+    grooves = Orthotropic([0.2, 0.3], [0.6, 0.4], 0.4).spread(2)
+    parts = (grooves, [0, 3]), (Coulomb([0.3, 0.5]), [1, 2]), (Tresca([0.2, 0.1]), [4, 5])
+    law = join(parts)
     problem = random_problem(law)
     solution = solve(problem, tol=1e-12)
     again = solve(problem, tol=1e-11, start=solution)
@@ -182,8 +182,8 @@ def test_a_load_that_only_strong_friction_holds():
     V = np.kron(np.ones((2, 1)), np.eye(3))
 
     def pull(s):
-        names = ("body 'a': displacement n", "body 'a': displacement x", "body 'a': displacement y")
-        return InterfaceProblem(np.eye(6), np.zeros((2, 3)), Orthotropic(0.1, 0.8), V, s, motions=names)  # fmt: skip
+        names, law = [f"body 'a': displacement {c}" for c in "nxy"], Orthotropic(0.1, 0.8)
+        return InterfaceProblem(np.eye(6), np.zeros((2, 3)), law, V, s, motions=tuple(names))
 
     assert solve(pull([-2.0, 0.0, 1.0])).solved
     with pytest.raises(InputError, match="slides off"):
@@ -275,7 +275,7 @@ def test_scene_files_have_it(tmp_path):
     along = np.cos(law.angle) * grooves[:, 1] + np.sin(law.angle) * grooves[:, 2]
     assert np.allclose(np.abs(along), 1)
     path.write_text(FILE.replace("[0.2, 0.6]", "[0.2, 0.6, 0.7]"))
-    with pytest.raises(InputError, match="line 15.*along and across"):
+    with pytest.raises(InputError, match=r"line 15.*along and across"):
         read_scene_file(path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,8 +26,9 @@ class Contact:
     upper, lower  a body's name, or 'name:surface' for another surface than the contact boundary of
                   its Part
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
-                  tangential traction [stress], for 'orthotropic' two of them; a number >= 0, one per contact (k,), or a function
-                  of the contacts' positions (dim, k) that gives either
+                  tangential traction [stress]; a number >= 0, one per contact (k,), or a function
+                  of the contacts' positions (dim, k) that gives either; for 'orthotropic' two
+                  coefficients instead of one
     law           a name in contactopt.problem.laws.LAWS
     coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
                   the surfaces
@@ -39,7 +40,7 @@ class Contact:
 
     upper: str
     lower: str
-    mu: float | np.ndarray | Callable[[np.ndarray], Any]
+    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any]
     law: str = "coulomb"
     coupling: str = "auto"
     carrier: str | None = None
@@ -84,10 +85,11 @@ class Contact:
     def friction(self) -> str:
         """The law and its number, for titles: 'mu = 0.3'."""
         name = "mu" if self.law in ("coulomb", "bilateral") else f"{self.law}, mu"
-        if isinstance(self.mu, (int, float)):
-            return f"{name} = {self.mu:g}"
-        two = self.direction is not None and np.shape(self.mu) == (2,)
-        return f"{name} = {self.mu[0]:g} and {self.mu[1]:g}" if two else f"{name} varies"
+        if callable(self.mu):
+            return f"{name} varies"
+        values = np.ravel(self.mu)
+        one = np.ndim(self.mu) == 0 or (self.direction is not None and len(values) == 2)
+        return f"{name} = {' and '.join(f'{mu:g}' for mu in values)}" if one else f"{name} varies"
 
 
 def _check_direction(name: str, direction: Any, law: type[Law]) -> None:

@@ -8,7 +8,7 @@ scenes (contactopt.scenes) use newton, millimetre and megapascal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -327,7 +327,7 @@ class Scene:
     name: str
     upper: Part | Rigid | HalfSpace | None = None
     lower: Part | Rigid | HalfSpace | None = None
-    mu: float | np.ndarray | Callable[[np.ndarray], Any] | None = None
+    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1

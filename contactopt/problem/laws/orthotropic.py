@@ -82,7 +82,7 @@ class Orthotropic(Law):
             )
         pair = values if values.ndim == 2 else np.broadcast_to(values, (k, 2)).T
         same = values.ndim == 0  # whatever the direction
-        return cls(*pair, np.zeros(k) if same else place.angles())
+        return cls(pair[0], pair[1], np.zeros(k) if same else place.angles())
 
     @property
     def coefficient(self) -> np.ndarray:
