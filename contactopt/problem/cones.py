@@ -154,12 +154,15 @@ def disc_of_height(
 
     slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
     """
-    radius = mu * np.abs(height)
-    P, D = np.empty((len(t), t.shape[1] + 1)), np.zeros((len(t), t.shape[1] + 1, t.shape[1] + 1))
-    P[:, 0], D[:, 0, 0] = height, 1.0
-    P[:, 1:], D[:, 1:, 1:] = disc_derivative(t, radius)
-    slip = np.linalg.norm(t, axis=1) > radius
-    D[slip, 1:, 0] = (mu * slope)[slip, None] * unit(t[slip])
+    k, dim = len(t), t.shape[1] + 1
+    bound, length = mu * np.abs(height), np.linalg.norm(t, axis=1)
+    slip = length > bound
+    P = np.concatenate([height[:, None], disc(t, bound)], axis=1)
+    D = np.broadcast_to(np.eye(dim), (k, dim, dim)).copy()
+    way = t[slip] / length[slip, None]
+    D[slip, 1:, 0] = (mu * slope)[slip, None] * way
+    turn = (bound[slip] / length[slip])[:, None, None]
+    D[slip, 1:, 1:] = turn * _across(way) if dim == 3 else 0.0
     return P, D
 
 
