@@ -15,11 +15,11 @@ returns a Program:
     acary_cadoux     the same with the gap shifted by mu s; Coulomb's law where s = |u_t|
 
 Discs and cones become polygons and pyramids with `facets`, which makes the last four QPs also in
-3D.
+3D. Under orthotropic friction g and mu bound the stretched force, whose set is a disc.
 
 All are convex because Q is positive semidefinite; that is the caller's promise
 (contactopt.methods.backends.conic checks it by Cholesky), since cvxpy's own test of it fails at
-random on large matrices.
+random on large matrices. `program.problem.get_problem_data` of cvxpy gives the arrays to others.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
@@ -65,7 +66,7 @@ def normal(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : Any interface problem.
 
     Returns
     -------
@@ -74,10 +75,8 @@ def normal(problem: InterfaceProblem) -> Program:
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     push = r >= 0
-    readers = {"gap": lambda: _dual(push)} | readers
-    return Program(
-        cp.Problem(cp.Minimize(cost), [push, *balance]), {"r_n": r}, {"r_t": r_t}, readers
-    )
+    program = cp.Problem(cp.Minimize(cost), [push, *balance])
+    return Program(program, {"r_n": r}, {"r_t": r_t}, {"gap": lambda: _dual(push)} | readers)
 
 
 def displacements(problem: InterfaceProblem) -> Program:
@@ -89,7 +88,7 @@ def displacements(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : Any interface problem.
 
     Returns
     -------
@@ -115,9 +114,7 @@ def displacements(problem: InterfaceProblem) -> Program:
         variables["lambda"] = lam = cp.Variable(plates.sum(), name="lambda")
         stretch, work = stretch - V[:, plates] @ lam, problem.s[plates] @ lam
     apart = u >= 0
-    program = cp.Problem(
-        cp.Minimize(cp.quad_form(stretch, cp.psd_wrap(_symmetric(S))) / 2 - work), [apart]
-    )
+    program = cp.Problem(cp.Minimize(_energy(S, stretch) - work), [apart])
     return Program(program, variables, {}, {"reaction": lambda: _dual(apart)})
 
 
@@ -152,7 +149,7 @@ def bilateral(problem: InterfaceProblem) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : Any interface problem.
 
     Returns
     -------
@@ -189,16 +186,10 @@ def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
         parameters["approach"] = cp.Parameter(plates.sum())
         c = c + V[:, plates] @ parameters["approach"]
     balance, shift = _balance(V[:, ~plates].T @ r + problem.s[~plates], "shift")
-    law, slip, _ = _friction(
-        cp.reshape(r, (problem.dim - 1, len(n)), order="F"), parameters["g"], facets
-    )
-    cost = cp.quad_form(r, cp.psd_wrap(_symmetric(problem.Q[np.ix_(t, t)]))) / 2 + c @ r
-    return Program(
-        cp.Problem(cp.Minimize(cost), [law, *balance]),
-        {"r_t": r},
-        parameters,
-        {"slip": slip} | shift,
-    )
+    law, slip, _ = _friction(problem, r, parameters["g"], facets)
+    cost = _energy(problem.Q[np.ix_(t, t)], r) + c @ r
+    program = cp.Problem(cp.Minimize(cost), [law, *balance])
+    return Program(program, {"r_t": r}, parameters, {"slip": slip} | shift)
 
 
 def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
@@ -209,23 +200,26 @@ def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
-    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
-        which are intervals in 2D.
+    problem, facets : As for `tangential`.
 
     Returns
     -------
     Variable r (k dim,), normal first in each block. Parameter g (k,). Multipliers "gap", "slip" and
     "approach".
     """
-    r, r_n, r_t, cost, balance, approach = _parts(problem)
-    g = cp.Parameter(problem.contacts, nonneg=True)
-    law, slip, _ = _friction(r_t, g, facets)
-    push, gap = _push(r_n, problem.law.lowest == 0)
-    readers = {"gap": gap, "slip": slip} | approach
-    return Program(
-        cp.Problem(cp.Minimize(cost), [*push, law, *balance]), {"r": r}, {"g": g}, readers
-    )
+    r, r_n, r_t, cost, balance, readers = _parts(problem)
+    g, apart = cp.Parameter(problem.contacts, nonneg=True), problem.law.lowest == 0
+    law, slip, _ = _friction(problem, r_t, g, facets)
+    push = [r_n[np.flatnonzero(apart)] >= 0] if apart.any() else []
+
+    def gap() -> np.ndarray:
+        out = np.zeros(len(apart))
+        for constraint in push:
+            out[apart] = _dual(constraint)
+        return out
+
+    program = cp.Problem(cp.Minimize(cost), [*push, law, *balance])
+    return Program(program, {"r": r}, {"g": g}, {"gap": gap, "slip": slip} | readers)
 
 
 def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
@@ -236,17 +230,12 @@ def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
-    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
-        which are intervals in 2D.
+    problem, facets : As for `tangential`.
 
     Returns
     -------
-    Variable r (k dim,). Multipliers "gap" (so opened), "slip" and "approach".
-
-    Raises
-    ------
-    InputError : If the law has no such cones.
+    Variable r (k dim,). Multipliers "gap" (so opened), "slip" and "approach". InputError if the law
+    has no such cones.
     """
     return _over_cones(problem, None, facets)
 
@@ -260,18 +249,12 @@ def acary_cadoux(problem: InterfaceProblem, facets: int | None = None) -> Progra
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
-    facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
-        which are intervals in 2D.
+    problem, facets : As for `tangential`.
 
     Returns
     -------
     Variable r (k dim,). Parameter s (k,), zero unless it is set. Multipliers "gap" u_n, "slip" u_t
-    and "approach".
-
-    Raises
-    ------
-    InputError : If the law has no such cones.
+    and "approach". InputError if the law has no such cones.
     """
     s = cp.Parameter(problem.contacts, nonneg=True, value=np.zeros(problem.contacts))
     return _over_cones(problem, s, facets)
@@ -285,86 +268,23 @@ def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dic
 
     Parameters
     ----------
-    Q : (2k, 2k) symmetric positive semidefinite; the caller checks that, because cvxpy's own check
-        is unreliable.
+    Q : (2k, 2k) symmetric positive semidefinite; the caller checks that.
     A : (p, 2k) rows of the balance.
 
     Returns
     -------
-    (problem, variable, parameters) : The cvxpy problem, its variable t (2k,), and its parameters c
-        (2k,), g (k,) and b (p,) by name. The multipliers of A t = b are the dual value of the last
-        constraint.
+    The cvxpy problem, its variable t (2k,), and its parameters c (2k,), g (k,) and b (p,) by name.
+    The multipliers of A t = b are the dual value of the last constraint.
     """
     k, p = len(Q) // 2, len(A)
     t = cp.Variable(2 * k, name="t")
     parameters = {"c": cp.Parameter(2 * k), "g": cp.Parameter(k, nonneg=True)}
-    constraints = [cp.SOC(parameters["g"], cp.reshape(t, (2, k), order="F"), axis=0)]
+    constraints = [cp.SOC(parameters["g"], _columns(t, k), axis=0)]
     if p:
         parameters["b"] = cp.Parameter(p)
         constraints.append(A @ t == parameters["b"])
     objective = cp.Minimize(cp.quad_form(t, cp.psd_wrap(Q)) / 2 + parameters["c"] @ t)
     return cp.Problem(objective, constraints), t, parameters
-
-
-def as_conic(program: Program) -> dict[str, Any]:
-    """The data of min x' P x / 2 + q' x  subject to  A x + y = b,  y in cones: zero, nonnegative,
-    second-order, in
-    this order.
-
-    Parameters
-    ----------
-    program : Its parameters must have values.
-
-    Returns
-    -------
-    Keys P, q, A, b (P and A sparse, P with both triangles), zero and nonneg (numbers of rows), soc
-    (list of dimensions), and columns: name of a variable -> its slice of x.
-    """
-    data, _, _ = program.problem.get_problem_data(cp.CLARABEL)
-    dims, first = data["dims"], data["param_prob"].var_id_to_col
-    columns = {
-        name: slice(first[v.id], first[v.id] + v.size) for name, v in program.variables.items()
-    }
-    cones = {"zero": int(dims.zero), "nonneg": int(dims.nonneg), "soc": [int(d) for d in dims.soc]}
-    return {
-        "P": data["P"],
-        "q": data["c"],
-        "A": data["A"],
-        "b": data["b"],
-        "columns": columns,
-    } | cones
-
-
-def as_qp(program: Program) -> Any:
-    """A program without cones for qpsolvers, with dense matrices.
-
-    Parameters
-    ----------
-    program : Its parameters must have values.
-
-    Returns
-    -------
-    Its x is ordered as in as_conic().
-
-    Raises
-    ------
-    InputError : If the program has second-order cones.
-    """
-    import qpsolvers
-
-    conic = as_conic(program)
-    if conic["soc"]:
-        raise InputError(
-            "the program has second-order cones, so it is no QP: use as_conic, or polygons"
-            " (facets=...)."
-        )
-    A, b, zero = conic["A"].toarray(), conic["b"], conic["zero"]
-    equal = {"A": A[:zero], "b": b[:zero]} if zero else {}
-    less = {"G": A[zero:], "h": b[zero:]} if conic["nonneg"] else {}
-    return qpsolvers.Problem(conic["P"].toarray(), conic["q"], **less, **equal)
-
-
-# What the programs share
 
 
 def _components(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -386,76 +306,79 @@ def _normal_parts(problem: InterfaceProblem) -> tuple[Any, Any, list[Any], dict[
     c = problem.q[:, 0] + problem.Q[np.ix_(n, t)] @ r_t
     V = problem.V[:, plates]
     balance, approach = _balance(V[n].T @ r + V[t].T @ r_t + problem.s[plates], "approach")
-    cost = cp.quad_form(r, cp.psd_wrap(_symmetric(problem.Q[np.ix_(n, n)]))) / 2 + c @ r
-    return r, cost, balance, approach, r_t
+    return r, _energy(problem.Q[np.ix_(n, n)], r) + c @ r, balance, approach, r_t
 
 
 def _parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, list[Any], dict[str, Reader]]:
-    """Variable r, its normal part (k,) and tangential part (dim - 1, k), cost, balance, its
+    """Variable r, its normal part (k,) and tangential part (k (dim - 1),), cost, balance, its
     multiplier by name.
     """
+    n, t = _components(problem)
     r = cp.Variable(problem.q.size, name="r")
-    blocks = cp.reshape(r, (problem.dim, problem.contacts), order="F")
     balance, approach = _balance(problem.V.T @ r + problem.s, "approach")
-    cost = cp.quad_form(r, cp.psd_wrap(_symmetric(problem.Q))) / 2 + problem.q.ravel() @ r
-    return r, blocks[0], blocks[1:], cost, balance, approach
+    return r, r[n], r[t], _energy(problem.Q, r) + problem.q.ravel() @ r, balance, approach
 
 
 def _over_cones(problem: InterfaceProblem, s: Any, facets: int | None) -> Program:
-    if not (problem.law.unilateral and problem.law.proportional):
+    plain = problem.law.plain
+    if not (plain.unilateral and plain.proportional):
         raise InputError(
             "this law has no cone of forces |r_t| <= mu r_n: use `tresca` or `bilateral`."
         )
-    r, r_n, r_t, cost, balance, approach = _parts(problem)
-    law, slip, size = _friction(r_t, cp.multiply(problem.mu, r_n), facets)
+    mu = plain.coefficient
+    r, r_n, r_t, cost, balance, readers = _parts(problem)
+    law, slip, size = _friction(problem, r_t, cp.multiply(mu, r_n), facets)
     push = r_n >= 0  # follows from the cone unless mu = 0
     if s is not None:
-        cost = cost + cp.multiply(problem.mu, s) @ r_n
-    gap = lambda: _dual(push) + problem.mu * (size() - (0 if s is None else s.value))  # noqa: E731
+        cost = cost + cp.multiply(mu, s) @ r_n
+    readers["gap"] = lambda: _dual(push) + mu * (size() - (0 if s is None else s.value))
     program = cp.Problem(cp.Minimize(cost), [push, law, *balance])
-    return Program(
-        program, {"r": r}, {} if s is None else {"s": s}, {"gap": gap, "slip": slip} | approach
-    )
+    return Program(program, {"r": r}, {} if s is None else {"s": s}, readers | {"slip": slip})
 
 
-def _friction(t: Any, g: Any, facets: int | None = None) -> tuple[Any, Reader, Reader]:
-    """|t_i| <= g_i for the columns of t (d, k), the reader of the slip u_t (k, d) and that of the
-    multiplier of g (k,).
+def _friction(
+    problem: InterfaceProblem, r_t: Any, g: Any, facets: int | None
+) -> tuple[Any, Reader, Reader]:
+    """|t_i| <= g_i for r_t (k d,), the reader of the slip u_t (k, d) and that of the multiplier of
+    g (k,).
 
+    t is r_t itself or, where friction depends on the direction, what `Law.stretch` makes of it.
     Intervals are polygons with two facets. Polygons are inscribed: they never allow more friction
     than the disc.
     """
-    d, k = t.shape
+    k, d = problem.contacts, problem.dim - 1
+    back = problem.law.stretch(problem.dim)
+    if back is not None:
+        back = np.linalg.inv(back)
+        r_t = sp.block_diag(list(back), format="csr") @ r_t
+
+    def slip(v: np.ndarray) -> np.ndarray:
+        return v if back is None else np.einsum("kab,kb->ka", back, v)
+
+    t = _columns(r_t, k)
     if d == 2 and facets is None:
         disc = cp.SOC(g, t, axis=0)
-        return disc, lambda: _dual(disc, 1).reshape(2, k).T, lambda: _dual(disc, 0).reshape(k)
+        read = lambda: slip(_dual(disc, 1).reshape(2, k).T)  # noqa: E731
+        return disc, read, lambda: _dual(disc, 0).reshape(k)
     if facets is not None and facets < 3:
         raise InputError(f"a polygon needs at least 3 facets; got {facets}.")
     D, reach = np.array([[1.0], [-1.0]]), 1.0
     if d == 2:
         angle = 2 * np.pi * np.arange(facets or 0) / (facets or 1)
-        D, reach = (
-            np.stack([np.cos(angle), np.sin(angle)], axis=1),
-            float(np.cos(np.pi / (facets or 1))),
-        )
+        D, reach = np.column_stack([np.cos(angle), np.sin(angle)]), float(np.cos(angle[1] / 2))
     polygon = D @ t <= reach * np.ones((len(D), 1)) @ cp.reshape(g, (1, k), order="F")
-    return polygon, lambda: -_dual(polygon).T @ D, lambda: reach * _dual(polygon).sum(axis=0)
+    read = lambda: slip(-_dual(polygon).T @ D)  # noqa: E731
+    return polygon, read, lambda: reach * _dual(polygon).sum(axis=0)
 
 
-def _push(r_n: Any, apart: np.ndarray) -> tuple[list[Any], Reader]:
-    """r_n >= 0 at the contacts that may open, a mask (k,), and the reader of the gap (k,), zero at
-    the others.
-    """
-    if not apart.any():
-        return [], lambda: np.zeros(len(apart))
-    push = (r_n if apart.all() else r_n[np.flatnonzero(apart)]) >= 0
+def _columns(t: Any, k: int) -> Any:
+    """A flat vector of k blocks with the blocks as its columns."""
+    return cp.reshape(t, (t.size // k, k), order="F")
 
-    def gap() -> np.ndarray:
-        out = np.zeros(len(apart))
-        out[apart] = _dual(push)
-        return out
 
-    return [push], gap
+def _energy(Q: np.ndarray, r: Any) -> Any:
+    """r' Q r / 2."""
+    return cp.quad_form(r, cp.psd_wrap(_symmetric(Q))) / 2
 
 
 def _balance(resultant: Any, name: str) -> tuple[list[Any], dict[str, Reader]]:

@@ -24,6 +24,7 @@ from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.frictionless import Frictionless
 from contactopt.problem.laws.mixed import Mixed
+from contactopt.problem.laws.orthotropic import Orthotropic
 from contactopt.problem.laws.tresca import Tresca
 
 LAWS = {
@@ -32,6 +33,7 @@ LAWS = {
     "associated": Associated,
     "bilateral": Bilateral,
     "frictionless": None,
+    "orthotropic": lambda mu: Orthotropic(mu, 0.5 * mu, np.linspace(0, 3, len(mu))),
 }
 STEP = 1e-6
 
@@ -200,6 +202,10 @@ def at_kinks(kind, dim, seed):
         u[5, 0], r[5, 0], r[5, 1:] = 0.0, 0.8, -0.8 * b[5] * e[5]
     if kind == "frictionless":
         r[:, 1:], u[1:4, 1:] = 0.0, e[1:4]
+    if kind == "orthotropic":  # of larger coefficient b: from the variables of Coulomb's law
+        S = law_of(kind, b).stretch(dim)
+        r[:, 1:] = np.einsum("kab,kb->ka", S, r[:, 1:])
+        u[:, 1:] = np.linalg.solve(S, u[:, 1:, None])[:, :, 0]
     problem = InterfaceProblem(Q, u - (Q @ r.ravel()).reshape(r.shape), law_of(kind, b))
     residual = natural_map_residual(problem, r, np.zeros(0))
     assert residual < 1e-12

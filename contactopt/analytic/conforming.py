@@ -19,7 +19,8 @@ def pin_in_hole(
     = 2 E*,
 
         E1* c / Q = [2 - ln(1 + b^2) - 2 b^4] / [pi b^2 (1 + b^2)],
-        p = Q / (pi R) {2 sqrt(b^2 - y^2) / [sqrt(1 + b^2) (1 + y^2)] + artanh[sqrt((b^2 - y^2) / (b^2 + 1))] / [b^2 (1 + b^2)]}.
+        p = Q / (pi R) {2 sqrt(b^2 - y^2) / [sqrt(1 + b^2) (1 + y^2)]
+                        + artanh[sqrt((b^2 - y^2) / (b^2 + 1))] / [b^2 (1 + b^2)]}.
 
     For small b this is Hertz. Positions are lengths of arc R phi from the middle of the contact.
 
@@ -45,27 +46,10 @@ def pin_in_hole(
     (Chalmers); Ciavarella, Decuzzi (2001), The state of stress induced by the plane frictionless
     cylindrical contact. I. The case of elastic similarity, Int. J. Solids Struct. 38, 4507-4523.
     """
-    from scipy.optimize import brentq
-
     check_positive(
         force_per_length=force_per_length, radius=radius, clearance=clearance, modulus=modulus
     )
-    ratio = 2 * modulus * clearance / force_per_length
-
-    def excess(s: float) -> float:
-        b = np.exp(s)
-        return float(2 - np.log1p(b**2) - 2 * b**4 - ratio * np.pi * b**2 * (1 + b**2))
-
-    # with no clearance at all contact ends at the root of 2 = ln(1 + b^2) + 2 b^4
-    full = brentq(lambda b: np.log1p(b**2) + 2 * b**4 - 2, 0.5, 1.0, xtol=1e-15)
-    ends = np.log(1e-8), np.log(full)
-    if not excess(ends[0]) > 0 > excess(ends[1]):
-        much = "large" if excess(ends[0]) > 0 else "small"
-        raise InputError(
-            f"the force {force_per_length:g} per length is too {much} for this pin; take another"
-            " force."
-        )
-    b = float(np.exp(brentq(excess, *ends, xtol=1e-15)))
+    b = _end_of_contact(2 * modulus * clearance / force_per_length, force_per_length)
 
     def pressure(x: np.ndarray) -> np.ndarray:
         angle = np.abs(np.asarray(x, dtype=float)) / radius
@@ -80,13 +64,33 @@ def pin_in_hole(
     )
 
 
+def _end_of_contact(ratio: float, force: float) -> float:
+    """b of pin_in_hole() for ratio = E1* c / Q."""
+    from scipy.optimize import brentq
+
+    def excess(s: float) -> float:
+        b = np.exp(s)
+        return float(2 - np.log1p(b**2) - 2 * b**4 - ratio * np.pi * b**2 * (1 + b**2))
+
+    # with no clearance at all contact ends at the root of 2 = ln(1 + b^2) + 2 b^4
+    full = brentq(lambda b: np.log1p(b**2) + 2 * b**4 - 2, 0.5, 1.0, xtol=1e-15)
+    ends = np.log(1e-8), np.log(full)
+    if not excess(ends[0]) > 0 > excess(ends[1]):
+        much = "large" if excess(ends[0]) > 0 else "small"
+        raise InputError(
+            f"the force {force:g} per length is too {much} for this pin; take another force."
+        )
+    return float(np.exp(brentq(excess, *ends, xtol=1e-15)))
+
+
 def press_fit(
     interference: float, bore: float, radius: float, outside: float, shaft: Material, hub: Material
 ) -> Reference:
     """A shaft pressed into a hub that is too narrow for it, plane strain: Lame's uniform pressure
     p.
 
-        d / (R p) = [(c^2 + R^2) / (c^2 - R^2) + m_h] / M_h + [(R^2 + a^2) / (R^2 - a^2) - m_s] / M_s,
+        d / (R p) = [(c^2 + R^2) / (c^2 - R^2) + m_h] / M_h
+                    + [(R^2 + a^2) / (R^2 - a^2) - m_s] / M_s,
 
     M = E / (1 - nu^2) and m = nu / (1 - nu) of each body.
 

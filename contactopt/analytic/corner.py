@@ -123,7 +123,7 @@ def edge_stick_threshold(
 
 
 def _zeros(determinant: Callable[[complex], complex]) -> np.ndarray:
-    """Complex zeros near (0, 1), without those of rigid motions: several at 0, divided out, and 1."""
+    """Complex zeros near (0, 1), without those of rigid motions: 1, and several at 0."""
     step = 1e-3
     order = round(np.log2(abs(determinant(2 * step) / determinant(step))))
 

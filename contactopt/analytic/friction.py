@@ -33,12 +33,10 @@ def flat_punch_line_friction(
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
+    force_per_length : Normal force P, positive in compression [force / length].
     half_width : Half-width a of the punch [length].
     mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
-        a rigid punch.
+    beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
@@ -51,9 +49,8 @@ def flat_punch_line_friction(
     if not _slips(mu, beta):
         return _without_slip(flat_punch_line(force_per_length, half_width), mu)
     check_positive(force_per_length=force_per_length, half_width=half_width)
-    return _flat_punch(
-        unit_punch(mu, abs(beta), False), force_per_length, half_width, 1, beta, None
-    )
+    punch = unit_punch(mu, abs(beta), False)
+    return _flat_punch(punch, force_per_length, half_width, 1, beta, None)
 
 
 def flat_punch_axisymmetric_friction(
@@ -69,8 +66,7 @@ def flat_punch_axisymmetric_friction(
     radius : Radius a of the punch [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
-        a rigid punch.
+    beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
@@ -100,14 +96,11 @@ def hertz_line_friction(
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    force_per_length : Normal force P, positive in compression [force / length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
-        a rigid punch.
+    beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
@@ -142,12 +135,10 @@ def hertz_point_friction(
     Parameters
     ----------
     force : Normal force, positive in compression [force].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
-        a rigid punch.
+    beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
@@ -166,14 +157,8 @@ def hertz_point_friction(
     # displacement outside a unit punch, beta H Q, over that below it, integrated with t^-3 from 1
     # to infinity
     moment = (2 * _log_cosh(v) - s**2) / (2 * s**3) / np.cosh(v) ** 2
-    outside = (
-        4
-        * abs(beta)
-        / (np.pi * punch.approach)
-        * weights
-        @ ((punch.panels.abel(ODD) @ punch.q) * moment)
-    )
-    curvature = 1 - 2 * outside
+    outside = weights @ ((punch.panels.abel(ODD) @ punch.q) * moment)
+    curvature = 1 - 8 * abs(beta) / (np.pi * punch.approach) * outside
     a = float((1.5 * punch.approach * force * radius * curvature / modulus) ** (1 / 3))
     return _round(punch, 3 * force / a**2, a, beta, a**2 / (radius * curvature))
 

@@ -40,10 +40,8 @@ def hertz_line_tangential(
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    force_per_length : Normal force P, positive in compression [force / length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
     loads : The present tangential force T, or its turning points so far and the present one; |T| <=
@@ -81,8 +79,7 @@ def hertz_point_tangential(
     Parameters
     ----------
     force : Normal force, positive in compression [force].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     tangential : Tangential modulus Gs as in tangential_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
@@ -113,8 +110,7 @@ def cycle_loss_line(force_per_length: float, modulus: float, mu: float, amplitud
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
+    force_per_length : Normal force P, positive in compression [force / length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
     amplitude : Largest tangential force per length [force / length].
@@ -146,8 +142,7 @@ def cycle_loss_point(
     Parameters
     ----------
     force : Normal force, positive in compression [force].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
     tangential : Tangential modulus Gs as in tangential_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
@@ -170,19 +165,11 @@ def cycle_loss_point(
 
 
 def masing_branches(loads: Sequence[float]) -> list[tuple[float, float]]:
-    """The part of a history of loads that still counts, by Masing's rules.
+    """The part of a history of loads, oldest first, that still counts by Masing's rules: for each
+    branch the change of the load along it, and 1 on the first loading or 2 after a reversal.
 
     A loop that is closed is forgotten, and so is everything once the load passes its largest size
     so far.
-
-    Parameters
-    ----------
-    loads : Turning points of the load, oldest first, with the present load at the end.
-
-    Returns
-    -------
-    list of (float, float) : For each branch the change of the load along it, and 1 on the first
-        loading or 2 after a reversal; oldest first.
     """
     points = [0.0]
     for load in loads:

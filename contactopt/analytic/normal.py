@@ -19,8 +19,7 @@ def hertz_point(force: float, radius: float, modulus: float) -> Reference:
     Parameters
     ----------
     force : Normal force, positive in compression [force].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
 
     Returns
@@ -46,10 +45,8 @@ def hertz_line(force_per_length: float, radius: float, modulus: float) -> Refere
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
-    radius : Radius R of the round body; the sum of curvatures is 1 / R where both are round
-        [length].
+    force_per_length : Normal force P, positive in compression [force / length].
+    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
 
     Returns
@@ -73,8 +70,7 @@ def flat_punch_line(force_per_length: float, half_width: float) -> Reference:
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
+    force_per_length : Normal force P, positive in compression [force / length].
     half_width : Half-width a of the punch [length].
 
     Returns
@@ -128,11 +124,9 @@ def flat_punch_line_bonded(force_per_length: float, half_width: float, beta: flo
 
     Parameters
     ----------
-    force_per_length : Normal force per length of the contact, positive in compression [force /
-        length].
+    force_per_length : Normal force P, positive in compression [force / length].
     half_width : Half-width a of the punch [length].
-    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
-        a rigid punch.
+    beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
@@ -173,8 +167,7 @@ def flat_punch_axisymmetric_bonded(
     force : Normal force, positive in compression [force].
     radius : Radius a of the punch [length].
     modulus : Contact modulus E* as in contact_modulus() [stress].
-    beta : Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under
-        a rigid punch.
+    beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
@@ -200,20 +193,11 @@ def flat_punch_axisymmetric_bonded(
 
 
 def under_punch(value: Field, a: float, power: int, odd: bool = False) -> Field:
-    """Make a traction under a punch from its bounded factor: value(u) / (a^(power - 1) sqrt(a^2 -
-    x^2)), u = artanh(|x|
-    / a).
+    """The traction under a punch of half-width a from its bounded factor, a function of u:
+    value(u) / (a^(power - 1) sqrt(a^2 - x^2)) with u = artanh(|x| / a), and nan where |x| >= a.
 
-    Parameters
-    ----------
-    value : A function of u (n,) that gives the bounded factor (n,).
-    a : Half-width of the punch [length].
-    power : The power of 1 / length that the traction has: 1 for a line, 2 for a disc.
-    odd : Whether the traction is odd in x. Then it is multiplied by the sign of x.
-
-    Returns
-    -------
-    The traction (n,) as a function of places x (n,) [length]; it is nan where |x| >= a.
+    power  of 1 / length that the traction has: 1 for a line, 2 for a disc
+    odd    whether it is odd in x: it is multiplied by the sign of x then
     """
 
     def field(x: np.ndarray) -> np.ndarray:
@@ -229,10 +213,8 @@ def under_punch(value: Field, a: float, power: int, odd: bool = False) -> Field:
 
 
 # The inverse Abel transform of cos(2 eta v) over a line that oscillates without end: the part that
-# the kernel has at
-# infinity, cosh(u), is integrated in the mean (Abel's sum), what remains decays. With sinh^2 v =
-# sinh^2 u + w^2 and
-# w = y cosh u the rest is analytic in y up to i.
+# the kernel has at infinity, cosh(u), is integrated in the mean (Abel's sum), what remains decays.
+# With sinh^2 v = sinh^2 u + w^2 and w = y cosh u the rest is analytic in y up to i.
 def _bonded_pressure(u: np.ndarray, eta: float) -> np.ndarray:
     """p sqrt(a^2 - r^2) over that of the frictionless punch and D cosh(pi eta) [-]."""
     rest = _decaying_part(u, lambda v: 2 * eta * np.sin(2 * eta * v) / np.sinh(v))

@@ -146,10 +146,8 @@ class Panels:
         (pi sinh).
         """
         u, v, same = self.v[:, None], self.v, np.eye(len(self.v), dtype=bool)
-        direct, mirror = (
-            np.abs(np.tanh(np.where(same, 1.0, self._distance()) / 2)),
-            np.tanh((u + v) / 2),
-        )
+        direct = np.abs(np.tanh(np.where(same, 1.0, self._distance()) / 2))
+        mirror = np.tanh((u + v) / 2)
         if parity == EVEN:
             kernel = np.log(direct * mirror)
         # direct / mirror = (sinh u - sinh v) / (sinh u + sinh v), without cancellation where u << v
@@ -166,11 +164,8 @@ class Panels:
         """(1/pi) int F(s) / (t - s) ds over |s| < 1, from values of F at s = tanh(v)."""
         u, v, same = self.v[:, None], self.v, np.eye(len(self.v), dtype=bool)
         product = np.where(same, 1.0, np.sinh(self._distance()) * np.sinh(u + v))
-        kernel = (
-            np.sinh(2 * u) / product
-            if parity == EVEN
-            else 2 * np.cosh(u) ** 2 * np.tanh(v) / product
-        )
+        shape = np.sinh(2 * u) if parity == EVEN else 2 * np.cosh(u) ** 2 * np.tanh(v)
+        kernel = shape / product
         kernel = np.where(same, parity / np.sinh(2 * u), kernel)
         correction = self._correction(log=False) * (np.cosh(u) / np.cosh(self.b + self.columns))
         return (kernel * self.weights + _fold(correction, parity)) / np.pi
@@ -189,11 +184,8 @@ class Panels:
         full = np.where(beyond, shape * (self.half[:, None] * WEIGHTS).ravel() / root, 0.0)
 
         i, k = np.nonzero(near & (panel >= own))
-        t, low, high = (
-            self.v[i],
-            np.maximum(self.centre[k] - self.half[k] - y[i], 0.0),
-            self.edges[k] - y[i],
-        )
+        t, high = self.v[i], self.edges[k] - y[i]
+        low = np.maximum(self.centre[k] - self.half[k] - y[i], 0.0)
         first, last = (np.sqrt(np.sinh(d) * np.sinh(2 * t + d))[:, None] for d in (low, high))
         nodes, weights = legendre.leggauss(ORDER + 4)
         # w^2 = sinh^2 v - sinh^2 u takes the root away
@@ -201,11 +193,8 @@ class Panels:
         v = np.arcsinh(np.hypot(np.sinh(t)[:, None], w))
         distance = np.arcsinh(w**2 / np.sinh(v + t[:, None]))
         weights = (last - first) / 2 * weights / np.cosh(v)
-        weights = (
-            np.cosh(t)[:, None] * weights / np.cosh(v)
-            if parity == EVEN
-            else np.sinh(t)[:, None] * weights / np.sinh(v)
-        )
+        grows = np.cosh if parity == EVEN else np.sinh
+        weights = grows(t)[:, None] * weights / grows(v)
         basis = legendre.legvander(
             (distance + (y[i] - self.centre[k])[:, None]) / self.half[k][:, None], ORDER - 1
         )

@@ -87,13 +87,11 @@ def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, floa
     """Dundurs' constants of two bodies in plane strain.
 
     With A = (1 - nu) / G and B = (1 - 2 nu) / (2 G) of the upper body (1) and the lower body (2)
-    they are alpha = (A2
-    - A1) / (A2 + A1) and beta = (B2 - B1) / (A2 + A1). Both are zero for equal materials and
-      positive where the upper
-    body is the stiffer. A rigid upper body has alpha = 1 and beta = (1 - 2 nu) / (2 (1 - nu)).
-    |alpha| <= 1, and
-    |beta| <= 1/2 for nu >= 0. Source: Dundurs (1969), J. Appl. Mech. 36, 650-652. Johnson (1985), section 5.1, has
-    beta with the opposite sign.
+    they are alpha = (A2 - A1) / (A2 + A1) and beta = (B2 - B1) / (A2 + A1). Both are zero for equal
+    materials and positive where the upper body is the stiffer. A rigid upper body, such as a punch,
+    has alpha = 1 and beta = (1 - 2 nu) / (2 (1 - nu)). |alpha| <= 1, and |beta| <= 1/2 for nu >= 0.
+    Source: Dundurs (1969), J. Appl. Mech. 36, 650-652. Johnson (1985), section 5.1, has beta with
+    the opposite sign.
 
     Parameters
     ----------
@@ -101,7 +99,7 @@ def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, floa
 
     Returns
     -------
-    (float, float) : alpha and beta [-].
+    alpha and beta [-].
 
     Raises
     ------

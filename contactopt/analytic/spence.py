@@ -28,10 +28,8 @@ from contactopt.analytic.panels import EVEN, LEFT, ODD, ORDER, TRANSFORM, Panels
 from contactopt.analytic.reference import check_beta
 from contactopt.checks import check_number
 
-SMALLEST_ARTANH, LARGEST_ARTANH = (
-    1e-9,
-    19.5,
-)  # artanh(c/a): below, c/a is called zero; above, it is one in double precision
+# artanh(c/a): below, c/a is called zero; above, it is one in double precision
+SMALLEST_ARTANH, LARGEST_ARTANH = 1e-9, 19.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +68,8 @@ class UnitPunch:
 
         Last entry: from 0.
         """
-        v, (p0, slope) = (
-            self.panels.v,
-            np.array(self.centre)[:, None] * (np.arange(len(self.p)) < LEFT),
-        )
+        v, central = self.panels.v, np.arange(len(self.p)) < LEFT
+        p0, slope = (value * central for value in self.centre)
         p = (self.p * np.cosh(v) - p0) / np.sinh(v) ** 2
         q = (self.q * np.cosh(v) / np.tanh(v) - slope) / (np.sinh(v) * np.cosh(v))
         return self.panels.remainder(EVEN) @ p, self.panels.remainder(ODD) @ q
@@ -92,29 +88,13 @@ class UnitPunch:
 
 @lru_cache(maxsize=64)
 def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
-    """Solve for the stick zone under a rigid flat punch of unit half-width.
+    """Solve for the stick zone under a rigid flat punch of unit half-width, mu > 0, 0 < beta < 1.
 
     The ratio c/a is within about 1e-7 of the exact one. The tractions are within about 1e-6 away
     from x = c and the edges.
-
-    Parameters
-    ----------
-    mu : The friction coefficient, greater than 0.
-    beta : Dundurs' constant, between 0 and 1.
-    axisymmetric : Whether the punch is a disc. Otherwise it is a strip in plane strain.
-
-    Returns
-    -------
-    The stick zone and the tractions.
-
-    Raises
-    ------
-    InputError : For values of mu and beta out of range.
     """
     from scipy.optimize import brentq
 
-    check_number("the friction coefficient mu", mu, low=0.0)
-    check_number("Dundurs' constant beta", beta, low=0.0, high=1.0)
     solve = _axisymmetric if axisymmetric else _plane
 
     def excess(log_b: float) -> float:

@@ -25,6 +25,7 @@ from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.coupling.charts import SymmetryPlane
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
+from contactopt.problem.laws import Law, Place, make_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
@@ -126,6 +127,22 @@ def _kind(name: str) -> Callable[[Scene, Contact, AssembledBody, AssembledBody],
         import_module(module), function
     )
     return made
+
+
+def law_of(pair: Contact, made: Coupling) -> Law:
+    """Make the law of the contacts of a pair of surfaces.
+
+    Parameters
+    ----------
+    pair : The pair, which names the law and its friction.
+    made : Its contacts.
+
+    Returns
+    -------
+    The law, with one parameter for each contact.
+    """
+    place = Place(made.areas, made.frames, pair.direction)
+    return make_law(pair.law, pair.mu, place, made.positions)
 
 
 def renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.coupling.charts import SymmetryPlane
 from contactopt.coupling.costs import MOST_EXPLICIT, form_of
-from contactopt.coupling.coupling import Coupling, couple
+from contactopt.coupling.coupling import Coupling, couple, law_of
 from contactopt.coupling.equilibrium import coupled_form
 from contactopt.coupling.planes_of_symmetry import mirror_planes
 from contactopt.errors import InputError
@@ -56,8 +56,7 @@ from contactopt.linear.operators import (
 from contactopt.linear.threads import one_blas_thread
 from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.chart import nodal_weights
-from contactopt.problem.laws import make_law
-from contactopt.problem.laws.mixed import join
+from contactopt.problem.laws import join
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import MOST_ACROSS, Part, Scene
 
@@ -511,10 +510,7 @@ def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
 
 def _law(pairs: Sequence[Contact], couplings: Sequence[Coupling]) -> Law:
     """One law for all contacts, from those of the pairs."""
-    laws = [
-        make_law(pair.law, pair.mu, made.areas, made.positions)
-        for pair, made in zip(pairs, couplings)
-    ]
+    laws = [law_of(pair, made) for pair, made in zip(pairs, couplings)]
     if len(laws) == 1:
         return laws[0]
     ends = np.cumsum([0, *(law.contacts for law in laws)])

@@ -379,7 +379,8 @@ def _stick(step: Step, pair: int) -> Seeds:
     reduction, solution = views(replace(step.reduction, problem=step.problem), step.solution)[pair]
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions
     u = problem.displacements(r, solution.multipliers)
-    sticks, slips = problem.law.sticking(r), problem.law.slipping(r)
+    sticks = problem.law.sticking(r)
+    slips = problem.law.pressed(r) & ~sticks
     across = np.stack([-r[:, 2], r[:, 1]], axis=1) if problem.dim == 3 else None
 
     def read(there: np.ndarray, moved: np.ndarray, law: Law) -> float:
@@ -400,7 +401,7 @@ def _stick(step: Step, pair: int) -> Seeds:
         for c in range(problem.dim if sticks[i] else 1):
             way = np.eye(problem.dim)[c]
             if slips[i]:  # a small step along the edge of the cone
-                bound = problem.law.bound(r[:, 0] + h * (np.arange(len(r)) == i))[i]
+                bound = problem.law.bound_along(r + h * np.eye(len(r), r.shape[1], -i))[i]
                 way[1:] = (
                     (bound / np.linalg.norm(r[i, 1:]) - 1) * r[i, 1:] / h
                     if np.any(r[i, 1:])
@@ -423,7 +424,7 @@ def _stick(step: Step, pair: int) -> Seeds:
 
         def at(h: float) -> float:
             law, there = problem.law.shifted(h * change), r.copy()
-            old, new = problem.law.bound(r[:, 0]), law.bound(r[:, 0])
+            old, new = problem.law.bound_along(r), law.bound_along(r)
             grows = np.divide(new, old, out=np.ones(len(old)), where=old > 0)
             there[slips, 1:] *= grows[slips, None]
             return read(there, u, law)

@@ -32,7 +32,7 @@ from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.errors import InputError
 from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.laws import find_law
+from contactopt.problem.laws import Place, find_law
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 
@@ -120,9 +120,8 @@ class Step:
         chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
         for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
             if pair.name in chosen:
-                law = find_law(pair.law).of_place(
-                    np.ones(made.stop - made.start), areas[made.contacts]
-                )
+                place = Place(areas[made.contacts], np.zeros((1, 2, 2)))
+                law = find_law(pair.law).of_place(np.ones(made.stop - made.start), place)
                 out[made.contacts] = getattr(law, law.parameters[0])
         return out
 

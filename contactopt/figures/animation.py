@@ -71,7 +71,9 @@ def animate(path: PathResult, file: str | Path) -> None:
     problem, scene = path.reduction.problem, path.states[-1].scene
     line = contact_line(problem)
     x, area = contact_place(problem)[line], problem.areas[line]
-    bound = [problem.mu[line] * np.abs(s.solution.reactions[line, 0]) / area for s in path.states]
+    bound = [problem.law.bound_along(s.solution.reactions)[line] / area for s in path.states]
+    for own in bound:
+        own[np.isinf(own)] = 0.0  # glued contacts have none
     shear = [-s.solution.reactions[line, 1] / area for s in path.states]
     peak = float(np.max(bound))
     (upper,) = left.plot(x, bound[0], "--", color=GREY, lw=1, label="friction bound, +/- mu p")

@@ -87,7 +87,7 @@ def write(result: Outcome, folder: Path, states: bool) -> None:
     problem, r = result.problem, result.solution.reactions
     places = np.concatenate([pair.chart.places for pair in problem.pairs], axis=1)
     x = places.T if problem.dim == 3 else places[0]
-    status, bound = contact_status(problem, r), problem.law.bound(r[:, 0])
+    status, bound = contact_status(problem, r), problem.law.bound_along(r)
     np.savez(
         folder / "interface.npz",
         x=x,  # along the contact surface

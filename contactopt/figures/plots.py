@@ -152,7 +152,8 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         return _map(scene, problem, values, f"size of the tangential traction [{stress}]", ax)
     line, place = contact_line(problem), contact_place(problem)
     x, t = place[line], solution.reactions[line, 1] / problem.areas[line]
-    bound = problem.mu[line] * np.abs(solution.reactions[line, 0]) / problem.areas[line]
+    bound = problem.law.bound_along(solution.reactions)[line] / problem.areas[line]
+    bound[np.isinf(bound)] = 0.0  # glued contacts have none
     status = contact_status(problem, solution.reactions)
     ax.plot(x, bound, color=GREY, lw=1, ls="--", label="friction bound, +/- mu p")
     ax.plot(x, -bound, color=GREY, lw=1, ls="--")

@@ -342,6 +342,32 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
     return Q.scaled(1.0, added, Q.counter)
 
 
+def turned(Q: Interface, S: sp.csr_array) -> Interface:
+    """S Q S, of the same form as Q.
+
+    Parameters
+    ----------
+    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    S : (n, n) symmetric, regular.
+
+    Returns
+    -------
+    (n, n) [length / force].
+    """
+    if sp.issparse(Q):
+        return sp.csr_array(S @ Q @ S)
+    if not isinstance(Q, InterfaceOperator):
+        return S @ (S @ Q.T).T
+
+    def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+        return np.asarray(S @ Q.product(S @ X, accuracy))
+
+    entries, held = Q.entries, np.asarray(abs(S) @ ~Q.held) == 0
+    exact = None if entries is None else lambda: S @ (S @ entries()).T
+    estimate = S.multiply(S) @ Q.diagonal
+    return InterfaceOperator(product, estimate, exact, Q.accuracy, Q.inexact, held=held)
+
+
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:
     """Q on some unknowns alone, of the same form as Q.
 

@@ -25,6 +25,7 @@ from contactopt.problem import (
     Status,
     dimensionless,
     infeasibility,
+    isotropic,
     natural_map_residual,
 )
 from contactopt.problem.certificate import Moved
@@ -147,7 +148,8 @@ def _run(
         )
     if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
-    scaled, scales = dimensionless(problem)
+    scaled, scales = dimensionless(isotropic(problem))
+    scales = replace(scales, stretch=problem.law.stretch(problem.dim))
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
     operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
     steps = method.iterate(

@@ -66,7 +66,8 @@ def solves(method: Any, law: Law) -> bool:
 
     Returns
     -------
-    The answer of the method's own `solves`, if it has one.
+    The answer of the method's own `solves` for the law in the variables in which methods see it
+    (`Law.plain`), if it has one.
     """
     predicate = getattr(method, "solves", None)
-    return predicate is None or bool(predicate(law))
+    return predicate is None or bool(predicate(law.plain))

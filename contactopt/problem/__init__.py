@@ -11,13 +11,13 @@ from contactopt.problem.certificate import (
     natural_map_residual,
     siconos_residual,
 )
-from contactopt.problem.chart import Chart
+from contactopt.problem.chart import Chart, Pair
 from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws import LAWS
 from contactopt.problem.laws.law import Law
-from contactopt.problem.pairs import Pair, alone, part_of
-from contactopt.problem.scaling import Scales, dimensionless
+from contactopt.problem.pairs import alone, part_of
+from contactopt.problem.scaling import Scales, dimensionless, isotropic
 from contactopt.problem.solution import Solution, Status
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "dimensionless",
     "fit_multipliers",
     "infeasibility",
+    "isotropic",
     "natural_map_residual",
     "part_of",
     "siconos_residual",

@@ -4,15 +4,16 @@ Two yardsticks of the problem and of the answer make the certificate dimensionle
 length L. With d = Q r, w = q + V lambda and u = d + w, |.| the length of one contact's block and F0
 the largest |r_i|:
 
-    L = the largest of  min(1, |r_i| / (1e-6 F0)) |d_i|   (displacements that the forces make where
-                        they act), max(-w_n, 0)                      (overlaps that the forces must
-                        remove), min |w_n|                         (the narrowest gap), 1e-6 min(1,
-                        |r_i| / (1e-6 F0)) |q_i|   (what rounding leaves of gaps that motions
-                        closed), and 1e-6 c min(F0, S)                 (what it leaves of
-                        displacements that cancel, as those of a uniform pressure on a periodic
-                        half-space);
-    F = min(F0, max(L / c, S)), at least 1e-5 max(L / c, S), with the mean compliance c = sum |r_i| c_i / sum |r_i| and
-        the force on a plate S = max_j |s_j| / max_i |V_ij|; c_i is the mean of the diagonal of Q over block i.
+    L = the largest of  a_i |d_i|        displacements that the forces make where they act,
+                        max(-w_n, 0)     overlaps that the forces must remove,
+                        min |w_n|        the narrowest gap,
+                        1e-6 a_i |q_i|   what rounding leaves of gaps that motions closed,
+                        1e-6 c min(F0, S)   and of displacements that cancel, as those of a uniform
+                                         pressure on a periodic half-space,
+        with the weight a_i = min(1, |r_i| / (1e-6 F0));
+    F = min(F0, max(L / c, S)), at least 1e-5 max(L / c, S), with the mean compliance
+        c = sum |r_i| c_i / sum |r_i|, c_i the mean of the diagonal of Q over block i, and the force
+        on a plate S = max_j |s_j| / max_i |V_ij|.
 
 L does not grow with the gaps of distant contacts, which stay open. F does not grow with forces that
 move nothing (the null space of Q): a force counts only as far as it makes a displacement or holds a
@@ -39,6 +40,7 @@ What a certificate of at most tol promises for Coulomb friction, at every contac
                          |u_t|))
     balance              |V_j' r + s_j| <= tol max(|s_j|, max_i |V_ij| F)
 
+Under orthotropic friction P projects on ellipses, and the bound is that in the direction of r_t.
 The certificate does not bound the distance to a solution: where Q is nearly singular, forces that
 differ much have displacements that differ little. It is the same in all units, and costs one
 product with Q.
@@ -53,7 +55,6 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.linear.operators import diagonal
 from contactopt.linear.stacked import Stacked
-from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
@@ -112,9 +113,9 @@ def natural_map_residual(
     -------
     The largest relative error [-], 0 at a solution; inf if a number is not finite.
 
-    Raises InputError on shapes that do not fit.
-    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to
-    Newton like solution methods, for the map; the yardsticks are those of the head of this module.
+    Raises
+    ------
+    InputError : On shapes that do not fit.
     """
     r, lam = _checked(problem, reactions, multipliers)
     if not (np.all(np.isfinite(r)) and np.all(np.isfinite(lam))):
@@ -126,8 +127,7 @@ def natural_map_residual(
     u = d + w
     measure = yardsticks(problem, r, d, w)
     errors = np.linalg.norm(r - problem.law.project(r - measure.rho[:, None] * u)[0], axis=1)
-    r_n, r_t = split(r)
-    beyond = np.linalg.norm(r_t, axis=1) - problem.law.bound(r_n)
+    beyond = np.linalg.norm(r[:, 1:], axis=1) - problem.law.bound_along(r)
     worst = max(
         float(np.max(errors)) / measure.force,
         float(np.max(beyond)) / measure.force,
@@ -232,15 +232,8 @@ def balance_residual(
         force = float(np.linalg.norm(r, axis=1).max(initial=0.0))
     error = np.abs(problem.V.T @ r.ravel() + problem.s)
     size = np.maximum(np.abs(problem.s), np.abs(problem.V).max(axis=0, initial=0.0) * force)
-    return float(
-        np.max(
-            np.where(
-                error > 0,
-                np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0),
-                0,
-            )
-        )
-    )
+    relative = np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0)
+    return float(np.max(np.where(error > 0, relative, 0.0)))
 
 
 def siconos_residual(
@@ -249,10 +242,10 @@ def siconos_residual(
     """The measure that Siconos and the FCLib collection compare methods by; for comparison, not for
     a verdict.
 
-    With K the product of the friction cones it is |r - proj_K(r - (u + mu |u_t| n))| / max(|q|,
-    |r|, |u|), where
-    |.| is the norm of all components together. It depends on units, and forces that move nothing or one distant open
-    contact make it as small as one likes. The balance of a plate is not in it.
+    With K the product of the friction cones it is
+    |r - proj_K(r - (u + mu |u_t| n))| / max(|q|, |r|, |u|), where |.| is the norm of all components
+    together. It depends on units, and forces that move nothing or one distant open contact make it
+    as small as one likes. The balance of a plate is not in it.
 
     Parameters
     ----------
@@ -277,9 +270,7 @@ def siconos_residual(
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
     """Find the multipliers that fit reactions best, by least squares on the components whose
-    displacement must vanish.
-
-    Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound.
+    displacement must vanish: u_n where the law says pressed, and u_t where it says sticking.
 
     Parameters
     ----------
@@ -290,17 +281,13 @@ def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndar
     -------
     (p,) multipliers lambda; zeros where no displacement must vanish.
     """
-    if len(problem.s) == 0:
-        return np.zeros(0)
-    r_n, r_t = split(np.asarray(reactions, dtype=float))
-    pressed = np.abs(r_n) > 1e-8 * np.abs(r_n).max(initial=0.0)
-    stuck = pressed & (np.linalg.norm(r_t, axis=1) < (1 - 1e-6) * problem.law.bound(r_n))
-    rows = np.concatenate(
-        [pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1
-    ).ravel()
-    if not rows.any():
+    r = np.asarray(reactions, dtype=float)
+    rows = np.repeat(problem.law.sticking(r)[:, None], problem.dim, axis=1)
+    rows[:, 0] = problem.law.pressed(r)
+    rows = rows.ravel()
+    if len(problem.s) == 0 or not rows.any():
         return np.zeros(len(problem.s))
-    u = (problem.Q @ np.ravel(reactions))[rows] + problem.q.ravel()[rows]
+    u = (problem.Q @ r.ravel())[rows] + problem.q.ravel()[rows]
     V = problem.V[rows]
     columns = np.linalg.norm(V, axis=0)
     columns[columns == 0] = 1.0

@@ -51,8 +51,7 @@ class Chart:
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
         """Lay a chart through bare points, of which nothing else is known, along the directions in
-        which they extend
-        most.
+        which they extend most.
 
         Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
         Otherwise the origin is the middle of the points, the axes are their principal directions,
@@ -91,24 +90,6 @@ class Chart:
         """
         return np.argsort(self.places[0], kind="stable")
 
-    def offsets(self, contact: int) -> np.ndarray:
-        """Compute places relative to one contact; on a closed line the shorter way round.
-
-        Parameters
-        ----------
-        contact : The number of the contact.
-
-        Returns
-        -------
-        (dim - 1, k) [length].
-        """
-        apart = self.places - self.places[:, [contact]]
-        return (
-            apart
-            if self.period is None
-            else (apart + self.period / 2) % self.period - self.period / 2
-        )
-
     def images(self) -> tuple[np.ndarray, np.ndarray]:
         """List the places of the whole surface, with those of all mirror images.
 
@@ -144,6 +125,26 @@ class Chart:
         else:
             spacing[order] = 1.0
         return spacing
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Consecutive contacts of an interface problem that belong to one pair of surfaces.
+
+    name          of the pair, for messages, tables and files
+    start, stop   numbers of its first contact and of the first one after it
+    chart         places of its contacts on their surface
+    """
+
+    name: str
+    start: int
+    stop: int
+    chart: Chart
+
+    @property
+    def contacts(self) -> slice:
+        """Of arrays with one row per contact."""
+        return slice(self.start, self.stop)
 
 
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:

@@ -2,11 +2,15 @@
 the contacts.
 
 This is geometry alone. Which of them a contact obeys is the business of contactopt.problem.laws.
+A function that ends in `_derivative` gives the nearest points and the generalised derivative of the
+projection.
 """
 
 from __future__ import annotations
 
 import numpy as np
+
+DIRECTIONS = 16  # of the polygon in a disc
 
 
 def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -24,18 +28,19 @@ def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def unit(t: np.ndarray) -> np.ndarray:
-    """Compute the directions of vectors.
-
-    Parameters
-    ----------
-    t : (k, d) vectors.
-
-    Returns
-    -------
-    (k, d) vectors of length one; zero where t is zero.
-    """
+    """Directions of vectors (k, d): of length one, and zero where t is zero."""
     length = np.linalg.norm(t, axis=1)[:, None]
     return np.divide(t, length, out=np.zeros(t.shape), where=length > 0)
+
+
+def polygon(dim: int) -> tuple[np.ndarray, float]:
+    """Directions of slip (j, dim - 1), the corners of a regular polygon in 3D, and the factor by
+    which a polygon with edges normal to them is wider than the disc inside it.
+    """
+    if dim == 2:
+        return np.array([[1.0], [-1.0]]), 1.0
+    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1), 1 / np.cos(np.pi / DIRECTIONS)
 
 
 def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
@@ -48,7 +53,7 @@ def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    array (k, d) : The nearest points.
+    (k, d) the nearest points.
     """
     length = np.linalg.norm(t, axis=1)
     shrink = np.divide(radius, length, out=np.ones_like(length), where=length > radius)
@@ -65,17 +70,14 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    array (k, dim) : The nearest points.
+    (k, dim) the nearest points.
     """
     n, t = split(r)
     length = np.linalg.norm(t, axis=1)
     inside = (length <= mu * n) & (n >= 0)  # without friction a tension is outside, too
     polar = mu * length <= -n  # nearest point is the apex
     height = np.where(inside, n, np.where(polar, 0.0, (n + mu * length) / (1 + mu**2)))
-    out = np.empty_like(r)
-    out[:, 0] = height
-    out[:, 1:] = disc(t, mu * np.maximum(height, 0.0))
-    return out
+    return np.column_stack([height, disc(t, mu * np.maximum(height, 0.0))])
 
 
 def half_line_derivative(
@@ -90,7 +92,7 @@ def half_line_derivative(
 
     Returns
     -------
-    arrays (k, 1) and (k, 1, 1) : The nearest points and the derivative, 0 or 1.
+    The nearest points (k, 1), and the derivative (k, 1, 1), 0 or 1.
     """
     bound = np.broadcast_to(low, len(y))[:, None]
     return np.maximum(y, bound), (y > bound).astype(float)[:, :, None]
@@ -108,21 +110,19 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
 
     Returns
     -------
-    arrays (k, d) and (k, d, d) : The nearest points and the derivative.
+    The nearest points (k, d), and the derivative (k, d, d).
     """
     k, d = y.shape
     if d == 1:
         bound = np.broadcast_to(radius, (k,))[:, None]
-        return np.minimum(np.maximum(y, -bound), bound), (np.abs(y) <= bound).astype(float)[
-            :, :, None
-        ]
+        inside = np.abs(y) <= bound
+        return np.minimum(np.maximum(y, -bound), bound), inside.astype(float)[:, :, None]
     length = np.linalg.norm(y, axis=1)
     outside = length > radius
-    unit = np.divide(y, length[:, None], out=np.zeros_like(y), where=length[:, None] > 0)
     D = np.broadcast_to(np.eye(d), (k, d, d)).copy()
     shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
-    D[outside] = shrink[outside, None, None] * (D - unit[:, :, None] * unit[:, None, :])[outside]
-    return disc(y, radius), D
+    D[outside] = shrink[outside, None, None] * _across(unit(y[outside]))
+    return np.asarray(y * shrink[:, None]), D
 
 
 def cylinder_derivative(
@@ -138,7 +138,7 @@ def cylinder_derivative(
 
     Returns
     -------
-    arrays (k, dim) and (k, dim, dim) : The nearest points and the derivative.
+    The nearest points (k, dim), and the derivative (k, dim, dim).
     """
     P, D = np.empty_like(y), np.zeros((*y.shape, y.shape[1]))
     P[:, :1], D[:, :1, :1] = half_line_derivative(y[:, :1], low)
@@ -149,33 +149,20 @@ def cylinder_derivative(
 def disc_of_height(
     height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of the tangential part alone, on discs whose radius is mu |height|, and its
-    derivative.
+    """Projection of tangential components t (k, dim - 1) alone, on discs whose radius is
+    mu |height|, and its derivative; the heights (k,) stay.
 
-    Parameters
-    ----------
-    height : (k,) normal components, which stay as they are.
-    t : (k, dim - 1) tangential components.
-    mu : (k,) friction coefficients.
-    slope : (k,) derivative of |height| by the height, so that the radii grow by mu slope.
-
-    Returns
-    -------
-    arrays (k, dim) and (k, dim, dim) : The heights beside the projected tangential components, and
-        the derivative.
+    slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
     """
     k, dim = len(t), t.shape[1] + 1
-    bound, grow = mu * np.abs(height), mu * slope
-    length = np.linalg.norm(t, axis=1)
+    bound, length = mu * np.abs(height), np.linalg.norm(t, axis=1)
     slip = length > bound
     P = np.concatenate([height[:, None], disc(t, bound)], axis=1)
     D = np.broadcast_to(np.eye(dim), (k, dim, dim)).copy()
-    unit = t[slip] / length[slip, None]
-    D[slip, 1:, 0] = grow[slip, None] * unit
+    way = t[slip] / length[slip, None]
+    D[slip, 1:, 0] = (mu * slope)[slip, None] * way
     turn = (bound[slip] / length[slip])[:, None, None]
-    D[slip, 1:, 1:] = turn * (np.eye(dim - 1) - unit[:, :, None] * unit[:, None, :])
-    if dim == 2:
-        D[slip, 1, 1] = 0.0
+    D[slip, 1:, 1:] = turn * _across(way) if dim == 3 else 0.0
     return P, D
 
 
@@ -193,7 +180,7 @@ def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, 
 
     Returns
     -------
-    arrays (k, dim) and (k, dim, dim) : The nearest points and the derivative.
+    The nearest points (k, dim), and the derivative (k, dim, dim).
     """
     k, dim = y.shape
     n, t = split(y)
@@ -202,14 +189,16 @@ def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, 
     surface = ~polar & ((length > mu * n) | (mu == 0))
     D = np.zeros((k, dim, dim))
     D[~polar & ~surface] = np.eye(dim)
-    m, size = mu[surface], length[surface]
-    unit = np.divide(
-        t[surface], size[:, None], out=np.zeros((len(m), dim - 1)), where=size[:, None] > 0
-    )
-    height = (n[surface] + m * size) / (1 + m**2)
-    ray = np.concatenate([np.ones((len(m), 1)), m[:, None] * unit], axis=1)
+    m, size, way = mu[surface], length[surface], unit(t[surface])
+    ray = np.concatenate([np.ones((len(m), 1)), m[:, None] * way], axis=1)
     D[surface] = ray[:, :, None] * ray[:, None, :] / (1 + m**2)[:, None, None]
     if dim == 3:
-        turn = np.divide(m * height, size, out=np.zeros(len(m)), where=size > 0)[:, None, None]
-        D[surface, 1:, 1:] += turn * (np.eye(2) - unit[:, :, None] * unit[:, None, :])
+        height = (n[surface] + m * size) / (1 + m**2)
+        turn = np.divide(m * height, size, out=np.zeros(len(m)), where=size > 0)
+        D[surface, 1:, 1:] += turn[:, None, None] * _across(way)
     return coulomb_cone(y, mu), D
+
+
+def _across(way: np.ndarray) -> np.ndarray:
+    """I - e e' (k, d, d) for directions e (k, d)."""
+    return np.asarray(np.eye(way.shape[1]) - way[:, :, None] * way[:, None, :])

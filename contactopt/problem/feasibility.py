@@ -22,10 +22,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.linear.operators import InterfaceOperator, asymmetry
+from contactopt.problem.cones import polygon, unit
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.scaling import dimensionless
+from contactopt.problem.scaling import dimensionless, isotropic
 
-DIRECTIONS = 16  # of the polygon in each cone, in 3D
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
 EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
@@ -65,38 +65,41 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     -------
     The proof. None says nothing: the problem may have a solution or not.
     """
-    if (
-        not (problem.law.unilateral and problem.law.proportional)
-        or isinstance(problem.Q, InterfaceOperator)
-        or problem.contacts == 0
-    ):
+    problem = isotropic(problem)
+    cones = problem.law.unilateral and problem.law.proportional
+    if not cones or isinstance(problem.Q, InterfaceOperator) or problem.contacts == 0:
         return None
     entries = problem.Q.nnz if sp.issparse(problem.Q) else problem.Q.size
-    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > MOST_ENTRIES or _definite(
-        problem
-    ):
+    edges = len(polygon(problem.dim)[0])
+    if entries / problem.dim * edges > MOST_ENTRIES or _definite(problem):
         return None
     scaled, scales = dimensionless(problem)
-    Q = scaled.Q if sp.issparse(scaled.Q) else sp.csr_array(scaled.Q)
-    Q = _without_ridge(problem, Q)
+    # without the unit compliance that this form gives components that cannot move
+    held = (
+        np.abs(problem.Q.diagonal()) == 0 if sp.issparse(problem.Q) else ~np.any(problem.Q, axis=1)
+    )
+    Q = sp.csr_array(scaled.Q)
+    Q = sp.csr_array(Q - sp.diags_array(np.where(held, Q.diagonal(), 0.0)))
     ray = _program(scaled, Q, time_limit)
     if ray is None:
         return None
     for _ in range(POLISH):
         if _verified(scaled, Q, *ray):
             weights, motions = ray
-            margin = (
-                -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
+            work = float(scaled.q[:, 0] @ weights + scaled.s @ motions)
+            return Infeasible(
+                weights,
+                motions * scales.multipliers / scales.length,
+                -work * scales.force * scales.length,
+                _sentence(scaled, weights, motions),
             )
-            told = _sentence(scaled, weights, motions)
-            return Infeasible(weights, motions * scales.multipliers / scales.length, margin, told)
         ray = _polished(scaled, Q, *ray)
     log.info("a ray that would prove the problem infeasible did not stand the check")
     return None
 
 
 def _definite(problem: InterfaceProblem) -> bool:
-    """Whether there is no plate and Q is a symmetric array, positive definite far above rounding."""
+    """Whether there is no plate and Q a symmetric array, positive definite far above rounding."""
     if len(problem.s) or sp.issparse(problem.Q) or asymmetry(problem.Q) > EXACT:
         return False
     try:
@@ -104,14 +107,6 @@ def _definite(problem: InterfaceProblem) -> bool:
     except np.linalg.LinAlgError:
         return False
     return bool(pivots.min() > 1e-6 * pivots.max())
-
-
-def _without_ridge(problem: InterfaceProblem, Q: sp.csr_array) -> sp.csr_array:
-    """Q without the unit compliance that the dimensionless form gives components that cannot move."""
-    held = (
-        np.abs(problem.Q.diagonal()) == 0 if sp.issparse(problem.Q) else ~np.any(problem.Q, axis=1)
-    )
-    return sp.csr_array(Q - sp.diags_array(np.where(held, Q.diagonal(), 0.0)))
 
 
 def _verified(
@@ -149,25 +144,17 @@ def _program(
     normal = np.arange(k) * d
     # g from (y, z)
     G = sp.hstack([sp.csr_array(Q.T[:, normal]), sp.csr_array(problem.V)], format="csr")
-    g_n = G[normal]
-    if d == 2:
-        ways, factor = np.array([[1.0], [-1.0]]), 1.0
-    else:
-        angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-        ways, factor = (
-            np.stack([np.cos(angle), np.sin(angle)], axis=1),
-            1 / np.cos(np.pi / DIRECTIONS),
-        )
-    rough = problem.mu > 0
-    rows = [g_n[~rough]]
+    (ways, factor), rough = polygon(d), problem.mu > 0
+    rows = [G[normal[~rough]]]
     for way in ways:
         slope = sum(c * G[normal + 1 + i] for i, c in enumerate(way))
-        rows.append((g_n + sp.diags_array(factor * problem.mu) @ slope)[rough])
+        rows.append((G[normal] + sp.diags_array(factor * problem.mu) @ slope)[rough])
     A = sp.vstack(rows, format="csr")
     p = len(problem.s)
     balance = sp.hstack([sp.csr_array(problem.V[normal].T), sp.csr_array((p, p))]) if p else None
     cost = np.concatenate([problem.q[:, 0], problem.s])
     cost = cost / (np.abs(cost).max(initial=0.0) or 1.0)
+    exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
     answer = linprog(
         cost,
         A,
@@ -176,11 +163,7 @@ def _program(
         np.zeros(p) if p else None,
         [(0, 1)] * k + [(-1, 1)] * p,
         method="highs",
-        options={
-            "time_limit": time_limit,
-            "primal_feasibility_tolerance": 1e-10,
-            "dual_feasibility_tolerance": 1e-10,
-        },
+        options={"time_limit": time_limit} | exact,
     )
     if answer.x is None or answer.fun is None or answer.fun > -1e-9:
         return None
@@ -202,8 +185,8 @@ def _polished(
     apex = (np.abs(g).max(axis=1) <= 1e-7 * size) & (size > 0)
     edge = ~apex & (np.abs(g[:, 0] + problem.mu * length) <= 1e-7 * size) & (size > 0)
     blocks = G.reshape(k, d, -1)
-    unit = np.divide(g[:, 1:], length[:, None], out=np.zeros((k, d - 1)), where=length[:, None] > 0)
-    slopes = blocks[:, 0] + problem.mu[:, None] * np.einsum("kd,kdj->kj", unit, blocks[:, 1:])
+    along = np.einsum("kd,kdj->kj", unit(g[:, 1:]), blocks[:, 1:])
+    slopes = blocks[:, 0] + problem.mu[:, None] * along
     smooth = problem.mu == 0
     balance = np.hstack([problem.V[normal[used]].T, np.zeros((len(motions), len(motions)))])
     rows = [
@@ -223,11 +206,8 @@ def _sentence(problem: InterfaceProblem, weights: np.ndarray, motions: np.ndarra
     largest = float(weights.max(initial=0.0))
     contacts: list[int] = np.flatnonzero(weights > 1e-6 * largest).tolist() if largest > 0 else []
     if len(contacts) == 0:
-        what = (
-            problem.motions[int(np.argmax(np.abs(problem.s * motions)))]
-            if problem.motions
-            else "the plate"
-        )
+        named = problem.motions or ["the plate"] * len(motions)
+        what = named[int(np.argmax(np.abs(problem.s * motions)))]
         return (
             f"no forces of the contacts can balance the load on {what}, so there is no solution;"
             " change the load."

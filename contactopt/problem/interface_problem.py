@@ -2,10 +2,8 @@
 
     u = Q r + V lambda + q,      V' r + s = 0,                                     (paper, eq (14))
     and at every contact a law, by default Coulomb's (contactopt.problem.laws has others):
-    u_n >= 0,  r_n >= 0,  u_n r_n = 0,                                                (Signorini)
-               (15)
-    |r_t| <= mu r_n,  and where u_t != 0:  r_t = -mu r_n u_t / |u_t|.                 (Coulomb)
-                      (16)-(17)
+    u_n >= 0,  r_n >= 0,  u_n r_n = 0,                                        (Signorini, eq (15))
+    |r_t| <= mu r_n,  and where u_t != 0:  r_t = -mu r_n u_t / |u_t|.        (Coulomb, (16)-(17))
 
 One block per contact node, normal component first. r is the force on the upper body, r_n >= 0 in
 compression; u is the relative displacement plus the initial gap, so that u_n is the gap that
@@ -36,10 +34,9 @@ from contactopt.linear.operators import (
     row_sizes,
     sparse,
 )
-from contactopt.problem.chart import Chart
+from contactopt.problem.chart import Chart, Pair
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.law import Law
-from contactopt.problem.pairs import Pair
 
 # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
 SYMMETRIC = 1e-2
@@ -99,91 +96,51 @@ class InterfaceProblem:
     ):
         if (law is None) == (mu is None):
             raise InputError("give either a law or a friction coefficient mu.")
-        fields = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
-        for name, value in (
-            fields
-            | {
-                "coordinates": coordinates,
-                "chart": chart,
-                "pairs": pairs,
-                "motions": motions,
-            }
-        ).items():
-            object.__setattr__(self, name, value)
-        self._check()
-
-    def _check(self) -> None:
-        q = np.atleast_2d(real_array("q", self.q))
+        q = np.atleast_2d(real_array("q", q))
         k, dim = q.shape if q.ndim == 2 else (len(q), 0)
         if dim not in (2, 3):
             raise InputError(
                 "q must have 2 or 3 columns (normal first), one row per contact; got shape"
                 f" {q.shape}."
             )
-        for name in ("V", "s", "areas", "coordinates"):
-            if given(getattr(self, name)):
-                object.__setattr__(self, name, real_array(name, getattr(self, name)))
-        if np.size(self.V) and not np.size(self.s):
+        if given(V) and not given(s):
             raise InputError(
                 "V has columns but s is empty; give the resultant s of every column of V."
             )
-        law = self.law if isinstance(self.law, Law) else Coulomb(self.law)
-        object.__setattr__(self, "law", law.spread(k))
-        places = np.atleast_2d(self.coordinates if np.size(self.coordinates) else np.arange(k))
-        implicit = isinstance(self.Q, InterfaceOperator)
-        arrays: dict[str, tuple[Any, tuple[int, ...]]] = {
-            "Q": (self.Q, (k * dim, k * dim)),
-            "q": (q, (k, dim)),
-            "s": (self.s, (np.size(self.s),)),
-            "V": (
-                self.V if np.size(self.s) else np.zeros((k * dim, 0)),
-                (k * dim, np.size(self.s)),
-            ),
-            "areas": (self.areas if np.size(self.areas) else np.ones(k), (k,)),
-            "coordinates": (places, (len(places), k)),
+        law = mu if law is None else law
+        law = law if isinstance(law, Law) else Coulomb(law)
+        s = real_array("s", s)
+        places = np.atleast_2d(
+            real_array("coordinates", coordinates) if given(coordinates) else np.arange(float(k))
+        )
+        arrays = {
+            "q": q,
+            "V": _shaped("V", V if s.size else np.zeros((k * dim, 0)), (k * dim, s.size)),
+            "s": _shaped("s", s, (s.size,)),
+            "areas": _shaped("areas", areas if given(areas) else np.ones(k), (k,)),
+            "coordinates": _shaped("coordinates", places, (len(places), k)),
         }
-        for name, (value, shape) in arrays.items():
-            array = self.Q if name == "Q" and implicit else _numbers(name, value)
-            if array.shape != shape:
-                raise InputError(f"{name} must have shape {shape}; got {array.shape}.")
-            if array is self.Q:
-                continue
-            (array.data if sp.issparse(array) else array).setflags(write=False)
-            object.__setattr__(self, name, array)
-        if self.chart is None:
-            object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
-        elif not isinstance(self.chart, Chart):
-            raise InputError(f"chart must be a Chart; got {type(self.chart).__name__}.")
-        elif self.chart.places.shape != (dim - 1, k):
+        for array in arrays.values():
+            array.setflags(write=False)
+        chart = _chart(chart, arrays["coordinates"], (dim - 1, k))
+        values = arrays | {
+            "Q": _compliance(Q, k * dim),
+            "law": law.spread(k),
+            "chart": chart,
+            "pairs": _consecutive(pairs, k, chart),
+            "motions": motions,
+        }
+        if motions and len(motions) != s.size:
             raise InputError(
-                f"the chart must have places of shape {(dim - 1, k)}; got"
-                f" {self.chart.places.shape}."
+                f"motions must name the {s.size} columns of V; got {len(motions)} names."
             )
-        pairs = self.pairs
-        if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
-            pairs = (Pair(pairs[0].name if pairs else "contact", 0, k, self.chart),)
-        if [pair.start for pair in pairs] + [k] != [0] + [pair.stop for pair in pairs]:
-            raise InputError(
-                f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}."
-            )
-        object.__setattr__(self, "pairs", pairs)
-        if self.motions and len(self.motions) != len(self.s):
-            raise InputError(
-                f"motions must name the {len(self.s)} columns of V; got {len(self.motions)} names."
-            )
-        if isinstance(self.Q, InterfaceOperator):
-            return
-        if diagonal(self.Q).min(initial=0.0) < -1e-12 * row_sizes(self.Q).max(initial=0.0):
-            raise InputError(
-                "Q must be positive semidefinite, but it has a negative diagonal entry; check its"
-                " sign."
-            )
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        facts = (count(self.contacts, "contact"), f"{self.dim}D", self._law, self._form)
-        return line(
-            "InterfaceProblem", *facts, count(len(self.s), "free motion") if len(self.s) else ""
-        )
+        free = count(len(self.s), "free motion") if len(self.s) else ""
+        contacts = count(self.contacts, "contact")
+        return line("InterfaceProblem", contacts, f"{self.dim}D", self._law, self._form, free)
 
     def _repr_html_(self) -> str:
         rows: dict[str, object] = {
@@ -191,8 +148,8 @@ class InterfaceProblem:
             "dimension": self.dim,
             "law": self._law,
             "Q": self._form,
+            "free motions": ", ".join(self.motions) or len(self.s),
         }
-        rows["free motions"] = ", ".join(self.motions) or len(self.s)
         if len(self.pairs) > 1:
             rows["pairs of surfaces"] = ", ".join(pair.name for pair in self.pairs)
         return card("InterfaceProblem", rows)
@@ -205,13 +162,8 @@ class InterfaceProblem:
 
     @property
     def _form(self) -> str:
-        form = (
-            "by products"
-            if isinstance(self.Q, InterfaceOperator)
-            else "sparse"
-            if sp.issparse(self.Q)
-            else "array"
-        )
+        form = "sparse" if sp.issparse(self.Q) else "array"
+        form = "by products" if isinstance(self.Q, InterfaceOperator) else form
         return f"Q {form} of {self.q.size} x {self.q.size}"
 
     @property
@@ -253,11 +205,7 @@ class InterfaceProblem:
 
         Returns
         -------
-        The problem itself if its Q is an array.
-
-        Raises
-        ------
-        InputError : If that would be too large (contactopt.linear.operators.MOST_BYTES).
+        The problem itself if its Q is an array. InputError if that would be too large.
         """
         return self if isinstance(self.Q, np.ndarray) else replace(self, Q=dense(self.Q))
 
@@ -276,15 +224,52 @@ class InterfaceProblem:
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
 
 
-def _numbers(name: str, value: Any) -> Any:
-    """The value as a real finite array of its own, or a sparse Q as sparse rows; InputError if it
-    is neither.
-    """
-    if name != "Q" or not sp.issparse(value):
-        return real_array(name, value)
-    if np.iscomplexobj(value):
-        raise InputError("Q must be real; got complex numbers.")
-    rows = sparse(value)
-    if not np.all(np.isfinite(rows.data)):
-        raise InputError("Q holds a number that is not finite.")
-    return rows
+def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """The value as a real finite array of its own, of that shape."""
+    array = real_array(name, value)
+    if array.shape != shape:
+        raise InputError(f"{name} must have shape {shape}; got {array.shape}.")
+    return array
+
+
+def _compliance(Q: Any, n: int) -> Interface:
+    """Q (n, n) in one of its three forms, as an array or rows of its own."""
+    if sp.issparse(Q):
+        if np.iscomplexobj(Q):
+            raise InputError("Q must be real; got complex numbers.")
+        Q = sparse(Q)
+        if not np.all(np.isfinite(Q.data)):
+            raise InputError("Q holds a number that is not finite.")
+        Q.data.setflags(write=False)
+    elif not isinstance(Q, InterfaceOperator):
+        Q = real_array("Q", Q)
+        Q.setflags(write=False)
+    if Q.shape != (n, n):
+        raise InputError(f"Q must have shape {(n, n)}; got {Q.shape}.")
+    if isinstance(Q, InterfaceOperator):
+        return Q
+    if diagonal(Q).min(initial=0.0) < -1e-12 * row_sizes(Q).max(initial=0.0):
+        raise InputError(
+            "Q must be positive semidefinite, but it has a negative diagonal entry; check its sign."
+        )
+    return Q
+
+
+def _chart(chart: Any, coordinates: np.ndarray, shape: tuple[int, int]) -> Chart:
+    if chart is None:
+        return Chart.of_points(coordinates, shape[0] + 1)
+    if not isinstance(chart, Chart):
+        raise InputError(f"chart must be a Chart; got {type(chart).__name__}.")
+    if chart.places.shape != shape:
+        raise InputError(f"the chart must have places of shape {shape}; got {chart.places.shape}.")
+    return chart
+
+
+def _consecutive(pairs: tuple[Pair, ...], k: int, chart: Chart) -> tuple[Pair, ...]:
+    if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
+        return (Pair(pairs[0].name if pairs else "contact", 0, k, chart),)
+    if [pair.start for pair in pairs] + [k] != [0] + [pair.stop for pair in pairs]:
+        raise InputError(
+            f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}."
+        )
+    return pairs

@@ -1,4 +1,4 @@
-"""The pairs of surfaces of an interface problem, and one pair taken alone.
+"""One pair of surfaces of an interface problem, taken alone.
 
 Places on a contact surface mean something within one pair only. Whoever reads them (figures,
 half-widths, preconditioners) does so pair by pair.
@@ -6,50 +6,14 @@ half-widths, preconditioners) does so pair by pair.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
 from contactopt.linear.operators import block
-from contactopt.problem.chart import Chart
-
-if TYPE_CHECKING:
-    from contactopt.problem.interface_problem import InterfaceProblem
-    from contactopt.problem.solution import Solution
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """Consecutive contacts of an interface problem that belong to one pair of surfaces.
-
-    name          of the pair, for messages, tables and files
-    start, stop   numbers of its first contact and of the first one after it
-    chart         places of its contacts on their surface
-    """
-
-    name: str
-    start: int
-    stop: int
-    chart: Chart
-
-    @property
-    def contacts(self) -> slice:
-        """Of arrays with one row per contact."""
-        return slice(self.start, self.stop)
-
-    def unknowns(self, dim: int) -> np.ndarray:
-        """Number the pair's rows in Q.
-
-        Parameters
-        ----------
-        dim : Number of components of a contact.
-
-        Returns
-        -------
-        (k_i dim,) numbers of the rows.
-        """
-        return np.arange(self.start * dim, self.stop * dim)
+from contactopt.problem.chart import Pair
+from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.solution import Solution
 
 
 def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
@@ -66,7 +30,8 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
     """
     if len(problem.pairs) == 1:
         return problem
-    rows, own = pair.unknowns(problem.dim), pair.contacts
+    own = pair.contacts
+    rows = np.arange(pair.start * problem.dim, pair.stop * problem.dim)
     return replace(
         problem,
         Q=block(problem.Q, rows),

@@ -1,4 +1,6 @@
-"""The dimensionless form of an interface problem, in which every method works."""
+"""The form of an interface problem in which every method works: without units, and with friction
+that is the same in all directions.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +9,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.linear.operators import NOISE, Interface, InterfaceOperator, diagonal, row_sizes
+from contactopt.linear.operators import (
+    NOISE,
+    Interface,
+    InterfaceOperator,
+    diagonal,
+    row_sizes,
+    turned,
+)
 from contactopt.problem.interface_problem import InterfaceProblem
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Units in which a problem is dimensionless: force, length, and one length per multiplier."""
+    """Units in which a problem is dimensionless: force, length, and one length per multiplier.
+
+    stretch  (k, dim - 1, dim - 1) what takes its tangential forces back (`isotropic`), or None
+    """
 
     force: float
     length: float
     multipliers: np.ndarray
+    stretch: np.ndarray | None = None
 
     def to_physical(
         self, reactions: np.ndarray, multipliers: np.ndarray
@@ -32,12 +45,15 @@ class Scales:
         -------
         Both in the units of the problem.
         """
+        if self.stretch is not None:
+            tangential = np.einsum("kab,kb->ka", self.stretch, reactions[:, 1:])
+            reactions = np.column_stack([reactions[:, 0], tangential])
         return reactions * self.force, multipliers * self.multipliers
 
     def to_dimensionless(
         self, reactions: np.ndarray, multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Take reactions and multipliers to the units of the dimensionless problem.
+        """Take reactions and multipliers to the dimensionless problem, as `to_physical` back.
 
         Parameters
         ----------
@@ -47,13 +63,44 @@ class Scales:
         -------
         Both without units.
         """
+        if self.stretch is not None:
+            tangential = np.linalg.solve(self.stretch, reactions[:, 1:, None])[:, :, 0]
+            reactions = np.column_stack([reactions[:, 0], tangential])
         return reactions / self.force, multipliers / self.multipliers
+
+
+def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
+    """Write a problem in variables in which friction is the same in all directions.
+
+    With S from `Law.stretch`, r = S y and v = S u give v = S Q S y + S V lambda + S q.
+
+    Parameters
+    ----------
+    problem : The interface problem.
+
+    Returns
+    -------
+    The problem in y and v; the problem itself where its law is the same in all directions.
+    """
+    stretch = problem.law.stretch(problem.dim)
+    if stretch is None:
+        return problem
+    blocks = np.tile(np.eye(problem.dim), (problem.contacts, 1, 1))
+    blocks[:, 1:, 1:] = stretch
+    places = np.arange(problem.contacts + 1)
+    S = sp.csr_array(sp.bsr_array((blocks, places[:-1], places), 2 * (problem.q.size,)))
+    return replace(
+        problem,
+        Q=turned(problem.Q, S),
+        q=(S @ problem.q.ravel()).reshape(problem.q.shape),
+        V=S @ problem.V,
+        law=problem.law.plain,
+    )
 
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
-    columns of V have length
-    one.
+    columns of V have length one.
 
     The force scale is the mean force that the balance asks of a node or, without a balance, the
     force that removes the root-mean-square overlap at one node. Gaps, however wide, do not count.
@@ -103,18 +150,10 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 
 def without_rounding(V: np.ndarray) -> np.ndarray:
-    """Motions without the entries that are rounding beside the largest of their column.
+    """Motions V (n, p) without the entries that are rounding beside the largest of their column.
 
     Normals of a flat surface that are off by rounding would let forces without friction hold a body
     along it: by motions without bound, which the certificate does not see.
-
-    Parameters
-    ----------
-    V : (n, p) motions.
-
-    Returns
-    -------
-    (n, p) motions, with zeros in place of rounding.
     """
     size = np.abs(V)
     return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)

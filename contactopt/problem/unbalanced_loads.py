@@ -14,13 +14,15 @@ Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.problem.cones import polygon
 from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.scaling import isotropic
 
-DIRECTIONS = 16  # of the polygon inside each cone, in 3D
 # work of the largest load over a motion's displacements from which on the motion counts
 SURE = 1e-6
 SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the motion at a contact
@@ -64,6 +66,7 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     """
     if not problem.law.unilateral or not np.any(problem.s):
         return None
+    problem = isotropic(problem)
     s = problem.s / np.abs(problem.s).max()
     if _balanced(problem, s):
         return None
@@ -85,21 +88,18 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     return Escape(motion, int(np.argmax(size)), opens)
 
 
-def _ways(dim: int) -> np.ndarray:
-    """Directions of slip (j, dim - 1), the corners of a polygon in 3D."""
-    if dim == 2:
-        return np.array([[1.0], [-1.0]])
-    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+def _along(rows: sp.csr_array, dim: int) -> list[Any]:
+    """V (k dim, p) along each direction of slip of the polygon."""
+    normal = np.arange(rows.shape[0] // dim) * dim
+    return [sum(c * rows[normal + 1 + i] for i, c in enumerate(way)) for way in polygon(dim)[0]]
 
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
     """Whether forces in polygons inside the cones are found that balance the loads."""
-    V, (k, d) = sp.csr_array(problem.V), problem.q.shape
-    normal = V[np.arange(k) * d]
-    slopes = [sum(c * V[np.arange(k) * d + 1 + i] for i, c in enumerate(way)) for way in _ways(d)]
+    V = sp.csr_array(problem.V)
+    normal, mu = V[:: problem.dim], sp.diags_array(problem.mu)
     edges = (
-        [normal + sp.diags_array(problem.mu) @ slope for slope in slopes]
+        [normal + mu @ slope for slope in _along(V, problem.dim)]
         if np.any(problem.mu)
         else [normal]
     )
@@ -134,18 +134,15 @@ def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.nda
     """
     from scipy.optimize import linprog
 
-    k, d = problem.q.shape
-    normal = np.arange(k) * d
-    ways, factor = _ways(d), 1.0 if d == 2 else 1 / np.cos(np.pi / DIRECTIONS)
-    mu, fixed = problem.mu, ~_cones(problem)
-    smooth = (mu == 0) | fixed
-    rows = [-V[normal[smooth]]]
-    for way in ways:
-        slope = sum(c * V[normal + 1 + i] for i, c in enumerate(way))
-        rows.append((sp.diags_array(factor * mu) @ slope - V[normal])[~smooth])
+    normal, factor = V[:: problem.dim], polygon(problem.dim)[1]
+    fixed = ~_cones(problem)
+    smooth = (problem.mu == 0) | fixed
+    mu = sp.diags_array(factor * problem.mu)
+    rows = [-normal[smooth]]
+    rows += [(mu @ slope - normal)[~smooth] for slope in _along(V, problem.dim)]
     A = sp.vstack(rows, format="csr")
-    rows_of_fixed = [V[normal[fixed] + 1 + i] for i in range(d - 1)] if fixed.any() else []
-    equal = sp.vstack([sp.csr_array(s[None]), *rows_of_fixed], format="csr")
+    blocks = np.arange(problem.q.size).reshape(problem.q.shape)
+    equal = sp.vstack([sp.csr_array(s[None]), V[blocks[fixed, 1:].ravel()]], format="csr")
     answer = linprog(  # z = z+ - z-
         np.ones(2 * len(s)),
         sp.hstack([A, -A], format="csr"),
@@ -156,11 +153,9 @@ def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.nda
         method="highs",
         options={"time_limit": SECONDS},
     )
-    return (
-        None
-        if answer.x is None or answer.status != 0
-        else np.asarray(answer.x[: len(s)] - answer.x[len(s) :])
-    )
+    if answer.x is None or answer.status != 0:
+        return None
+    return np.asarray(answer.x[: len(s)] - answer.x[len(s) :])
 
 
 def _cones(problem: InterfaceProblem) -> np.ndarray:

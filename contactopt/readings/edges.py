@@ -155,7 +155,7 @@ def stick_edge(
         return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
     if not status.slip.any():
         return contact, uncertain
-    bound, r_t = problem.law.bound(reactions[:, 0]), reactions[:, 1:]
+    bound, r_t = problem.law.bound_along(reactions), reactions[:, 1:]
     slack = bound - np.sum(r_t * _directions(problem, r_t, status.slip), axis=1)
     relative = slack / np.where(bound > 0, bound, 1.0)
     distance = None if slip is None else np.linalg.norm(slip, axis=1)

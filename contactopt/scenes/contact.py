@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from contactopt.checks import check_number, real_array
 from contactopt.errors import InputError
-from contactopt.problem.laws import find_law
+from contactopt.problem.laws import Law, find_law
 
 SIDES = ("upper", "lower")
 
@@ -27,20 +27,24 @@ class Contact:
                   its Part
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
                   tangential traction [stress]; a number >= 0, one per contact (k,), or a function
-                  of the contacts' positions (dim, k) that gives either
+                  of the contacts' positions (dim, k) that gives either; for 'orthotropic' two
+                  coefficients instead of one
     law           a name in contactopt.problem.laws.LAWS
     coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
                   the surfaces
+    direction     of friction in space, one number per component: the law 'orthotropic' reads
+                  mu = (along, across) this direction, which is drawn on the surface
     carrier       the side whose nodes carry the contacts, 'upper' or 'lower', for couplings that
                   can choose; None: the coupling chooses
     """
 
     upper: str
     lower: str
-    mu: float | np.ndarray | Callable[[np.ndarray], Any]
+    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any]
     law: str = "coulomb"
     coupling: str = "auto"
     carrier: str | None = None
+    direction: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         for side in (self.upper, self.lower):
@@ -54,7 +58,9 @@ class Contact:
             raise InputError(
                 f"the carrier of contact '{self.name}' must be 'upper', 'lower' or None."
             )
-        find_law(self.law)
+        law = find_law(self.law)
+        if self.direction is not None:
+            _check_direction(self.name, self.direction, law)
         if not callable(self.mu):
             _check_friction(self.mu)
 
@@ -79,7 +85,21 @@ class Contact:
     def friction(self) -> str:
         """The law and its number, for titles: 'mu = 0.3'."""
         name = "mu" if self.law in ("coulomb", "bilateral") else f"{self.law}, mu"
-        return f"{name} = {self.mu:g}" if isinstance(self.mu, (int, float)) else f"{name} varies"
+        if callable(self.mu):
+            return f"{name} varies"
+        values = np.ravel(self.mu)
+        one = np.ndim(self.mu) == 0 or (self.direction is not None and len(values) == 2)
+        return f"{name} = {' and '.join(f'{mu:g}' for mu in values)}" if one else f"{name} varies"
+
+
+def _check_direction(name: str, direction: Any, law: type[Law]) -> None:
+    if not law.directed:
+        raise InputError(
+            f"the law of contact '{name}' is the same in all directions; leave out the direction,"
+            " or take the law 'orthotropic'."
+        )
+    if not real_array(f"the direction of friction of contact '{name}'", direction).any():
+        raise InputError(f"the direction of friction of contact '{name}' is zero.")
 
 
 def _check_friction(mu: Any) -> None:

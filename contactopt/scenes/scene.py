@@ -6,7 +6,7 @@ system is the user's; the named scenes (contactopt.scenes) use newton, millimetr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -74,7 +74,7 @@ class Scene:
     name: str
     upper: Body | None = None
     lower: Body | None = None
-    mu: float | np.ndarray | Callable[[np.ndarray], Any] | None = None
+    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1

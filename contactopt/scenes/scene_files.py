@@ -352,9 +352,16 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
                     f" as '{body}:NAME', one of {', '.join(sorted(boundaries)) or 'none'}.",
                     side,
                 )
-    mu = _function(table, "mu", reading, needed=True)
+    if isinstance(table.data.get("mu"), list):
+        mu: Any = tuple(table.numbers("mu", 2, "a number, or two: along and across a direction"))
+    else:
+        mu = _function(table, "mu", reading, needed=True)
     texts = {key: table.take(key, str) for key in ("law", "coupling", "carrier")}
-    given = {key: value for key, value in texts.items() if value is not None}
+    given: dict[str, Any] = {key: value for key, value in texts.items() if value is not None}
+    way = table.table("direction")
+    if way is not None:
+        values = _components(way, reading, whole=True)
+        given["direction"] = tuple(values.get(c, 0.0) for c in reading.components)
     with table.about():
         made = Contact(table.take("upper", str), table.take("lower", str), mu, **given)
     table.close()

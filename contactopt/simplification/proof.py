@@ -25,9 +25,8 @@ from scipy.spatial import KDTree
 
 from contactopt.bodies import assemble
 from contactopt.bodies.body import Assembly
-from contactopt.coupling.coupling import Coupling, couple
+from contactopt.coupling.coupling import Coupling, couple, law_of
 from contactopt.problem.certificate import Yardsticks, yardsticks
-from contactopt.problem.laws import make_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Rigid, Scene
 from contactopt.simplification.constants import NEAR
@@ -71,7 +70,7 @@ def certificate_of_whole(
             r, measure = spread.reactions(pair, made)
             u = (made.upper @ moves[upper] - made.lower @ moves[lower]).reshape(r.shape)
             u[:, 0] += made.gap
-            law = make_law(pair.law, pair.mu, made.areas, made.positions)
+            law = law_of(pair, made)
             off = r - law.project(r - measure.rho[:, None] * u)[0]
             errors.append(float(np.linalg.norm(off, axis=1).max(initial=0.0)) / measure.force)
             forces[upper] += made.upper.T @ r.ravel()

@@ -196,7 +196,7 @@ class PathResult:
                 areas=problem.areas,
                 frames=self.reduction.frames,
                 reactions=forces,
-                bounds=[problem.law.bound(r[:, 0]) for r in forces],
+                bounds=[problem.law.bound_along(r) for r in forces],
                 status=[mask.stick + 2 * mask.slip for mask in masks],
                 displacements=[state.displacements for state in self.states],
             )

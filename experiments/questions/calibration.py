@@ -15,6 +15,7 @@ from contactopt import HalfSpace, Material, plots
 from contactopt.derivatives.outputs import seeds_of
 from contactopt.derivatives.parameters import parameter, put_all
 from contactopt.derivatives.states import along, solved_chain
+from contactopt.problem.contact_status import contact_status
 from experiments.report import write
 
 E, MU, FORCE = 5.0, 0.5, 100.0  # MPa, -, N
@@ -134,9 +135,8 @@ def knowledge() -> tuple[list[dict[str, Any]], np.ndarray]:
                 for one in which
             ]
             scaled = np.array(J).T / sigma * [E, mu]
-            slipping = int(
-                chain.steps[-1].problem.law.slipping(chain.steps[-1].solution.reactions).sum()
-            )
+            last = chain.steps[-1]
+            slipping = int(contact_status(last.problem, last.solution.reactions).slip.sum())
             singular = np.linalg.svd(scaled, compute_uv=False)
             blind = not singular[1] > 1e-8 * singular[0]
             out[i, j] = np.inf if blind else float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))

@@ -1,6 +1,4 @@
-"""Laws of contact and friction: one file each, one line here.
-
-Nothing is imported before it is used.
+"""Laws of contact and friction: one file each, one row here.
 
 A law says which forces a contact can carry and how they go with its displacement. It is a frozen
 dataclass whose fields are its parameters, one number per contact, and an InterfaceProblem carries
@@ -11,9 +9,10 @@ contact and an opening g_i that slip adds to the gap:
 
     law            K, forces that a contact can carry                  g, added to the gap
     coulomb        |r_t| <= mu r_n                                     mu |u_t|
+    orthotropic    |M^-1 r_t| <= r_n,  M = diag(mu_1, mu_2)            |M u_t|
     frictionless   r_n >= 0, r_t = 0                                   0
     associated     |r_t| <= mu r_n                                     0: slip itself opens the gap
-                   by mu |u_t|
+                                                                       by mu |u_t|
     tresca         r_n >= 0, |r_t| <= bound                            0
     bilateral      |r_t| <= mu |r_n|, the bound taken as given         0
     tied           all                                                 0
@@ -31,7 +30,33 @@ import numpy as np
 
 from contactopt.checks import real_array
 from contactopt.errors import InputError
+from contactopt.problem.laws.associated import Associated
+from contactopt.problem.laws.bilateral import Bilateral
+from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.problem.laws.frictionless import Frictionless
 from contactopt.problem.laws.law import Law
+from contactopt.problem.laws.mixed import Mixed, join
+from contactopt.problem.laws.orthotropic import Orthotropic
+from contactopt.problem.laws.place import Place
+from contactopt.problem.laws.tied import Tied
+from contactopt.problem.laws.tresca import Tresca
+
+__all__ = [
+    "LAWS",
+    "Associated",
+    "Bilateral",
+    "Coulomb",
+    "Frictionless",
+    "Law",
+    "Mixed",
+    "Orthotropic",
+    "Place",
+    "Tied",
+    "Tresca",
+    "find_law",
+    "join",
+    "make_law",
+]
 
 # name -> (module, class, what it is)
 LAWS = {
@@ -39,6 +64,11 @@ LAWS = {
         "contactopt.problem.laws.coulomb",
         "Coulomb",
         "contact that may open; Coulomb friction",
+    ),
+    "orthotropic": (
+        "contactopt.problem.laws.orthotropic",
+        "Orthotropic",
+        "Coulomb friction with two coefficients, along and across a direction",
     ),
     "bilateral": (
         "contactopt.problem.laws.bilateral",
@@ -73,11 +103,7 @@ def find_law(name: str) -> type[Law]:
 
     Returns
     -------
-    The subclass of Law.
-
-    Raises
-    ------
-    InputError : If there is no law of that name.
+    The subclass of Law. InputError if there is no law of that name.
     """
     if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
@@ -86,29 +112,22 @@ def find_law(name: str) -> type[Law]:
     return law
 
 
-def make_law(name: str, value: Any, areas: np.ndarray, places: np.ndarray) -> Law:
+def make_law(name: str, value: Any, place: Place, positions: np.ndarray) -> Law:
     """Make the law that a scene means at its contacts.
 
     Parameters
     ----------
     name : A name in LAWS.
     value : What the law reads: a friction coefficient, or for `tresca` a traction bound [stress].
-        One number, an array (k,), or a function of the places (dim, k) that gives either.
-    areas, places : Nodal areas (k,) and positions (dim, k) of the contacts.
+        One number, an array (k,), or a function of the positions that gives either; for
+        `orthotropic` two of them.
+    place : Where the contacts are.
+    positions : (dim, k) of the contacts.
 
     Returns
     -------
-    The law, with one parameter for each contact.
-
-    Raises
-    ------
-    InputError : On an unknown name and on values that are not numbers, negative, or not one per
-        contact.
+    The law, with one parameter for each contact. InputError on an unknown name and on values that
+    are not numbers, negative, or of another shape.
     """
-    values = real_array("the friction of a scene", value(places) if callable(value) else value)
-    if values.shape not in ((), areas.shape):
-        raise InputError(
-            f"the friction of a scene must be one number or one per contact, shape {areas.shape};"
-            f" got {values.shape}."
-        )
-    return find_law(name).of_place(np.broadcast_to(values, areas.shape), areas).spread(len(areas))
+    values = real_array("the friction of a scene", value(positions) if callable(value) else value)
+    return find_law(name).of_place(values, place).spread(len(place.areas))

@@ -8,6 +8,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,6 @@ class Frictionless(Law):
         return out
 
     @classmethod
-    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Frictionless:
+    def of_place(cls, values: np.ndarray, place: Place) -> Frictionless:
         """Whatever the value that the scene gives: it has no meaning for this law."""
-        return cls(np.zeros(len(areas)))
+        return cls(np.zeros(len(place.areas)))

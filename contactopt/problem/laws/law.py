@@ -11,13 +11,11 @@ import numpy as np
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.cones import unit
+from contactopt.problem.laws.place import Place
 
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
-
-
 # a tangential force sticks if it is below its bound by more than this, relative to the bound
 BELOW = 1e-6
-
 
 # points (k, dim) and the generalised derivative (k, dim, dim)
 Projected = tuple[np.ndarray, np.ndarray]
@@ -47,12 +45,14 @@ class Law:
     proportional  the friction bound is mu |r_n|, with mu the coefficient
     dilatant      slip opens the gap
     bounded       tangential forces have a bound
+    directed      a scene may give it a direction of friction
     """
 
     convex: bool = False
     proportional: bool = False
     dilatant: bool = False
     bounded: bool = True
+    directed: bool = False
 
     def __post_init__(self) -> None:
         for name in self.parameters:
@@ -62,11 +62,10 @@ class Law:
                     f"{name} must be a number or one number per contact; got shape {value.shape}."
                 )
             if np.any(value < 0):
-                what = {"mu": "the friction coefficient mu", "limit": "the friction bound"}.get(
-                    name, name
-                )
+                named = {"mu": "the friction coefficient mu", "limit": "the friction bound"}
                 raise InputError(
-                    f"{what} must not be negative; its least value is {value.min():g}."
+                    f"{named.get(name, name)} must not be negative; its least value is"
+                    f" {value.min():g}."
                 )
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -93,7 +92,7 @@ class Law:
 
     @property
     def coefficient(self) -> np.ndarray:
-        """(k,) friction coefficients, 0 where the law has none."""
+        """(k,) friction coefficients, the largest of all directions; 0 where the law has none."""
         return np.zeros(self.contacts)
 
     @property
@@ -101,8 +100,27 @@ class Law:
         """(k,) mask of the contacts that can carry a tangential force."""
         return self.coefficient > 0
 
+    @property
+    def plain(self) -> Law:
+        """The law that holds in the variables of `stretch`, the same in all directions."""
+        return self
+
+    def stretch(self, dim: int) -> np.ndarray | None:
+        """Compute variables in which friction is the same in all directions of the surface.
+
+        Parameters
+        ----------
+        dim : Number of components of a contact.
+
+        Returns
+        -------
+        Symmetric matrices S (k, dim - 1, dim - 1): where r_t = S y_t and u_t = S^-1 v_t obey this
+        law, y_t and v_t obey `plain`. None: the law is `plain` itself, S = 1.
+        """
+        return None
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
-        """Compute the largest tangential force that each contact can carry.
+        """Compute the largest tangential force that each contact can carry in any direction.
 
         Parameters
         ----------
@@ -113,6 +131,19 @@ class Law:
         (k,) largest |r_t| [force].
         """
         raise NotImplementedError
+
+    def bound_along(self, r: np.ndarray) -> np.ndarray:
+        """Compute the largest tangential force that each contact can carry in the direction of r_t.
+
+        Parameters
+        ----------
+        r : (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        (k,) largest |r_t| [force].
+        """
+        return self.bound(r[:, 0])
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
         """Project points on the set K of forces, with the generalised derivative of the projection.
@@ -143,8 +174,7 @@ class Law:
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
-        """Evaluate the map P of Newton's equations r = P(r - rho u), and its generalised
-        derivative.
+        """Evaluate the map P of Newton's equations r = P(r - rho u), with its derivative.
 
         Parameters
         ----------
@@ -152,7 +182,7 @@ class Law:
 
         Returns
         -------
-        P(y) (k, dim), and its derivatives (k, dim, dim).
+        P(y) (k, dim), and its generalised derivatives (k, dim, dim).
         """
         return self.nearest_derivative(y, y[:, 0])
 
@@ -165,11 +195,7 @@ class Law:
 
         Returns
         -------
-        (k, dim) derivatives.
-
-        Raises
-        ------
-        InputError : For a law that does not know it.
+        (k, dim) derivatives. InputError for a law that does not know them.
         """
         raise InputError(
             f"the law {type(self).__name__} has no derivative by its parameter"
@@ -189,7 +215,7 @@ class Law:
         Two masks (k,).
         """
         normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
-        slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound(y[:, 0])
+        slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound_along(y)
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
@@ -206,9 +232,8 @@ class Law:
         """
         out = y.copy()
         out[kinks.normal, 0] = 0.0
-        out[:, 1:] = np.where(
-            kinks.tangential[:, None], unit(y[:, 1:]) * self.bound(out[:, 0])[:, None], y[:, 1:]
-        )
+        edge = unit(y[:, 1:]) * self.bound_along(out)[:, None]
+        out[:, 1:] = np.where(kinks.tangential[:, None], edge, y[:, 1:])
         return out
 
     def idle(self, y: np.ndarray) -> np.ndarray:
@@ -237,21 +262,11 @@ class Law:
         """
         return np.zeros(len(u_t))
 
-    def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float | np.ndarray) -> np.ndarray:
-        """Evaluate proj_K(r - rho (u + g n)), which is equal to r exactly where r and u obey the
-        law.
-
-        Parameters
-        ----------
-        r, u : Forces [force] and displacements [length] (k, dim), normal first.
-        rho : Step [force / length], one number or one per contact (k,).
-
-        Returns
-        -------
-        (k, dim) forces [force].
+    def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float) -> np.ndarray:
+        """proj_K(r - rho (u + g n)) (k, dim), which is equal to r exactly where r and u obey the
+        law; rho is a step [force / length].
         """
-        step = np.asarray(rho)[..., None] if np.ndim(rho) else rho
-        shifted = r - step * u
+        shifted = r - rho * u
         shifted[:, 0] -= rho * self.opening(u[:, 1:])
         return self.nearest(shifted, r[:, 0])
 
@@ -281,33 +296,11 @@ class Law:
         (k,) mask.
         """
         return self.pressed(r) & (
-            np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound(r[:, 0])
+            np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound_along(r)
         )
 
-    def slipping(self, r: np.ndarray) -> np.ndarray:
-        """Tell which contacts are pressed and carry a tangential force at its bound.
-
-        Parameters
-        ----------
-        r : (k, dim) contact forces, normal first [force].
-
-        Returns
-        -------
-        (k,) mask.
-        """
-        return self.pressed(r) & ~self.sticking(r)
-
     def scaled(self, force: float) -> Self:
-        """Write the same law with forces in another unit.
-
-        Parameters
-        ----------
-        force : The unit [force].
-
-        Returns
-        -------
-        The law in that unit.
-        """
+        """The same law with forces in another unit."""
         return self
 
     def times(self, factor: float) -> Self:
@@ -364,19 +357,8 @@ class Law:
         return self.select(first)
 
     def spread(self, k: int) -> Self:
-        """Make the law of k contacts: numbers become arrays (k,).
-
-        Parameters
-        ----------
-        k : Number of contacts.
-
-        Returns
-        -------
-        The law with arrays.
-
-        Raises
-        ------
-        InputError : On arrays of another length.
+        """The law of k contacts: numbers become arrays (k,); InputError on arrays of another
+        length.
         """
         for name in self.parameters:
             if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
@@ -386,18 +368,23 @@ class Law:
         return self._mapped(lambda parameter: np.broadcast_to(parameter, (k,)))
 
     @classmethod
-    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Law:
+    def of_place(cls, values: np.ndarray, place: Place) -> Law:
         """Make the law of a scene's contacts from the values that the scene gives.
 
         Parameters
         ----------
-        values : (k,) friction coefficients, unless the law says otherwise.
-        areas : (k,) nodal areas [length^2].
+        values : Friction coefficients, unless the law says otherwise: one, or one per contact (k,).
+        place : Where the contacts are.
 
         Returns
         -------
-        The law of the k contacts.
+        The law of the k contacts. InputError on values of another shape.
         """
+        if values.shape not in ((), place.areas.shape):
+            raise InputError(
+                "the friction of a scene must be one number or one per contact, shape"
+                f" {place.areas.shape}; got {values.shape}."
+            )
         return cls(values)  # type: ignore[call-arg]
 
     @property

@@ -21,11 +21,7 @@ class Mixed(Law):
     members: tuple[np.ndarray, ...]
 
     def __post_init__(self) -> None:
-        together = (
-            np.concatenate([np.asarray(m, dtype=int) for m in self.members])
-            if self.members
-            else np.zeros(0)
-        )
+        together = np.concatenate([np.zeros(0, dtype=int), *self.members]).astype(int)
         if not np.array_equal(np.sort(together), np.arange(len(together))):
             raise InputError(
                 "every contact needs exactly one law; the contacts of the laws overlap or leave"
@@ -36,13 +32,9 @@ class Mixed(Law):
                 raise InputError(
                     f"a law of {law.contacts} contacts was given for {len(own)} of them."
                 )
-        for flag, together_ in (
-            ("convex", all),
-            ("proportional", all),
-            ("dilatant", any),
-            ("bounded", all),
-        ):
-            object.__setattr__(self, flag, together_(getattr(law, flag) for law in self.parts))
+        for flag in ("convex", "proportional", "bounded"):
+            object.__setattr__(self, flag, all(getattr(law, flag) for law in self.parts))
+        object.__setattr__(self, "dilatant", any(law.dilatant for law in self.parts))
 
     @property
     def contacts(self) -> int:
@@ -60,8 +52,24 @@ class Mixed(Law):
     def rough(self) -> np.ndarray:
         return self._gathered(lambda law, own: law.rough)
 
+    @property
+    def plain(self) -> Law:
+        return join([(law.plain, own) for law, own in zip(self.parts, self.members)])
+
+    def stretch(self, dim: int) -> np.ndarray | None:
+        made = [law.stretch(dim) for law in self.parts]
+        if all(S is None for S in made):
+            return None
+        out = np.tile(np.eye(dim - 1), (self.contacts, 1, 1))
+        for S, own in zip(made, self.members):
+            out[own] = np.eye(dim - 1) if S is None else S
+        return out
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return self._gathered(lambda law, own: law.bound(r_n[own]))
+
+    def bound_along(self, r: np.ndarray) -> np.ndarray:
+        return self._gathered(lambda law, own: law.bound_along(r[own]))
 
     def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
         return self._gathered(lambda law, own: law.nearest(y[own], r_n[own]))
@@ -76,10 +84,8 @@ class Mixed(Law):
         return self._gathered(lambda law, own: law.project_by_parameter(y[own]))
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
-        normal = self._gathered(lambda law, own: law.kinks(y[own], distance).normal)
-        return Kinks(
-            normal, self._gathered(lambda law, own: law.kinks(y[own], distance).tangential)
-        )
+        both = self._gathered(lambda law, own: np.stack(law.kinks(y[own], distance), axis=1))
+        return Kinks(*both.T)
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
         return self._gathered(

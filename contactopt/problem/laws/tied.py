@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,6 @@ class Tied(Law):
         return y.copy(), np.broadcast_to(np.eye(y.shape[1]), (*y.shape, y.shape[1])).copy()
 
     @classmethod
-    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Tied:
+    def of_place(cls, values: np.ndarray, place: Place) -> Tied:
         """Whatever the value that the scene gives: it has no meaning for this law."""
-        return cls(np.zeros(len(areas)))
+        return cls(np.zeros(len(place.areas)))

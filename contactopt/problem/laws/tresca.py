@@ -10,6 +10,7 @@ import numpy as np
 
 from contactopt.problem.cones import cylinder_derivative, disc, unit
 from contactopt.problem.laws.law import Law, Projected
+from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,5 +49,5 @@ class Tresca(Law):
         return replace(self, limit=count * self.limit[first])
 
     @classmethod
-    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Tresca:
-        return cls(values * areas)
+    def of_place(cls, values: np.ndarray, place: Place) -> Law:
+        return super().of_place(values * place.areas, place)
