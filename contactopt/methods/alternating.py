@@ -29,7 +29,7 @@ from contactopt.methods.backends import CONIC, QP, find
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.splitting import NormalProblem, TangentialProblem
 from contactopt.methods.kernels.subproblems import KrylovSubproblem
-from contactopt.methods.method import Iterate
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.methods.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
@@ -38,7 +38,7 @@ PCG = "pcg"  # the backend that needs no entry of Q
 
 
 @dataclass(frozen=True)
-class Alternating:
+class Alternating(Method):
     """The alternating iteration of the paper: a normal and a tangential convex program in turn.
 
     Parameters
@@ -76,25 +76,14 @@ class Alternating:
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
     def solves(self, law: Law) -> bool:
-        """Say whether the method solves problems of a law.
-
-        Parameters
-        ----------
-        law : The law of a problem.
-
-        Returns
-        -------
-        True for laws that bound tangential forces and under which slip does not open the gap.
-        """
+        """Laws that bound tangential forces and under which slip does not open the gap."""
         return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         # columns with normal entries
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
         normal, tangential = self._subproblems(problem, pushes)
-        r, multipliers = (
-            (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        )
+        r, multipliers = start or at_rest(problem)
         multipliers = multipliers.copy()
         while True:
             r, multipliers[pushes] = normal.solve(r, multipliers)
@@ -103,18 +92,14 @@ class Alternating:
             yield r, multipliers.copy()
 
     def _subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
-        _check_friction(problem, ~pushes)
+        if not pushes.all() and not np.any(problem.law.rough):
+            raise InputError(
+                "a plate that moves tangentially needs friction to hold it, but mu = 0."
+            )
         normal, tangential = self.backends(problem.dim)
         if normal == PCG:
             P = model_of(problem, self.preconditioner)
-            return KrylovSubproblem(problem, P, pushes, True), KrylovSubproblem(
-                problem, P, ~pushes, False
-            )
-        return NormalProblem(normal, problem, pushes), TangentialProblem(
-            tangential, problem, ~pushes
-        )
-
-
-def _check_friction(problem: InterfaceProblem, tangential: np.ndarray) -> None:
-    if tangential.any() and not np.any(problem.law.rough):
-        raise InputError("a plate that moves tangentially needs friction to hold it, but mu = 0.")
+            first = KrylovSubproblem(problem, P, pushes, True)
+            return first, KrylovSubproblem(problem, P, ~pushes, False)
+        first = NormalProblem(normal, problem, pushes)
+        return first, TangentialProblem(tangential, problem, ~pushes)

@@ -25,15 +25,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from contactopt.checks import check_number
 from contactopt.methods.constants import EIGENVALUE_MARGIN
 from contactopt.methods.kernels.alart_curnier import cold_start
 from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.kernels.mprgp import largest_eigenvalue
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.methods.proximal import proximal_equations
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
@@ -41,7 +39,7 @@ from contactopt.problem.laws.law import Law
 
 
 @dataclass(frozen=True)
-class AugmentedLagrangian:
+class AugmentedLagrangian(Method):
     """The augmented Lagrangian method, exact or in the variant of Uzawa.
 
     Parameters
@@ -56,9 +54,6 @@ class AugmentedLagrangian:
 
     def __post_init__(self) -> None:
         check_number("the penalty rho", self.rho, low=0.0)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def solves(self, law: Law) -> bool:
         """The exact variant solves every law; Uzawa's holds friction bounds, which associated
@@ -78,7 +73,7 @@ class AugmentedLagrangian:
             yield point
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
-        r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        r, lam = start or at_rest(problem)
         rho, low = (
             1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0),
             problem.law.lowest,

@@ -63,7 +63,7 @@ from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.methods.method import NATIVE, Iterate, Known
+from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
@@ -76,7 +76,7 @@ SAME = 1e-6  # relative difference of two residuals of a stage that goes round i
 
 
 @dataclass(frozen=True)
-class Auto:
+class Auto(Method):
     """The default method. It has no number to choose.
 
     Parameters
@@ -93,14 +93,11 @@ class Auto:
     def __post_init__(self) -> None:
         find_preconditioner(self.preconditioner)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
         if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
-            reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
+            reached = start or at_rest(problem)
         else:
             if isinstance(problem.Q, Convolution):
                 start = yield from self._nested(problem, start)

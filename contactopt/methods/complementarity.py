@@ -26,7 +26,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.linear.deadline import check_time
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import NATIVE, Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
 
@@ -35,7 +35,7 @@ PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 
 @dataclass(frozen=True)
-class Lemke:
+class Lemke(Method):
     """Lemke's method on the linear complementarity problem, for plane problems. It has no settings.
 
     It raises InputError in 3D and for more than 300 contacts.
@@ -71,17 +71,10 @@ class Lemke:
 def complementarity_problem(
     problem: InterfaceProblem, copositive: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Write a problem in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda
-    last in z.
+    """A problem of k contacts in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0.
 
-    Parameters
-    ----------
-    problem : The interface problem of k contacts under Coulomb's law.
-    copositive : Whether the form with 4 k unknowns is written, whose matrix is copositive.
-
-    Returns
-    -------
-    M (m, m), q (m,) and C (2 k, c).
+    `copositive` chooses the form with 4 k unknowns. Returns M (m, m), q (m,) and C (2 k, c) with r
+    = C z[:c]; lambda is last in z.
     """
     k, p = problem.contacts, len(problem.s)
     normal, tangent, eye = np.eye(2 * k)[:, ::2], np.eye(2 * k)[:, 1::2], np.eye(k)
@@ -97,17 +90,8 @@ def complementarity_problem(
 
 
 def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """Solve a linear complementarity problem by complementary pivots on w - M z - z0 = q.
-
-    Parameters
-    ----------
-    M : (m, m) matrix.
-    q : (m,) right-hand side.
-
-    Returns
-    -------
-    A solution z (m,) with z >= 0, M z + q >= 0 and z'(M z + q) = 0; None if the pivots end on a
-    ray.
+    """A solution z (m,) >= 0 with M z + q >= 0 and z'(M z + q) = 0, by complementary pivots on
+    w - M z - z0 = q; None if the pivots end on a ray.
     """
     m = len(q)
     if np.all(q >= 0):

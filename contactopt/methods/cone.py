@@ -30,8 +30,8 @@ from contactopt.errors import InputError
 from contactopt.methods.backends import CONIC, find
 from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.direct import CoulombSOCP
-from contactopt.methods.kernels.semismooth import crossover
-from contactopt.methods.method import Iterate
+from contactopt.methods.kernels.semismooth import Projection, crossover
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone_derivative
 from contactopt.problem.laws.law import Law
@@ -40,7 +40,7 @@ BRIDGES = ("clarabel", "cvxpy")
 
 
 @dataclass(frozen=True)
-class AcaryCadoux:
+class AcaryCadoux(Method):
     """The fixed point of Acary and Cadoux: one cone program after another.
 
     Parameters
@@ -96,17 +96,8 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 def cone_program(
     problem: InterfaceProblem, bridge: str, backend: str
 ) -> Callable[[np.ndarray], Iterate]:
-    """Prepare the cone program of the module's head for one opening after the other.
-
-    Parameters
-    ----------
-    problem : The interface problem of k contacts.
-    bridge : A name in BRIDGES.
-    backend : A name in CONIC, where the bridge is cvxpy.
-
-    Returns
-    -------
-    A function of the opening mu s (k,) [length] that returns r (k, dim) and multipliers (p,).
+    """The cone program of the module's head, as a function of the opening mu s (k,) [length] that
+    returns r (k, dim) and multipliers (p,).
     """
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
@@ -125,14 +116,7 @@ def cone_program(
             r, lam = answer["r"], answer["approach"]
         else:
             r, lam = direct.solve(c.ravel())
-        return crossover(
-            problem.Q,
-            c.ravel(),
-            V,
-            s_plates,
-            lambda y: coulomb_cone_derivative(y, problem.mu),
-            r.reshape(c.shape),
-            lam,
-        )
+        project: Projection = lambda y: coulomb_cone_derivative(y, problem.mu)  # noqa: E731
+        return crossover(problem.Q, c.ravel(), V, s_plates, project, r.reshape(c.shape), lam)
 
     return solve

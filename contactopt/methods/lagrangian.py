@@ -28,7 +28,7 @@ from contactopt.methods.constants import EIGENVALUE_MARGIN, ROUGH_NORMAL, SHARPE
 from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.kernels.mprgp import largest_eigenvalue, smalbe
 from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.laws.law import Law
@@ -37,7 +37,7 @@ INNER = 5000  # Uzawa steps in one tangential problem
 
 
 @dataclass(frozen=True)
-class Lagrangian:
+class Lagrangian(Method):
     """Uzawa's iteration on the friction forces inside the two-stage iteration.
 
     Parameters
@@ -50,14 +50,11 @@ class Lagrangian:
     def __post_init__(self) -> None:
         check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def solves(self, law: Law) -> bool:
         return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        r, lam = start or at_rest(problem)
         r_n, r_t, lam = r[:, 0], r[:, 1:], lam.copy()
         # columns with normal entries
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
@@ -78,9 +75,9 @@ class Part:
 
     def __init__(self, problem: InterfaceProblem, own: np.ndarray, first: int):
         blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-        here, there = (
-            (blocks[:, :1], blocks[:, 1:]) if first == 0 else (blocks[:, 1:], blocks[:, :1])
-        )
+        here, there = blocks[:, :1], blocks[:, 1:]
+        if first:
+            here, there = there, here
         rows, others = here.ravel(), there.ravel()
         self.problem, self.own, self.shape = problem, own, here.shape
         self.q, self.V, self.V_there = problem.q.ravel()[rows], problem.V[rows], problem.V[others]

@@ -34,7 +34,7 @@ from contactopt.methods.constants import (
     NESTED_TIGHTEST,
 )
 from contactopt.methods.kernels.levels import Evaluation, Level, Point, step
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
@@ -47,16 +47,13 @@ NEAR = 1e-8
 
 
 @dataclass(frozen=True)
-class Nested:
+class Nested(Method):
     """No settings."""
 
     implicit: ClassVar[bool] = True
 
     def solves(self, law: Law) -> bool:
         return True
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         for point, _ in self.steps(problem, start):

@@ -41,7 +41,7 @@ from contactopt.methods.kernels.alart_curnier import (
 from contactopt.methods.kernels.balance import loose_motions, settled
 from contactopt.methods.kernels.coupled_newton import coupled_steps
 from contactopt.methods.kernels.krylov import model_of
-from contactopt.methods.method import NATIVE, Iterate, Known
+from contactopt.methods.method import Iterate, Known, Method
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
@@ -53,7 +53,7 @@ SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 
 
 @dataclass(frozen=True)
-class Newton:
+class Newton(Method):
     """Newton's method on the equations of Alart and Curnier.
 
     Parameters
@@ -78,9 +78,6 @@ class Newton:
             )
         find_preconditioner(self.preconditioner)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
@@ -90,19 +87,9 @@ class Newton:
     def steps(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
-        """Iterate as `iterate` does, and tell the residual of the equations.
+        """Iterates, each with the residual of the equations that its step began with.
 
-        Parameters
-        ----------
-        problem, start : As for `iterate`.
-
-        Yields
-        ------
-        An iterate, and the residual of the equations that its step began with.
-
-        Raises
-        ------
-        InputError : If the linear algebra that was asked for does not fit Q.
+        Raises InputError if the linear algebra that was asked for does not fit Q.
         """
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:

@@ -26,7 +26,7 @@ import scipy.sparse as sp
 from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import Interface
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws.law import Law
@@ -38,7 +38,7 @@ OFTEN = 100  # contacts between two looks at the clock
 
 
 @dataclass(frozen=True)
-class NSGS:
+class NSGS(Method):
     """Nonsmooth Gauss-Seidel: the law at one contact after another.
 
     Parameters
@@ -52,9 +52,6 @@ class NSGS:
 
     def __post_init__(self) -> None:
         check_number("the relaxation", self.relaxation, low=0.0, high=2.0)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def solves(self, law: Law) -> bool:
         return law.proportional and not law.dilatant

@@ -29,7 +29,7 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.linear.operators import shifted
 from contactopt.methods.auto import Auto
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem, natural_map_residual
 
 # certificate of the regularised problem, relative to the error 1 / factor that the penalty makes
@@ -37,7 +37,7 @@ EXACT = 1e-3
 
 
 @dataclass(frozen=True)
-class Penalty:
+class Penalty(Method):
     """The penalty method. The regularised problem is solved by `auto`.
 
     Parameters
@@ -55,9 +55,6 @@ class Penalty:
         check_number("the penalty factor", self.factor, low=0.0)
         if self.tangential_factor is not None:
             check_number("the tangential penalty factor", self.tangential_factor, low=0.0)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         softened = self.regularised(problem)

@@ -25,14 +25,14 @@ from contactopt.methods.backends import CONIC, QP, find
 from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.qp import BoxQP
 from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.method import Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws.law import Law
 
 
 @dataclass(frozen=True)
-class Tresca:
+class Tresca(Method):
     """The fixed point of Tresca: convex programs with friction bounds of the solution before.
 
     Parameters
@@ -96,13 +96,9 @@ class TrescaProblem:
         """r (k, dim) and the multipliers (p,) for the bounds g (k,)."""
         problem, c = self.problem, self.problem.q.ravel()
         if isinstance(self.solver, BoxQP):
-            low, high = (
-                np.stack([self.low, -g], axis=1),
-                np.stack([np.full(len(g), np.inf), g], axis=1),
-            )
-            r, lam = self.solver.solve(
-                c, -problem.s, low.ravel(), high.ravel(), start=start.ravel()
-            )
+            low = np.stack([self.low, -g], axis=1).ravel()
+            high = np.stack([np.full(len(g), np.inf), g], axis=1).ravel()
+            r, lam = self.solver.solve(c, -problem.s, low, high, start=start.ravel())
         else:
             answer = self.solver.solve(g=g)
             r, lam = answer["r"], answer["approach"]
