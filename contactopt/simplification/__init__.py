@@ -11,7 +11,7 @@ Four kinds of simplification are looked for, the exact ones first:
 |---|---|---|
 | `sections.py` | the third dimension, of prisms between rollers | none |
 | `mirrors.py` | one half, across each plane of mirror symmetry | none |
-| `joints.py` | slip of pairs that stick, friction of pairs that hardly rub | measured on a coarse mesh |
+| `joints.py` | slip of pairs that stick, friction of pairs that hardly rub | measured coarsely |
 | `large_bodies.py` | the mesh, where the contact is small beside the bodies | estimated |
 
 "Exact" means that the certificate of the whole was computed from the solution of the smaller scene,

@@ -37,13 +37,14 @@ AROUND = 0.5
 class Spot:
     """The contact as a coarse solve shows it.
 
-    half_width  of the contact [length];   force  total normal force
+    half_width  of the contact [length]
+    force       total normal force
     shear       total tangential forces (dim - 1,) on the upper body, along the tangents
     gap         the initial gap as a function of the distance from the middle (in 2D the place along
                 the line)
     size        distance from the contact to the nearest end of an elastic body [length]
-    slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation
-                [-]
+    slope       of the gap at the edge of the contact [-]
+    misfit      of the gap over the indentation [-]
     """
 
     half_width: float
@@ -67,9 +68,8 @@ def offered_half_spaces(scene: Scene, solved: Solved) -> Found:
         return [], []
     spot = spot_of(solved)
     if isinstance(spot, str):
-        return [], (
-            [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
-        )
+        told = [f"Half-spaces are no model of this scene: {spot}."]
+        return [], told if len(scene.pairs) == 1 else []
     size = f"{spot.size / spot.half_width:.3g} half-widths from the contact"
     if spot.error > WORST:
         error = f"{spot.error:.0%} in the peak pressure: the bodies end {size}"
@@ -115,9 +115,8 @@ def spot_of(solved: Solved) -> Spot | str:
     gap, slope, misfit = fitted
     # that of mirror images cancels
     shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))
-    return Spot(
-        half_width, float(r[:, 0].sum()), shear, gap, _size(solved, touching), slope, misfit
-    )
+    force, size = float(r[:, 0].sum()), _size(solved, touching)
+    return Spot(half_width, force, shear, gap, size, slope, misfit)
 
 
 def _gap(
@@ -143,21 +142,21 @@ def _size(solved: Solved, touching: np.ndarray) -> float:
     """Distance from the contact to the nearest side that does not go on from its surface."""
     reduction, scene, least = solved.reduction, solved.reduction.scene, np.inf
     centre = reduction.problem.coordinates[:, touching].mean(axis=1, keepdims=True)
+    planes = [plane for coupling in reduction.couplings for plane in coupling.planes]
     for part, made in zip(scene.parts, reduction.bodies):
-        if not isinstance(part, Part):
-            continue
-        basis, degree = made.body.basis, made.body.degree  # type: ignore[attr-defined]
-        mesh = basis.mesh
-        surface = np.concatenate([mesh.boundaries[name] for name in scene.surfaces_of(part)])
-        facets = np.setdiff1d(mesh.boundary_facets(), surface)
-        corners = mesh.p[:, mesh.facets[:, facets]]
-        outward, up = (face_nodes(basis, degree, own)[1] for own in (facets, surface))
-        around = up.mean(axis=1) @ outward > AROUND
-        for plane in (plane for coupling in reduction.couplings for plane in coupling.planes):
-            around |= plane.contains(corners.mean(axis=1), float(np.ptp(mesh.p, axis=1).max()))
-        if not around.all():
-            points = lattice_points(corners[:, :, ~around])
-            least = min(least, float(np.linalg.norm(points - centre, axis=0).min()))
+        if isinstance(part, Part):
+            basis, degree = made.body.basis, made.body.degree  # type: ignore[attr-defined]
+            mesh = basis.mesh
+            surface = np.concatenate([mesh.boundaries[name] for name in scene.surfaces_of(part)])
+            facets = np.setdiff1d(mesh.boundary_facets(), surface)
+            corners, extent = mesh.p[:, mesh.facets[:, facets]], float(np.ptp(mesh.p, axis=1).max())
+            outward, up = (face_nodes(basis, degree, own)[1] for own in (facets, surface))
+            around = up.mean(axis=1) @ outward > AROUND
+            for plane in planes:
+                around |= plane.contains(corners.mean(axis=1), extent)
+            if not around.all():
+                points = lattice_points(corners[:, :, ~around])
+                least = min(least, float(np.linalg.norm(points - centre, axis=0).min()))
     return least
 
 

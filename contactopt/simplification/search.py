@@ -51,14 +51,12 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
     if part is None or not scene.given:
         part = coarse(made.scene)
     if not part.solution.solved:
-        told = (
-            f"The scene was not solved on a coarse mesh ({part.solution.message}); contacts were"
-            " not looked at."
-        )
-        return replace(made, notes=(*made.notes, told))
-    more = offered_joints(made.scene, part)
-    spot, notes = offered_half_spaces(made.scene, part)
-    return replace(made, found=(*made.found, *more, *spot), notes=(*made.notes, *notes))
+        why, more = part.solution.message, []
+        notes = [f"The scene was not solved on a coarse mesh ({why}); contacts were not looked at."]
+    else:
+        more, notes = offered_half_spaces(made.scene, part)
+        more = [*offered_joints(made.scene, part), *more]
+    return replace(made, found=(*made.found, *more), notes=(*made.notes, *notes))
 
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
@@ -71,12 +69,8 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
 
     Returns
     -------
-    The report, whose `scene` is the given one where nothing was proved, and the solution of that
-    part on its own mesh; None in place of it where nothing was proved.
-
-    Raises
-    ------
-    InputError : As simplify().
+    The report, and the solution of its `scene` on that scene's own mesh. Where nothing was proved
+    the scene is the given one, and the solution is None.
     """
     notes: list[str] = []
     chain: list[Simplification] = []

@@ -1,4 +1,4 @@
-"""A scene with the meshes of its bodies: how large it is, and where its gaps and its friction act."""
+"""A scene with the meshes of its bodies: how large it is, and where its gaps and friction act."""
 
 from __future__ import annotations
 
@@ -62,14 +62,12 @@ class Whole:
     def acting(self, body: str, boundary: str) -> np.ndarray:
         """(dim, s) nodes of a boundary and points between them, on its curve as well."""
         if (body, boundary) not in self._acting:
-            corners, curve = self.corners(body, boundary), self.parts[body].curve_of(boundary)
-            x = lattice_points(corners)
-            on = (
-                x
-                if curve is None
-                else np.concatenate([x, np.asarray(curve(x), dtype=float)], axis=1)
+            x, curve = (
+                lattice_points(self.corners(body, boundary)),
+                self.parts[body].curve_of(boundary),
             )
-            self._acting[body, boundary] = on
+            curved = [] if curve is None else [np.asarray(curve(x), dtype=float)]
+            self._acting[body, boundary] = np.concatenate([x, *curved], axis=1)
         return self._acting[body, boundary]
 
     @cached_property
@@ -113,38 +111,34 @@ def sizes_of(scene: Scene) -> tuple[int, int]:
             numbers = skfem.Dofs(mesh, SHAPES[mesh.refdom.__name__][1][scene.degree]())
             unknowns += scene.dim * int(numbers.N)
             for name in scene.surfaces_of(part):
-                nodes[part.name, name] = len(
-                    numbers.get_facet_dofs(mesh.boundaries[name]).flatten()
-                )
+                own = numbers.get_facet_dofs(mesh.boundaries[name]).flatten()
+                nodes[part.name, name] = len(own)
         elif isinstance(part, HalfSpace):
             grid = [len(row) for row in part.ticks(scene.elements, scene.zone, scene.dim - 1)]
             unknowns += scene.dim * int(np.prod(grid))
             nodes[part.name, "contact"] = int(np.prod(grid))
     usual = {part.name: getattr(part, "contact", "contact") for part in scene.parts}
-    counts = [
-        max(
-            nodes.get((body, name or usual[body]), 0)
-            for body, name in zip(pair.bodies, pair.surfaces)
-        )
-        for pair in scene.pairs
-        if pair.law != "tied"
-    ]
-    return unknowns, sum(counts)
+    contacts = 0
+    for pair in scene.pairs:
+        if pair.law != "tied":
+            sides = zip(pair.bodies, pair.surfaces)
+            contacts += max(nodes.get((body, name or usual[body]), 0) for body, name in sides)
+    return unknowns, contacts
 
 
-def with_pairs(scene: Scene, pairs: tuple[Contact, ...]) -> Scene:
-    """The scene with other pairs of surfaces, in its short form if it has one and they fit."""
-    if scene.contacts or len(pairs) != 1:
-        return replace(
-            scene,
-            upper=None,
-            lower=None,
-            mu=None,
-            law="coulomb",
-            bodies=scene.parts,
-            contacts=pairs,
-        )
-    return replace(scene, mu=pairs[0].mu, law=pairs[0].law)
+def with_pairs(
+    scene: Scene, bodies: tuple[Any, ...], pairs: tuple[Contact, ...], **others: Any
+) -> Scene:
+    """The scene with other bodies, pairs of surfaces and fields, in its short form if it has one
+    and they fit.
+    """
+    if not scene.contacts and len(pairs) == 1 and len(bodies) == 2:
+        upper, lower = bodies
+        others |= {"upper": upper, "lower": lower, "mu": pairs[0].mu, "law": pairs[0].law}
+    else:
+        others |= {"upper": None, "lower": None, "mu": None, "law": "coulomb"}
+        others |= {"bodies": bodies, "contacts": pairs}
+    return replace(scene, **others)
 
 
 def of_mesh(mesh: Any, change: Callable[[Any], Any]) -> Any:
