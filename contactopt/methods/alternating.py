@@ -99,7 +99,7 @@ class Alternating(Method):
         normal, tangential = self.backends(problem.dim)
         if normal == PCG:
             P = model_of(problem, self.preconditioner)
-            first = KrylovSubproblem(problem, P, pushes, True)
-            return first, KrylovSubproblem(problem, P, ~pushes, False)
-        first = NormalProblem(normal, problem, pushes)
-        return first, TangentialProblem(tangential, problem, ~pushes)
+            pressing = KrylovSubproblem(problem, P, pushes, True)
+            return pressing, KrylovSubproblem(problem, P, ~pushes, False)
+        contact = NormalProblem(normal, problem, pushes)
+        return contact, TangentialProblem(tangential, problem, ~pushes)

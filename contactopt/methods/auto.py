@@ -113,7 +113,7 @@ class Auto(Method):
             reached = start or at_rest(problem)
         else:
             if isinstance(problem.Q, Convolution):
-                points = Nested().steps(problem, start)
+                points = Nested().with_residuals(problem, start)
                 best, _ = yield from _followed(points, lambda steps, since: since >= PATIENCE)
                 start = best or start
                 note(logger, NO_PROGRESS_NESTED)
@@ -276,13 +276,13 @@ def _newton(
 
     method, warm, least = Newton(preconditioner=preconditioner), start, np.inf
     if start is not None:
-        found, least = yield from _followed(method.steps(problem, start), tired)
+        found, least = yield from _followed(method.with_residuals(problem, start), tired)
         warm = found or start
         note(
             logger,
             "Newton's method made no progress from the given start and begins anew without it",
         )
-    found, residual = yield from _followed(method.steps(problem, None), spent)
+    found, residual = yield from _followed(method.with_residuals(problem, None), spent)
     return (found if residual < least else warm) or cold_start(problem)
 
 

@@ -15,8 +15,8 @@ from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
 from contactopt.linear.stacked import Stacked
-from contactopt.methods import Repeated, default_method, find_method, solvers_of
-from contactopt.methods.method import Iterate, Known, Method, at_rest, solves
+from contactopt.methods import Repeated, default_method, find_method, solvers_of, solves
+from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.notes import collected
 from contactopt.problem import (
     Infeasible,

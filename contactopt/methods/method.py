@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from contactopt.problem import InterfaceProblem, Law
+from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
@@ -50,12 +50,6 @@ class Method(Protocol):
         InputError : If one cannot be used.
         """
         return NATIVE, NATIVE
-
-
-def solves(method: Any, law: Law) -> bool:
-    """Whether a method solves problems of a law. One that says nothing about it solves all."""
-    predicate = getattr(method, "solves", None)
-    return predicate is None or bool(predicate(law))
 
 
 def at_rest(problem: InterfaceProblem) -> Iterate:

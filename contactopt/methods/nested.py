@@ -56,10 +56,10 @@ class Nested(Method):
         return True
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        for point, _ in self.steps(problem, start):
+        for point, _ in self.with_residuals(problem, start):
             yield point
 
-    def steps(
+    def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate, float]]:
         """Iterates on the finest grid with the residual of the equations."""

@@ -81,10 +81,10 @@ class Newton(Method):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        for point, _ in self.steps(problem, start):
+        for point, _ in self.with_residuals(problem, start):
             yield point
 
-    def steps(
+    def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
         """Iterates, each with the residual of the equations that its step began with.

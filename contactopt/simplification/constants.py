@@ -16,15 +16,6 @@ BETWEEN = 8
 PROVED = 1e-6  # certificate of the whole with the forces and displacements of the part, at most
 MOST = 2_000_000  # displacement unknowns of the largest whole that is assembled for a proof
 
-# Half-spaces instead of bodies (contactopt.simplification.large_bodies).
-# error of the peak pressure times (size of the body over the contact half-width)^2, in the plane
-FINITE = 0.45
-# error of the peak pressure over the square of the largest slope of the gap inside the contact
-STEEP = 0.15
-WORST = 0.05  # estimated error up to which half-spaces are offered
-ACROSS = {2: 128, 3: 32}  # points across the contact half-width of the half-spaces, by dimension
-REACH = 1.5  # half side of their points over the contact half-width
-
 # Bonded and frictionless pairs (contactopt.simplification.joints).
 SHARE = 0.8  # of its friction bound that no contact of a pair may use for the pair to be tied
 # largest tangential traction over the largest pressure below which friction is left out

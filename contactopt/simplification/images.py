@@ -220,10 +220,10 @@ class _Comparison:
         for one in _conditions(part, components):
             for two in others:
                 size = max(np.abs(one.values).max(), np.abs(two.values).max())
-                same = one.kind == two.kind and np.allclose(
-                    H @ one.space @ H, two.space, atol=EQUAL
+                same = one.kind == two.kind and bool(
+                    np.allclose(H @ one.space @ H, two.space, atol=EQUAL)
+                    and np.all(np.abs(H @ one.values - two.values) <= EQUAL * size)
                 )
-                same = same and np.all(np.abs(H @ one.values - two.values) <= EQUAL * size)
                 if same and (not one.where or self.fits(part.name, one.where, two.where)):
                     if one.item is two.item and isinstance(one.item, Plate):
                         found.add((part.name, part.loads.index(one.item)))

@@ -20,7 +20,7 @@ from contactopt.readings.quantities import elastic_energy
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import SHARE, SMOOTH
 from contactopt.simplification.findings import Simplification
-from contactopt.simplification.whole import sizes_of, with_pairs
+from contactopt.simplification.whole import whole_of, with_pairs
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 ROUGH = Options(tol=1e-6)
@@ -73,9 +73,9 @@ def _offer(
         " largest pressures on that mesh."
     )
     check: Callable[[Solved], str] = lambda simple: verdict(names, simple)  # noqa: E731
-    price = {"error": _change(solved, other), "check": check}
-    sizes = sizes_of(scene), sizes_of(made)
-    return Simplification(f"{law} contacts", what, why, *sizes, made, **price)
+    error, name = _change(solved, other), f"{law} contacts"
+    sizes = whole_of(scene).sizes, whole_of(made).sizes
+    return Simplification(name, what, why, *sizes, made, error=error, check=check)
 
 
 def _use_of_friction(solved: Solved, pair: Pair, value: Any) -> float:

@@ -14,7 +14,7 @@ from contactopt.errors import InputError
 from contactopt.simplification.findings import PARTS, Simplification
 from contactopt.simplification.halves import half_of, roller
 from contactopt.simplification.images import Images, Plane, images_under
-from contactopt.simplification.whole import Whole, sizes_of, whole_of
+from contactopt.simplification.whole import Whole, whole_of
 
 ACROSS = 1e-6  # cosine below which two normals are across each other
 UNIQUE = "Exact wherever the solution is unique."
@@ -54,10 +54,9 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
         except InputError as error:
             notes.append(f"{told}, but is not cut: {error}")
             continue
-        assert made is not None
         part = PARTS[2 ** (len(found) + 1)]
         what = f"The {part} on one side of the plane {where} stands for the whole."
-        sizes = sizes_of(whole.scene), sizes_of(scene)
+        sizes = whole.sizes, made.sizes
         found.append(Simplification("mirror symmetry", what, _why(images), *sizes, scene, (fold,)))
         whole = made
     return found, notes

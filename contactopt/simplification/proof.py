@@ -50,7 +50,9 @@ def certificate_of_whole(
     the meshes of both were made, and `folds` say how the whole lies on the part, one step after the
     other.
     """
-    bodies = {each.name: assemble(whole, each, elements, zone) for each in whole.parts}
+    bodies: dict[str, Any] = {}
+    for each in whole.parts:
+        bodies[each.name] = assemble(whole, each, elements, zone)
     spread = Spread(part, folds)
     errors = [0.0]
     try:
@@ -71,9 +73,10 @@ def certificate_of_whole(
         return np.inf
     for each in whole.parts:
         U, F = moves[each.name], forces[each.name]
-        rigid = isinstance(each, Rigid)
-        body = None if rigid else bodies[each.name].body
-        errors.append(_rigid(whole, each, U, F) if rigid else _elastic(body, U, F))
+        if isinstance(each, Rigid):
+            errors.append(_rigid(whole, each, U, F))
+        else:
+            errors.append(_elastic(bodies[each.name].body, U, F))
     return max(errors) if np.all(np.isfinite(errors)) else np.inf
 
 

@@ -22,7 +22,7 @@ from contactopt.simplification.constants import NEAR, ROUNDED
 from contactopt.simplification.findings import Simplification
 from contactopt.simplification.images import equal_functions
 from contactopt.simplification.proof import Key
-from contactopt.simplification.whole import Whole, of_mesh, sizes_of, with_pairs
+from contactopt.simplification.whole import Whole, of_mesh, whole_of, with_pairs
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _simplification(prism: _Prism, component: str) -> Simplification:
         f"The bodies are prisms along {component}, their ends are held along it, and nothing"
         " changes or acts along it. Exact wherever the solution is unique."
     )
-    sizes = sizes_of(prism.whole.scene), sizes_of(scene)
+    sizes = prism.whole.sizes, whole_of(scene).sizes
     return Simplification("plane strain", what, why, *sizes, scene, (fold,))
 
 

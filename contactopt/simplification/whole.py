@@ -13,7 +13,7 @@ import skfem
 from contactopt.bodies.body import check_mesh
 from contactopt.meshes.cells import SHAPES
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+from contactopt.scenes.scene import Part, Rigid, Scene
 from contactopt.simplification.constants import BETWEEN
 
 
@@ -43,6 +43,24 @@ class Whole:
     def size(self) -> float:
         """Largest extent [length]."""
         return float(np.ptp(self.points, axis=1).max())
+
+    @cached_property
+    def sizes(self) -> tuple[int, int]:
+        """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
+
+        Contacts are the nodes of the finer surface of each pair; supports are not taken off.
+        """
+        numbers, contacts = {}, 0
+        for name, mesh in self.meshes.items():
+            element = SHAPES[mesh.refdom.__name__][1][self.scene.degree]()
+            numbers[name] = skfem.Dofs(mesh, element)
+        for pair in self.scene.pairs:
+            if pair.law != "tied":
+                contacts += max(
+                    len(numbers[body].get_facet_dofs(self.meshes[body].boundaries[at]).flatten())
+                    for body, at in self.surfaces(pair)
+                )
+        return self.scene.dim * sum(int(each.N) for each in numbers.values()), contacts
 
     def corners(self, body: str, boundary: str) -> np.ndarray:
         """(dim, corners, m) of the facets of a boundary [length]."""
@@ -88,42 +106,18 @@ def lattice_points(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("dcm,cs->dsm", corners, weights).reshape(len(corners), -1))
 
 
-def whole_of(scene: Scene) -> Whole | None:
-    """The scene with its meshes; None where a body is a half-space or lives elsewhere."""
-    if not all(isinstance(part, (Part, Rigid)) for part in scene.parts):
-        return None
+def has_meshes(scene: Scene) -> bool:
+    """Whether all bodies are elastic with meshes, or rigid."""
+    return all(isinstance(part, (Part, Rigid)) for part in scene.parts)
+
+
+def whole_of(scene: Scene) -> Whole:
+    """The scene with its meshes."""
     parts = [part for part in scene.parts if isinstance(part, Part)]
     meshes = {part.name: part.build_mesh(scene.elements, scene.zone) for part in parts}
     for part in parts:
         check_mesh(scene, part, meshes[part.name])
     return Whole(scene, meshes)
-
-
-def sizes_of(scene: Scene) -> tuple[int, int]:
-    """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
-
-    Contacts are the nodes of the finer surface of each pair; supports are not taken off.
-    """
-    unknowns, nodes = 0, {}
-    for part in scene.parts:
-        if isinstance(part, Part):
-            mesh = part.build_mesh(scene.elements, scene.zone)
-            numbers = skfem.Dofs(mesh, SHAPES[mesh.refdom.__name__][1][scene.degree]())
-            unknowns += scene.dim * int(numbers.N)
-            for name in scene.surfaces_of(part):
-                own = numbers.get_facet_dofs(mesh.boundaries[name]).flatten()
-                nodes[part.name, name] = len(own)
-        elif isinstance(part, HalfSpace):
-            grid = [len(row) for row in part.ticks(scene.elements, scene.zone, scene.dim - 1)]
-            unknowns += scene.dim * int(np.prod(grid))
-            nodes[part.name, "contact"] = int(np.prod(grid))
-    usual = {part.name: getattr(part, "contact", "contact") for part in scene.parts}
-    contacts = 0
-    for pair in scene.pairs:
-        if pair.law != "tied":
-            sides = zip(pair.bodies, pair.surfaces)
-            contacts += max(nodes.get((body, name or usual[body]), 0) for body, name in sides)
-    return unknowns, contacts
 
 
 def with_pairs(
