@@ -1,19 +1,16 @@
 """Alternating direction method of multipliers over Coulomb's cones, the slip term renewed in every
 iteration.
 
-    min  r'Qr/2 + (q + g n)' r    subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,    g_i = mu_i
-         |u_t,i|:
-r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier
-x of r = z by their difference; -rho x is the velocity u + g n, which renews g in every iteration.
-For fixed g this converges for every rho; with g renewed there is no proof, it needs no full rank of
-Q, but strong friction may defeat it (reports/robustness). Other laws have other sets and openings
-(contactopt.problem.laws); where both are fixed, as for Tresca's and associated friction, it always
-converges. Cost: one factorisation of Q + rho I, 2 n^3/3 operations (LU, since a Q from a file need
-not be quite symmetric), and n^2 per iteration. rho is balanced after 10, 20, 40, ... iterations
-where that is worth a factorisation, so that the errors of r = z and of the velocity fall together.
+    min  r'Qr/2 + (q + g n)' r   subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,
+
+with g_i = mu_i |u_t,i|. r follows from one linear system with Q + rho I and the balance rows, z by projection, and the
+scaled multiplier x of r = z from their difference; -rho x is the velocity u + g n, which renews g.
+Other laws have other sets and openings (contactopt.problem.laws). rho is balanced after 10, 20, 40,
+... iterations where that is worth a factorisation, so that the errors of r = z and of the velocity
+fall together. An LU factorisation is taken, since a Q from a file need not be quite symmetric.
+
 Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato,
-Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM, for the iteration and
-the balancing of rho.
+Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM.
 """
 
 from __future__ import annotations
@@ -92,7 +89,7 @@ def _balancing(
 ) -> float:
     """The factor by which rho should change.
 
-    The larger error says which way: a larger rho lets r = z fall faster, a smaller one the velocity.
+    The larger error says which way: a larger rho lets r = z fall faster, a smaller one velocities.
     """
     primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
     parts = problem.Q @ z.ravel(), problem.q, rho * x  # the velocity is their difference

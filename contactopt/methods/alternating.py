@@ -1,16 +1,12 @@
 """The paper's two-stage iteration (section 5.1): normal and tangential forces in turn.
 
-Normal problem, r_t fixed (eq (21); its optimality conditions are Signorini's, eq (15)): a
-bound-constrained QP,
-    min  r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n    subject to  r_n >= 0,  V_n' r_n = -s - V_t'
-         r_t.
-Tangential problem, r_n fixed (eq (22)): a box-constrained QP with one tangential direction, an SOCP
-with two,
+Normal problem, r_t fixed (eq (21); its optimality conditions are Signorini's, eq (15)): a QP,
+    min  r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n    subject to  r_n >= 0,
+         V_n' r_n = -s - V_t' r_t.
+Tangential problem, r_n fixed (eq (22)): a QP with one tangential direction, an SOCP with two,
     min  r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t    subject to  |r_t| <= mu |r_n|.
 The multipliers of the balance rows are the plates' displacements. Plates that move tangentially
-only belong to the tangential problem. Each iteration costs one QP and one QP or SOCP. It contracts
-where friction couples weakly to the normal force (small mu, similar bodies) and may cycle
-otherwise; relaxation < 1 then often helps. A backend's answer is made exact by active-set steps, or
+only belong to the tangential problem. A backend's answer is made exact by active-set steps, or
 asked for again at tighter settings. The backend `pcg`, for both problems, forms no entry of Q:
 active sets and conjugate gradients with the preconditioners of contactopt.methods.preconditioners.
 """

@@ -5,12 +5,11 @@ fixed, the forces solve
     min  r'Qr/2 + (q + g n)' r    subject to  |r_t| <= mu r_n,  V'r + s = 0,
 a convex program over Coulomb's cones; g is renewed from its answer (the outer iteration that is
 yielded). Other laws have other sets and openings (contactopt.problem.laws); for bilateral contact
-the bound mu |r_n| is held. An inner iteration costs one product with Q (Nesterov's step 1 / largest
-eigenvalue, restarted where the momentum points uphill), an outer one many of them. The inner
-iteration always converges, in a number of steps like the square root of Q's condition number, and
-for singular Q more slowly; the fixed point has no proof of convergence. Sources: O'Donoghue, Candes
-(2015), Adaptive restart; Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear
-discrete Coulomb friction problem via convex optimization.
+the bound mu |r_n| is held. The inner iteration takes Nesterov's step 1 / largest eigenvalue and is
+restarted where the momentum points uphill.
+
+Sources: O'Donoghue, Candes (2015), Adaptive restart; Acary, Cadoux, Lemarechal, Malick (2011), A
+formulation of the linear discrete Coulomb friction problem via convex optimization.
 """
 
 from __future__ import annotations

@@ -1,22 +1,17 @@
-"""Augmented Lagrangian method (method of multipliers) for contact and friction together, after
-Alart and Curnier.
+"""Augmented Lagrangian method (method of multipliers) for contact and friction together.
 
 The forces are the multipliers of the contact conditions; the penalty rho augments them, and each
 iteration sets
-    r_j = P(r_{j-1} - rho u_j),  P the map of the law (contactopt.problem.laws),  u_j = Q r_j + V
-                                 lambda + q,
-with the balance V' r_j + s = 0. Seen from the forces this is the proximal-point iteration
-(Rockafellar): r_j solves Coulomb's problem with the compliance Q + I / rho, u = Q r_j + V lambda +
-q + (r_j - r_{j-1}) / rho. The default solves it exactly by semismooth Newton steps, one dense
-linear system each; rho does not change, unlike in `proximal`, so the error falls by 1 / (1 + rho *
-smallest eigenvalue of Q), or slower than any such factor where Q is singular. No proof for Coulomb
-friction; ends where Newton's steps fail on a subproblem: rho smaller then helps. explicit = True is
-Uzawa's variant, u_{j-1} in place of u_j: one product with Q per iteration, rho from Q's largest
-eigenvalue, lambda from the balance of the step itself. It needs as many iterations as Q's condition
-number and converges as gradient projections do: for small mu; with large ones it may cycle. P is
-not a projection on a fixed set, so that the balance is sought with the friction bounds of the last
-iterate. Sources: Alart, Curnier (1991); Simo, Laursen (1992), An augmented Lagrangian treatment of
-contact problems involving friction; Rockafellar (1976).
+    r_j = P(r_{j-1} - rho u_j),   u_j = Q r_j + V lambda + q,   with the balance V' r_j + s = 0,
+P the map of the law (contactopt.problem.laws). Seen from the forces this is the proximal-point
+iteration with the compliance Q + I / rho. The default solves it exactly by semismooth Newton steps;
+rho does not change, unlike in `proximal`, and the iteration ends where these steps fail.
+explicit = True is Uzawa's variant, u_{j-1} in place of u_j: one product with Q per iteration, rho
+from Q's largest eigenvalue, lambda from the balance of the step itself. P is not a projection on a
+fixed set, so that the balance is sought with the friction bounds of the last iterate.
+
+Sources: Alart, Curnier (1991); Simo, Laursen (1992), An augmented Lagrangian treatment of contact
+problems involving friction; Rockafellar (1976).
 """
 
 from __future__ import annotations

@@ -4,17 +4,14 @@ proximal loop.
 0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
    falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
-   force at all) while its residual falls. Elastic bodies end here (reports/newton_steps), each step
-   one dense linear system. Where its sortings go round in a circle near a solution, a few proximal
-   steps from the best of its points break out of it.
+   force at all) while its residual falls. Elastic bodies end here (reports/newton_steps). Where its
+   sortings go round in a circle near a solution, a few proximal steps break out of it.
 2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
-   deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. They need no
-   symmetric Q and no backend. Where these fail, it ends if a proof is found that there is no
-   solution (contactopt.problem.feasibility).
+   deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
+   fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
 3. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
    linear systems of it.
-4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex
-   programs.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
 5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early
    says nothing of the next; then the proximal loop from the best of all points, its weight falling
    slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved the
@@ -23,8 +20,7 @@ proximal loop.
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
-It ends where the driver's certificate or limits say so. There is no proof that it finds a solution:
-Coulomb's problem may have none.
+It ends where the driver's certificate or limits say so.
 """
 
 from __future__ import annotations
@@ -225,12 +221,7 @@ class _Robust:
         return self.better(start, reached)
 
     def proximal(
-        self,
-        start: Iterate,
-        patience: int,
-        alpha: float,
-        gentle: bool = False,
-        aim: float = np.inf,
+        self, start: Iterate, patience: int, alpha: float, gentle: bool = False, aim: float = np.inf
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns
         the last. `aim` is the residual that the first of these rounds must reach.

@@ -1,19 +1,18 @@
 """Coulomb friction in 2D as a linear complementarity problem (LCP), solved by Lemke's method.
 
-Split r_t = -mu r_n + x and u_t = v - y with v, y >= 0. Then 0 <= x = r_t + mu r_n and 0 <= mu r_n -
-r_t = 2 mu r_n - x say
-|r_t| <= mu r_n, x v = 0 says r_t = -mu r_n where u_t > 0, (2 mu r_n - x) y = 0 says r_t = mu r_n where u_t < 0: the law is
-    0 <= (r_n, x, y)  complementary to  (u_n, v = u_t + y, 2 mu r_n - x) >= 0,   u = Q r + V lambda
-                      + q,  r linear in (r_n, x).
-A free lambda is a - b with a, b >= 0, complementary to -(V' r + s) >= 0 and V' r + s >= 0: together
-they are the balance. Lemke's method pivots with the covering vector of ones; lexicographic ties
-keep degenerate problems from cycling. It may end on a ray (rare: measured for mu >= 2 only). Then a
-form with 4k unknowns is tried, r_t = b - c with b, c >= 0 and |u_t| bounded by y: its matrix is
-copositive for every Q >= 0 and mu, so that for positive definite Q and plates that press no ray
-exists, up to rounding. If that ends on a ray too there is no answer. About m = 3k to 4k pivots of 2
-m^2 operations: for small problems. Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring
-(1986), A mathematical programming approach to three-dimensional contact problems with friction;
-Stewart, Trinkle (1996) for the copositive form.
+Split r_t = -mu r_n + x and u_t = v - y with v, y >= 0. Then 0 <= x = r_t + mu r_n and
+0 <= mu r_n - r_t = 2 mu r_n - x say |r_t| <= mu r_n, x v = 0 says r_t = -mu r_n where u_t > 0,
+(2 mu r_n - x) y = 0 says r_t = mu r_n where u_t < 0: the law is
+    0 <= (r_n, x, y)  complementary to  (u_n, v = u_t + y, 2 mu r_n - x) >= 0,
+with u = Q r + V lambda + q and r linear in (r_n, x). A free lambda is a - b with a, b >= 0,
+complementary to -(V' r + s) >= 0 and V' r + s >= 0: together they are the balance. Lemke's method
+pivots with the covering vector of ones; lexicographic ties keep degenerate problems from cycling.
+It may end on a ray (rare: measured for mu >= 2 only). Then a form with 4k unknowns is tried, r_t =
+b - c with b, c >= 0 and |u_t| bounded by y: its matrix is copositive for every Q >= 0 and mu, so
+that for positive definite Q and plates that press no ray exists, up to rounding.
+
+Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring (1986), A mathematical programming
+approach to three-dimensional contact problems with friction; Stewart, Trinkle (1996).
 """
 
 from __future__ import annotations

@@ -5,17 +5,14 @@ Both solve, over Coulomb's cones,
     min  r' Q r / 2 + (q + mu s n)' r    subject to  |r_t| <= mu r_n,  V' r + s_plates = 0.
 `Relaxation` solves it once with s = 0. That is another law, friction with an associated flow rule:
 where a contact slips its gap opens by mu |u_t|, so that a block dragged along a plane rises from
-it. It gets stick, open contacts and problems without slip right; where contacts slip, forces and
-approach are off by a term that grows with mu. `AcaryCadoux` repeats it with s = |u_t| of the last
-answer, which takes the opening back; a fixed point is exactly a solution of Coulomb's problem. On a
-problem whose law is associated friction both solve that law, in one program. Each outer iteration
-costs one SOCP, whose matrices are handed over once; the answer is made exact by Newton steps on r =
-P(r - u), P the projection on the cones. Converges linearly where mu times the coupling of slip and
-dilatancy is small; there is no proof. Where Q is badly rank-deficient the Newton steps may fail,
-and the certificate stays at what the backend's accuracy gives. The SOCP has an answer unless loads
-pull the bodies apart or friction cannot hold a plate that is dragged. Source: Acary, Cadoux,
-Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via convex
-optimization.
+it. `AcaryCadoux` repeats it with s = |u_t| of the last answer, which takes the opening back; a
+fixed point is exactly a solution of Coulomb's problem. On a problem whose law is associated
+friction both solve that law, in one program. The answer of each program is made exact by Newton
+steps on r = P(r - u), P the projection on the cones; where Q is badly rank-deficient these may
+fail, and the certificate stays at what the backend's accuracy gives.
+
+Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb
+friction problem via convex optimization.
 """
 
 from __future__ import annotations

@@ -45,9 +45,9 @@ other solutions and the solution's change of state with mu are not covered: a he
 
 Relaxation. The cone program  min r'Qr/2 + q'r, |r_t| <= mu r_n, V'r + s = 0  asks for
 u_n >= mu |u_t| and r . u = 0. Its solution solves Coulomb's problem if and only if no loaded
-contact with friction slips in it (there it has u_n = mu |u_t|, Coulomb u_n = 0). mu = 0 is enough, and so is stick of all that touches if
-the rest opens by more than mu |u_t|; Q_nt = 0 is not. It is solved, and its answer certified for
-both problems. All of this is dense linear algebra, O(n^3), and one cone program.
+contact with friction slips in it (there it has u_n = mu |u_t|, Coulomb u_n = 0). mu = 0 is enough,
+and so is stick of all that touches if the rest opens by more than mu |u_t|; Q_nt = 0 is not. It is
+solved, and its answer certified for both problems.
 """
 
 from __future__ import annotations

@@ -4,15 +4,13 @@ section 5.1).
 Normal problem, r_t fixed: the QP (21), solved by conjugate gradients with bounds
 (contactopt.methods.kernels.mprgp) and made exact by active set steps. Tangential problem, r_n
 fixed: the friction force is the Lagrange multiplier of the bound on the slip rate; Uzawa's ascent
-on it,
-    r_t <- projection of r_t - rho u_t on the discs |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
+    r_t <- projection of r_t - rho u_t on |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
 is repeated until it has converged. It minimises the convex program (22) of `alternating`;
 tangentially moving plates keep their balance within the projection. rho = 1 / largest eigenvalue of
-Q_tt, so that the inner iteration always converges, linearly at a rate 1 - 1 / condition number of
-Q_tt: cheap iterations, one product with Q_tt each, but many. The outer loop contracts or cycles
-exactly as `alternating` does (moderate mu, weak coupling); relaxation < 1 helps there. Sources:
-Uzawa's method in Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational
-Inequalities; Panagiotopoulos (1975) for the alternation.
+Q_tt, so that the inner iteration always converges.
+
+Sources: Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational Inequalities, for
+Uzawa's method; Panagiotopoulos (1975) for the alternation.
 """
 
 from __future__ import annotations
@@ -84,7 +82,7 @@ class Part:
         self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
         self.step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(self.Q) or 1.0)
 
-    def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, ...]:
         """Linear term, own rigid motions and their resultants, given the other components' forces."""
         c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
         return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
@@ -103,17 +101,15 @@ class Part:
     def uzawa(
         self, r_t: np.ndarray, r_n: np.ndarray, lam: np.ndarray, accuracy: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The tangential program, until a step moves r_t by at most accuracy times the first step."""
+        """The tangential program, until a step moves r_t by no more than `accuracy` of its size."""
         c, V, s = self.data(r_n, lam)
-        radius, own, first = self.problem.law.bound(r_n), lam[self.own], 0.0
+        radius, own = self.problem.law.bound(r_n), lam[self.own]
+        project: Projection = lambda y: disc_derivative(y, radius)  # noqa: E731
         for _ in range(INNER):
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
-            new, own = project_balanced(
-                lambda y: disc_derivative(y, radius), y, V, s, self.step, own
-            )
-            move = float(np.linalg.norm(new - r_t))
-            r_t, first = new, max(first, move)
+            new, own = project_balanced(project, y, V, s, self.step, own)
+            move, r_t = float(np.linalg.norm(new - r_t)), new
             if move <= accuracy * max(1.0, float(np.linalg.norm(r_t))):
                 break
         return r_t, own

@@ -5,10 +5,11 @@ The problem is solved on coarse grids first, where it costs little to find out w
 and slip; each solution starts the next finer grid. The steps are those of the primal-dual active
 set method (`newton`), whose linear systems are solved by PCG or GMRES in single precision to the
 accuracy that the step is worth, while residuals are computed in double precision. Without friction
-only the normal components are computed. Sources: Polonsky, Keer (1999), A numerical method for
-solving rough contact problems based on the multi-level multi-summation and conjugate gradient
-techniques, for contact by FFT and conjugate gradients; Hueber, Stadler, Wohlmuth (2008) for the
-active sets; Eisenstat, Walker (1996) for the accuracy of steps.
+only the normal components are computed.
+
+Sources: Polonsky, Keer (1999), A numerical method for solving rough contact problems based on the
+multi-level multi-summation and conjugate gradient techniques; Hueber, Stadler, Wohlmuth (2008) for
+the active sets; Eisenstat, Walker (1996) for the accuracy of steps.
 """
 
 from __future__ import annotations

@@ -3,17 +3,15 @@ Coulomb friction.
 
 Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law
 (contactopt.problem.laws): each step sorts the contacts into open, sticking and slipping and solves
-one linear system of the closed ones: dense, n^3/3 to 2 n^3/3 operations, by sparse factors where Q
-is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that the step is worth
-(Eisenstat, Walker 1996), some ten products with Q each (contactopt.methods.kernels.krylov). Where
+one linear system of the closed ones: dense, by sparse factors where Q is sparse, or, where Q is an
+operator, by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker 1996). Where
 the bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
-(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution; the number of
-steps hardly depends on the mesh (reports/newton_steps). Motions that friction alone holds, and no
-sticking contact, follow from a convex problem before each step
-(contactopt.methods.kernels.balance). Not globally convergent: rank-deficient Q (rigid bodies,
-redundant contacts) or strong friction may make it cycle, which is what `proximal` is for. Sources:
-Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
-three-dimensional contact problems with Coulomb friction.
+(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution. Motions that
+friction alone holds, and no sticking contact, follow from a convex problem before each step
+(contactopt.methods.kernels.balance).
+
+Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm
+for three-dimensional contact problems with Coulomb friction.
 """
 
 from __future__ import annotations

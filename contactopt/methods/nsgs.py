@@ -7,10 +7,10 @@ eliminated and S the Schur complement, (S + l I) r_t = Q_tn v_n / Q_nn - v_t, an
 one equation for l with a root in a known interval: linear in 2D (closed form), solved by
 safeguarded Newton steps in 3D. Plates enter by the method of multipliers: the sweep works on Q +
 tau V V', q + V (lambda + tau s), and lambda grows by tau (V' r + s) after it; tau V' V = 10 mean
-compliances. A sweep costs one product with Q and k local problems of some microseconds each. No
-factorisation, works for rank-deficient Q; converges linearly, slowly where each contact feels all
-others, and may not converge for strong friction. Source: Jourdan, Alart, Jean (1998), A
-Gauss-Seidel like algorithm to solve frictional contact problems.
+compliances.
+
+Source: Jourdan, Alart, Jean (1998), A Gauss-Seidel like algorithm to solve frictional contact
+problems.
 """
 
 from __future__ import annotations

@@ -4,11 +4,10 @@ form of Q.
 Outer iterate r_j solves Coulomb's problem with u = Q r + V lambda + q + alpha (r - r_{j-1}), a
 problem whose compliance Q + alpha I has full rank, by Newton steps from r_{j-1} with a line search.
 alpha falls by 5 after a success and rises by 8 after a failure, so that the loop ends as Newton's
-method where that converges. The fixed points are exactly the solutions of Coulomb's problem; there
-is no proof of convergence for Coulomb friction. Cost: one linear system per Newton step, dense, or
-by a sparse factorisation where Q is sparse. Q need not be symmetric. Source: Acary, Bremond, Huber
-(2018), section on proximal-point algorithms; Rockafellar (1976). The multiplier form of the same
-loop is the augmented Lagrangian method with penalty 1 / alpha.
+method where that converges. The fixed points are exactly the solutions of Coulomb's problem. The
+multiplier form of the same loop is the augmented Lagrangian method with penalty 1 / alpha.
+
+Sources: Acary, Bremond, Huber (2018), section on proximal-point algorithms; Rockafellar (1976).
 """
 
 from __future__ import annotations

@@ -5,12 +5,12 @@ Each outer iteration solves ONE convex problem, normal and tangential forces tog
 a box-constrained QP with one tangential direction, an SOCP with two, and then sets g = mu |r_n|.
 Its answer is made exact by Newton steps on r = P(r - u), P the projection on half-lines and discs.
 The first bounds are those of the bonded problem if a plate presses the bodies together, else zero:
-then the first iterate is contact without friction. Converges linearly, at a rate proportional to mu
-times the coupling of normal and tangential forces; beyond a critical mu it cycles, and relaxation <
-1 then often helps. A fixed point is exactly a solution of Coulomb's problem. Bounds too small for a
-plate that is dragged tangentially leave the convex problem without an answer. Sources:
-Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for the
-numerical realization of contact problems with Coulomb friction.
+then the first iterate is contact without friction. A fixed point is exactly a solution of Coulomb's
+problem. Bounds too small for a plate that is dragged tangentially leave the convex problem without
+an answer.
+
+Sources: Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for
+the numerical realization of contact problems with Coulomb friction.
 """
 
 from __future__ import annotations

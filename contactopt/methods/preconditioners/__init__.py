@@ -11,14 +11,14 @@ Q itself. In 3D the sum of P21 along both directions of the contact surface is P
 P maps a relative displacement, the residual b - Q r of an iteration, to a force. P21 extends that
 displacement by zero, which is right only for displacements that vanish at the ends (H00^1/2). They
 do not vanish at a free edge. The matrix that P22 inverts, like Q, acts on forces. There are none
-outside the contact, so that extending them by zero is right. The third preconditioner,
-    `neumann`, the square root of the Laplacian of the contact line or surface (contactopt.methods.preconditioners.neumann),
-needs no extension, for its cosine transforms leave the ends free. A contact line that is closed by
-itself needs none for P21 and P22 either: the circulant matrices act on its own nodes. Contacts are
-found on their line or grid in the problem's chart, so that it does not matter how the bodies are
-turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions
-of the two bodies against each other, first of all the sway of a slender body: `deflated` solves for
-them exactly (balancing, Mandel 1993).
+outside the contact, so that extending them by zero is right. The third preconditioner, `neumann`,
+the square root of the Laplacian of the contact line or surface, needs no extension, for its cosine
+transforms leave the ends free. A contact line that is closed by itself needs none for P21 and P22
+either: the circulant matrices act on its own nodes. Contacts are found on their line or grid in the
+problem's chart, so that it does not matter how the bodies are turned. Each preconditioner acts on
+every component by itself. What is left are a few smooth motions of the two bodies against each
+other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing,
+Mandel 1993).
 
 Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a
 cheap product G, which `neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G

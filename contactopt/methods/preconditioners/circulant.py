@@ -103,7 +103,7 @@ def _circular(symbol: np.ndarray) -> GridMap:
 
 
 def closed_curve(k: int) -> int:
-    """Half the number of nodes of the closed curve around k contacts: a power of two, at least k."""
+    """Half the number of nodes of the closed curve: a power of two, at least k contacts."""
     return int(2 ** np.ceil(np.log2(k)))
 
 

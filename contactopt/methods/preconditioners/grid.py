@@ -1,4 +1,4 @@
-"""The grid of the contacts: a line, a closed curve or a rectangle of nodes that transforms work on."""
+"""The grid of the contacts: a line, a closed curve or a rectangle that transforms work on."""
 
 from __future__ import annotations
 
