@@ -35,14 +35,10 @@ CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
-# residual above which a method that has worked for long may be at a problem without a solution
-FAR = 0.1
-# seconds of work after which the proof is first looked for; then after ten times as long, and so on
-DOUBT = 1.0
+FAR = 0.1  # residual above which a method that works for long may be at one without a solution
+DOUBT = 1.0  # seconds of work before the proof is first looked for, then ten times as long, ...
 SAME = 1e-11  # relative distance at which two iterates are the same state
-# repeated states in a row after which a method is not going anywhere; some change course before
-# that
-CONFIRM = 8
+CONFIRM = 8  # repeated states in a row of a method that goes nowhere; some change course before
 
 
 def solve(
@@ -240,8 +236,8 @@ def _counts(Q: Interface) -> dict[str, float]:
     """
     if not isinstance(Q, InterfaceOperator):
         return {}
-    cycles = {} if Q.coupled is None else {"cycles": float(Q.coupled.cycles)}
-    return {"products": float(Q.products)} | cycles
+    counts: dict[str, float] = {"products": Q.products}
+    return counts if Q.coupled is None else counts | {"cycles": Q.coupled.cycles}
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:

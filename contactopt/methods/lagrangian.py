@@ -83,7 +83,7 @@ class Part:
         self.step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(self.Q) or 1.0)
 
     def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Linear term, own rigid motions and their resultants, given the other components' forces."""
+        """Linear term, own rigid motions and resultants, given the other components' forces."""
         c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
         return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
 

@@ -5,12 +5,9 @@
 
 # What counts as equal (contactopt.simplification.images). The proof on the whole has the last word.
 NEAR = 1e-9  # distance of nodes from their images, over the size of the scene
-# difference of loads, of gaps and of friction from their images, over their own values
-EQUAL = 1e-9
+EQUAL = 1e-9  # difference of loads, gaps and friction from their images, over their own values
 ROUNDED = 1e-12  # the same over the largest value anywhere: what rounding leaves where a gap closes
-# intervals of each edge of a facet at whose ends gaps and friction are compared, along the axis,
-# too
-BETWEEN = 8
+BETWEEN = 8  # intervals of each edge of a facet at whose ends gaps and friction are compared
 
 # Proofs (contactopt.simplification.proof).
 PROVED = 1e-6  # certificate of the whole with the forces and displacements of the part, at most
@@ -18,5 +15,4 @@ MOST = 2_000_000  # displacement unknowns of the largest whole that is assembled
 
 # Bonded and frictionless pairs (contactopt.simplification.joints).
 SHARE = 0.8  # of its friction bound that no contact of a pair may use for the pair to be tied
-# largest tangential traction over the largest pressure below which friction is left out
-SMOOTH = 1e-2
+SMOOTH = 1e-2  # largest tangential traction over the largest pressure, where friction is left out
