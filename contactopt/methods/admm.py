@@ -5,9 +5,10 @@ iteration.
 
 with g_i = mu_i |u_t,i|. r follows from one linear system with Q + rho I and the balance rows, z by
 projection, and the scaled multiplier x of r = z from their difference; -rho x is the velocity
-u + g n, which renews g. Other laws have other sets and openings (contactopt.problem.laws). rho is balanced after 10, 20, 40,
-... iterations where that is worth a factorisation, so that the errors of r = z and of the velocity
-fall together. An LU factorisation is taken, since a Q from a file need not be quite symmetric.
+u + g n, which renews g. Other laws have other sets and openings (contactopt.problem.laws). rho is
+balanced after 10, 20, 40, ... iterations where that is worth a factorisation, so that the errors of
+r = z and of the velocity fall together. An LU factorisation is taken, since a Q from a file need
+not be quite symmetric.
 
 Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato,
 Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM.

@@ -33,8 +33,45 @@ from contactopt.problem.laws.law import Law
 PCG = "pcg"  # the backend that needs no entry of Q
 
 
+class TwoStage(Method):
+    """The iteration, for any two solvers of the normal and of the tangential problem.
+
+    relaxation  fraction of each new tangential force that is taken, above 0 and at most 1
+    """
+
+    relaxation: float
+
+    def __post_init__(self) -> None:
+        check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
+
+    def solves(self, law: Law) -> bool:
+        """Laws that bound tangential forces and under which slip does not open the gap."""
+        return law.bounded and not law.dilatant
+
+    def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
+        """Solvers of the normal and of the tangential problem.
+
+        Each has `solve(r, multipliers)`, which returns r (k, dim) with its own components renewed,
+        and the multipliers of its own plates: those of the mask `pushes` (p,) belong to the normal
+        problem, all others to the tangential one.
+        """
+        raise NotImplementedError
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        # columns with normal entries
+        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
+        normal, tangential = self.subproblems(problem, pushes)
+        r, multipliers = start or at_rest(problem)
+        multipliers = multipliers.copy()
+        while True:
+            r, multipliers[pushes] = normal.solve(r, multipliers)
+            new, multipliers[~pushes] = tangential.solve(r, multipliers)
+            r = new + (1 - self.relaxation) * (r - new)
+            yield r, multipliers.copy()
+
+
 @dataclass(frozen=True)
-class Alternating(Method):
+class Alternating(TwoStage):
     """The alternating iteration of the paper: a normal and a tangential convex program in turn.
 
     Parameters
@@ -52,7 +89,7 @@ class Alternating(Method):
     preconditioner: str | None = None
 
     def __post_init__(self) -> None:
-        check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
+        super().__post_init__()
         find_preconditioner(self.preconditioner)
 
     @property
@@ -71,23 +108,7 @@ class Alternating(Method):
         tangential = self.tangential or ("proxqp" if dim == 2 else "clarabel")
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
-    def solves(self, law: Law) -> bool:
-        """Laws that bound tangential forces and under which slip does not open the gap."""
-        return law.bounded and not law.dilatant
-
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        # columns with normal entries
-        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
-        normal, tangential = self._subproblems(problem, pushes)
-        r, multipliers = start or at_rest(problem)
-        multipliers = multipliers.copy()
-        while True:
-            r, multipliers[pushes] = normal.solve(r, multipliers)
-            new, multipliers[~pushes] = tangential.solve(r, multipliers)
-            r = new + (1 - self.relaxation) * (r - new)
-            yield r, multipliers.copy()
-
-    def _subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
+    def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
         if not pushes.all() and not np.any(problem.law.rough):
             raise InputError(
                 "a plate that moves tangentially needs friction to hold it, but mu = 0."

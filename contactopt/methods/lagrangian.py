@@ -15,27 +15,26 @@ Uzawa's method; Panagiotopoulos (1975) for the alternation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
+from contactopt.methods.alternating import TwoStage
 from contactopt.methods.constants import EIGENVALUE_MARGIN, ROUGH_NORMAL, SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.kernels.mprgp import largest_eigenvalue, smalbe
 from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.method import Iterate, Method, at_rest
+from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
-from contactopt.problem.laws.law import Law
 
 INNER = 5000  # Uzawa steps in one tangential problem
 
 
 @dataclass(frozen=True)
-class Lagrangian(Method):
+class Lagrangian(TwoStage):
     """Uzawa's iteration on the friction forces inside the two-stage iteration.
 
     Parameters
@@ -45,25 +44,8 @@ class Lagrangian(Method):
 
     relaxation: float = 1.0
 
-    def __post_init__(self) -> None:
-        check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
-
-    def solves(self, law: Law) -> bool:
-        return law.bounded and not law.dilatant
-
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        r, lam = start or at_rest(problem)
-        r_n, r_t, lam = r[:, 0], r[:, 1:], lam.copy()
-        # columns with normal entries
-        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
-        normal, tangential = Part(problem, pushes, 0), Part(problem, ~pushes, 1)
-        change = 1.0
-        while True:
-            r_n, lam[pushes] = normal.exact(r_n, r_t, lam)
-            new, lam[~pushes] = tangential.uzawa(r_t, r_n, lam, max(SHARPER * change, SHARPEST))
-            change = float(np.linalg.norm(new - r_t)) / max(1.0, float(np.linalg.norm(new)))
-            r_t = new + (1 - self.relaxation) * (r_t - new)
-            yield np.concatenate([r_n[:, None], r_t], axis=1), lam.copy()
+    def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
+        return Normal(problem, pushes, 0), Tangential(problem, ~pushes, 1)
 
 
 class Part:
@@ -87,29 +69,41 @@ class Part:
         c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
         return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
 
-    def exact(
-        self, r_n: np.ndarray, r_t: np.ndarray, lam: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The normal QP."""
-        low = self.problem.law.lowest
-        c, V, s = self.data(r_t, lam)
-        rough = smalbe(self.Q, c, low, V.T, -s, r_n, lam[self.own], ROUGH_NORMAL)
-        project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
-        r, new = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
-        return r[:, 0], new
 
-    def uzawa(
-        self, r_t: np.ndarray, r_n: np.ndarray, lam: np.ndarray, accuracy: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The tangential program, until a step moves r_t by no more than `accuracy` of its size."""
-        c, V, s = self.data(r_n, lam)
-        radius, own = self.problem.law.bound(r_n), lam[self.own]
+class Normal(Part):
+    """The normal QP."""
+
+    def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
+        low = self.problem.law.lowest
+        c, V, s = self.data(r[:, 1:], lam)
+        rough = smalbe(self.Q, c, low, V.T, -s, r[:, 0], lam[self.own], ROUGH_NORMAL)
+        project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
+        r_n, own = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
+        return np.concatenate([r_n, r[:, 1:]], axis=1), own
+
+
+class Tangential(Part):
+    """The tangential program, until a step moves r_t by no more than `accuracy` of its size: a
+    hundredth of what the last solve moved it.
+    """
+
+    accuracy = SHARPER
+
+    def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
+        c, V, s = self.data(r[:, 0], lam)
+        r_t, radius, own = r[:, 1:], self.problem.law.bound(r[:, 0]), lam[self.own]
         project: Projection = lambda y: disc_derivative(y, radius)  # noqa: E731
         for _ in range(INNER):
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
             new, own = project_balanced(project, y, V, s, self.step, own)
-            move, r_t = float(np.linalg.norm(new - r_t)), new
-            if move <= accuracy * max(1.0, float(np.linalg.norm(r_t))):
+            move, r_t = _over(new, r_t), new
+            if move <= self.accuracy:
                 break
-        return r_t, own
+        self.accuracy = max(SHARPER * _over(r_t, r[:, 1:]), SHARPEST)
+        return np.concatenate([r[:, :1], r_t], axis=1), own
+
+
+def _over(new: np.ndarray, old: np.ndarray) -> float:
+    """How far forces moved, over their size."""
+    return float(np.linalg.norm(new - old)) / max(1.0, float(np.linalg.norm(new)))
