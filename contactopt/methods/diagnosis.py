@@ -186,8 +186,7 @@ class Diagnosis:
 
 
 def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Diagnosis:
-    """Say what is known of a problem before it is solved and, given a solution, of the iterations
-    near it.
+    """Say what is known of a problem before it is solved and, given one, near its solution.
 
     Parameters
     ----------
@@ -216,8 +215,8 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     eigenvalues = la.eigvalsh((problem.Q + problem.Q.T) / 2)
     top = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
     counted = eigenvalues[eigenvalues > len(eigenvalues) * np.finfo(float).eps * top]
-    uniform = _uniform_slip(scaled, shape)
-    one = problem.contacts == 1 and problem.dim == 2
+    skew = np.linalg.norm(problem.Q - problem.Q.T)
+    uniform, one = _uniform_slip(scaled, shape), problem.contacts == 1 and problem.dim == 2
     exact = one and _normal_plates(scaled) and uniform.unique > 0
     local = None
     if solution is not None:
@@ -238,9 +237,7 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
         rank=len(counted),
         least=float(eigenvalues.min(initial=0.0)) / top,
         condition=float(counted.max() / counted.min()) if len(counted) else np.inf,
-        asymmetry=float(
-            np.linalg.norm(problem.Q - problem.Q.T) / (np.linalg.norm(problem.Q) or 1.0)
-        ),
+        asymmetry=float(skew / (np.linalg.norm(problem.Q) or 1.0)),
         guaranteed=uniform if exact else _guaranteed(scaled, shape),
         uniform_slip=uniform,
         exact=exact,
