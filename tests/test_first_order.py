@@ -7,7 +7,7 @@ from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
 from contactopt.methods.admm import ADMM, Balanced
-from contactopt.methods.apg import APG, disc_qp
+from contactopt.methods.apg import APG
 from contactopt.methods.kernels.mprgp import (
     box_qp,
     largest_eigenvalue,
@@ -15,7 +15,6 @@ from contactopt.methods.kernels.mprgp import (
     projected_gradient,
     smalbe,
 )
-from contactopt.problem.cones import disc
 
 LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
 METHODS = {"apg": APG(), "admm": ADMM()}
@@ -103,26 +102,6 @@ def test_shapes_are_checked():
 def test_largest_eigenvalue():
     assert largest_eigenvalue(spd(30), 60) == pytest.approx(1.0, rel=0.05)
     assert largest_eigenvalue(np.zeros((3, 3))) == 0.0
-
-
-@pytest.mark.parametrize("d", [1, 2])
-def test_disc_qp_finds_the_forces_it_was_made_from(d):
-    """Stick, slip and zero radius prescribed: the linear term follows from u = 0 in stick and u
-    against t in slip.
-    """
-    k = 60
-    rng = np.random.default_rng(7)
-    radius = np.where(np.arange(k) % 5, rng.uniform(0.2, 1, k), 0.0)
-    unit = rng.normal(size=(k, d))
-    unit /= np.linalg.norm(unit, axis=1)[:, None]
-    sliding = np.arange(k) % 2 == 0
-    t = np.where(sliding, 1.0, rng.uniform(0.1, 0.9, k))[:, None] * radius[:, None] * unit
-    u = np.where(sliding | (radius == 0), rng.uniform(0.5, 2, k), 0.0)[:, None] * -unit
-    Q = spd(k * d, 8, 100.0)
-    c = u - (Q @ t.ravel()).reshape(k, d)
-    found, met = disc_qp(Q, c, radius, tol=1e-11)
-    assert met and np.allclose(found, t, atol=1e-8)
-    assert np.allclose(found, disc(found, radius))
 
 
 @pytest.mark.parametrize("name", METHODS)

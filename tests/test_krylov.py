@@ -213,7 +213,7 @@ def test_auto_falls_back_on_the_entries_of_Q():
 
 def test_auto_gives_up_a_start_that_leads_nowhere(monkeypatch):
     problem = reduce(scenes.flat_punch(2, elements=16, mu=0.3), Q="implicit")
-    cold, steps = solve(problem), Newton.steps
+    cold, steps = solve(problem), Newton.with_residuals
     bad = replace(cold, reactions=np.ones_like(cold.reactions))
 
     def lost(self, problem, start):
@@ -221,7 +221,7 @@ def test_auto_gives_up_a_start_that_leads_nowhere(monkeypatch):
             return steps(self, problem, start)
         return ((start, 1.0) for _ in range(100))
 
-    monkeypatch.setattr(Newton, "steps", lost)
+    monkeypatch.setattr(Newton, "with_residuals", lost)
     solution = solve(problem, start=bad)
     assert solution.solved and solution.iterations == cold.iterations + 2
 

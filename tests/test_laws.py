@@ -20,8 +20,7 @@ from contactopt import (
     scenes,
     solve,
 )
-from contactopt.methods import METHODS, find_method, solvers_of
-from contactopt.methods.method import solves
+from contactopt.methods import METHODS, find_method, solvers_of, solves
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws import (

@@ -276,7 +276,7 @@ def test_auto_leaves_newton_when_it_cycles(monkeypatch):
     problem, _ = dimensionless(rigid_bodies(1, 6, 14, 0.7))
     wrong = np.ones(problem.q.shape)
     monkeypatch.setattr(
-        "contactopt.methods.newton.Newton.steps",
+        "contactopt.methods.newton.Newton.with_residuals",
         lambda self, p, s=None: iter([((wrong, np.zeros(0)), 1.0)] * 50),
     )
     points = []

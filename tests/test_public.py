@@ -47,7 +47,8 @@ def symbols() -> dict[str, Any]:
         module = importlib.import_module(name)
         found[module.__name__] = module
         found |= {f"{module.__name__}.{inner}": thing for inner, thing in defined_in(module)}
-    for module, name, _ in METHODS.values():
+    for file, name, _ in METHODS.values():
+        module = f"contactopt.methods.{file}"
         found[f"{module}.{name}"] = getattr(importlib.import_module(module), name)
     return found
 

@@ -19,7 +19,7 @@ from importlib import import_module
 from typing import Any
 
 from contactopt.errors import InputError
-from contactopt.methods.method import Method, solves
+from contactopt.methods.method import Method
 from contactopt.problem import Law
 
 
@@ -31,76 +31,51 @@ class Repeated(Exception):
     """
 
 
-# name -> (module, class, what it is)
+# name -> (module in this room, class, what it is)
 METHODS = {
-    "auto": (
-        "contactopt.methods.auto",
-        "Auto",
-        "Newton, then cones and proximal where it fails; the default",
-    ),
-    "newton": (
-        "contactopt.methods.newton",
-        "Newton",
-        "semismooth Newton on the Alart-Curnier equations",
-    ),
-    "proximal": ("contactopt.methods.proximal", "Proximal", "proximal-point loop around Newton"),
+    "auto": ("auto", "Auto", "Newton, then cones and proximal where it fails; the default"),
+    "newton": ("newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
+    "proximal": ("proximal", "Proximal", "proximal-point loop around Newton"),
     "tresca": (
-        "contactopt.methods.tresca_iteration",
+        "tresca_iteration",
         "Tresca",
         "successive convex problems with given friction bounds",
     ),
-    "acary_cadoux": (
-        "contactopt.methods.cone",
-        "AcaryCadoux",
-        "fixed point on the SOCP over Coulomb's cones",
-    ),
-    "relaxation": (
-        "contactopt.methods.cone",
-        "Relaxation",
-        "one SOCP: associated friction, another law (dilatancy)",
-    ),
-    "penalty": (
-        "contactopt.methods.penalty",
-        "Penalty",
-        "penalty method, minimised exactly; error ~ 1 / factor",
-    ),
-    "lagrangian": (
-        "contactopt.methods.lagrangian",
-        "Lagrangian",
-        "normal QP, then Uzawa's multipliers for friction",
-    ),
+    "acary_cadoux": ("cone", "AcaryCadoux", "fixed point on the SOCP over Coulomb's cones"),
+    "relaxation": ("cone", "Relaxation", "one SOCP: associated friction, another law (dilatancy)"),
+    "penalty": ("penalty", "Penalty", "penalty method, minimised exactly; error ~ 1 / factor"),
+    "lagrangian": ("lagrangian", "Lagrangian", "normal QP, then Uzawa's multipliers for friction"),
     "augmented_lagrangian": (
-        "contactopt.methods.augmented_lagrangian",
+        "augmented_lagrangian",
         "AugmentedLagrangian",
         "method of multipliers, exact or Uzawa",
     ),
-    "nsgs": ("contactopt.methods.nsgs", "NSGS", "nonsmooth Gauss-Seidel, contact by contact"),
-    "admm": ("contactopt.methods.admm", "ADMM", "alternating direction method of multipliers"),
-    "apg": ("contactopt.methods.apg", "APG", "accelerated projected gradient in a fixed point"),
+    "nsgs": ("nsgs", "NSGS", "nonsmooth Gauss-Seidel, contact by contact"),
+    "admm": ("admm", "ADMM", "alternating direction method of multipliers"),
+    "apg": ("apg", "APG", "accelerated projected gradient in a fixed point"),
     "lemke": (
-        "contactopt.methods.complementarity",
+        "complementarity",
         "Lemke",
         "Lemke's method on the 2D complementarity problem; small",
     ),
     "alternating": (
-        "contactopt.methods.alternating",
+        "alternating",
         "Alternating",
         "normal QP and tangential QP or SOCP in turn (paper, 5.1)",
     ),
 }
 
 
-def solvers_of(law: Law) -> list[str]:
-    """List the methods that solve problems of a law.
-
-    Parameters
-    ----------
-    law : The law of a problem.
-
-    Returns
-    -------
-    Names in METHODS, in their order.
+def solves(method: Any, law: Law) -> bool:
+    """Whether a method solves problems of a law, in the variables in which methods see the law
+    (`Law.plain`). One that says nothing about it solves all.
     """
+    predicate = getattr(method, "solves", None)
+    return predicate is None or bool(predicate(law.plain))
+
+
+def solvers_of(law: Law) -> list[str]:
+    """The names in METHODS of those that solve problems of a law."""
     return [name for name in METHODS if solves(find_method(name), law)]
 
 
@@ -139,7 +114,7 @@ def find_method(name: str, **settings: Any) -> Method:
         raise InputError(f"unknown method {name!r}; choose from {', '.join(METHODS)}.")
     module, cls, _ = METHODS[name]
     try:
-        method: Method = getattr(import_module(module), cls)(**settings)
+        method: Method = getattr(import_module(f"{__name__}.{module}"), cls)(**settings)
     except TypeError as error:
         raise InputError(f"method '{name}': {error}.") from error
     return method

@@ -1,19 +1,17 @@
 """Alternating direction method of multipliers over Coulomb's cones, the slip term renewed in every
 iteration.
 
-    min  r'Qr/2 + (q + g n)' r    subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,    g_i = mu_i
-         |u_t,i|:
-r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier
-x of r = z by their difference; -rho x is the velocity u + g n, which renews g in every iteration.
-For fixed g this converges for every rho; with g renewed there is no proof, it needs no full rank of
-Q, but strong friction may defeat it (reports/robustness). Other laws have other sets and openings
-(contactopt.problem.laws); where both are fixed, as for Tresca's and associated friction, it always
-converges. Cost: one factorisation of Q + rho I, 2 n^3/3 operations (LU, since a Q from a file need
-not be quite symmetric), and n^2 per iteration. rho is balanced after 10, 20, 40, ... iterations
-where that is worth a factorisation, so that the errors of r = z and of the velocity fall together.
+    min  r'Qr/2 + (q + g n)' r   subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,
+
+with g_i = mu_i |u_t,i|. r follows from one linear system with Q + rho I and the balance rows, z by
+projection, and the scaled multiplier x of r = z from their difference; -rho x is the velocity
+u + g n, which renews g. Other laws have other sets and openings (contactopt.problem.laws). rho is
+balanced after 10, 20, 40, ... iterations where that is worth a factorisation, so that the errors of
+r = z and of the velocity fall together. An LU factorisation is taken, since a Q from a file need
+not be quite symmetric.
+
 Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato,
-Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM, for the iteration and
-the balancing of rho.
+Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ from scipy.sparse.linalg import splu
 
 from contactopt.checks import check_number
 from contactopt.methods.constants import FIRST_BALANCING, LEAST_CHANGE, MOST_CHANGE
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 
 OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
@@ -38,7 +36,7 @@ Inverse = Callable[[np.ndarray], np.ndarray]  # x (n,) or (n, j) -> (Q + rho I)^
 
 
 @dataclass(frozen=True)
-class ADMM:
+class ADMM(Method):
     """The alternating direction method of multipliers on r = z.
 
     Parameters
@@ -53,13 +51,8 @@ class ADMM:
     def __post_init__(self) -> None:
         check_number("the weight rho", self.rho, low=0.0)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        z, multipliers = (
-            (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        )
+        z, multipliers = start or at_rest(problem)
         rho, count, check = self.rho, 0, FIRST_BALANCING
         system = Balanced(problem, rho)
         x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
@@ -81,27 +74,30 @@ class ADMM:
             count += 1
             if count == check:
                 check *= 2
-                # The larger error says which way rho must go: a larger rho lets r = z fall faster,
-                # a smaller one the
-                # velocity.
-                primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
-                # what the velocity is the difference of
-                moved = (problem.Q @ z.ravel(), problem.q, rho * x)
-                dual = (
-                    rho
-                    * float(np.linalg.norm(z - old))
-                    / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)
-                )
-                factor = float(
-                    np.clip(
-                        np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)),
-                        1 / MOST_CHANGE,
-                        MOST_CHANGE,
-                    )
-                )
-                if not 1 / LEAST_CHANGE < factor < LEAST_CHANGE:
-                    rho, x = rho * factor, x / factor
+                change = _balancing(problem, r, z, old, x, rho)
+                if not 1 / LEAST_CHANGE < change < LEAST_CHANGE:
+                    rho, x = rho * change, x / change
                     system = Balanced(problem, rho)
+
+
+def _balancing(
+    problem: InterfaceProblem,
+    r: np.ndarray,
+    z: np.ndarray,
+    old: np.ndarray,
+    x: np.ndarray,
+    rho: float,
+) -> float:
+    """The factor by which rho should change.
+
+    The larger error says which way: a larger rho lets r = z fall faster, a smaller one velocities.
+    """
+    primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
+    parts = problem.Q @ z.ravel(), problem.q, rho * x  # the velocity is their difference
+    size = max(*(float(np.linalg.norm(part)) for part in parts), 1e-300)
+    dual = rho * float(np.linalg.norm(z - old)) / size
+    wanted = np.sqrt(max(primal, 1e-300) / max(dual, 1e-300))
+    return float(np.clip(wanted, 1 / MOST_CHANGE, MOST_CHANGE))
 
 
 class Balanced:
@@ -111,9 +107,8 @@ class Balanced:
 
     def __init__(self, problem: InterfaceProblem, rho: float):
         self.V = problem.V
-        self.inverse = (
-            _sparse_inverse(problem.Q, rho) if sp.issparse(problem.Q) else _inverse(problem.Q, rho)
-        )
+        inverse = _sparse_inverse if sp.issparse(problem.Q) else _inverse
+        self.inverse = inverse(problem.Q, rho)
         self.motions = self.inverse(problem.V) if problem.V.shape[1] else problem.V
         self.schur = problem.V.T @ self.motions
 

@@ -1,22 +1,17 @@
-"""Augmented Lagrangian method (method of multipliers) for contact and friction together, after
-Alart and Curnier.
+"""Augmented Lagrangian method (method of multipliers) for contact and friction together.
 
 The forces are the multipliers of the contact conditions; the penalty rho augments them, and each
 iteration sets
-    r_j = P(r_{j-1} - rho u_j),  P the map of the law (contactopt.problem.laws),  u_j = Q r_j + V
-                                 lambda + q,
-with the balance V' r_j + s = 0. Seen from the forces this is the proximal-point iteration
-(Rockafellar): r_j solves Coulomb's problem with the compliance Q + I / rho, u = Q r_j + V lambda +
-q + (r_j - r_{j-1}) / rho. The default solves it exactly by semismooth Newton steps, one dense
-linear system each; rho does not change, unlike in `proximal`, so the error falls by 1 / (1 + rho *
-smallest eigenvalue of Q), or slower than any such factor where Q is singular. No proof for Coulomb
-friction; ends where Newton's steps fail on a subproblem: rho smaller then helps. explicit = True is
-Uzawa's variant, u_{j-1} in place of u_j: one product with Q per iteration, rho from Q's largest
-eigenvalue, lambda from the balance of the step itself. It needs as many iterations as Q's condition
-number and converges as gradient projections do: for small mu; with large ones it may cycle. P is
-not a projection on a fixed set, so that the balance is sought with the friction bounds of the last
-iterate. Sources: Alart, Curnier (1991); Simo, Laursen (1992), An augmented Lagrangian treatment of
-contact problems involving friction; Rockafellar (1976).
+    r_j = P(r_{j-1} - rho u_j),   u_j = Q r_j + V lambda + q,   with the balance V' r_j + s = 0,
+P the map of the law (contactopt.problem.laws). Seen from the forces this is the proximal-point
+iteration with the compliance Q + I / rho. The default solves it exactly by semismooth Newton steps;
+rho does not change, unlike in `proximal`, and the iteration ends where these steps fail.
+explicit = True is Uzawa's variant, u_{j-1} in place of u_j: one product with Q per iteration, rho
+from Q's largest eigenvalue, lambda from the balance of the step itself. P is not a projection on a
+fixed set, so that the balance is sought with the friction bounds of the last iterate.
+
+Sources: Alart, Curnier (1991); Simo, Laursen (1992), An augmented Lagrangian treatment of contact
+problems involving friction; Rockafellar (1976).
 """
 
 from __future__ import annotations
@@ -25,15 +20,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from contactopt.checks import check_number
 from contactopt.methods.constants import EIGENVALUE_MARGIN
 from contactopt.methods.kernels.alart_curnier import cold_start
 from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.kernels.mprgp import largest_eigenvalue
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.methods.proximal import proximal_equations
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
@@ -41,7 +34,7 @@ from contactopt.problem.laws.law import Law
 
 
 @dataclass(frozen=True)
-class AugmentedLagrangian:
+class AugmentedLagrangian(Method):
     """The augmented Lagrangian method, exact or in the variant of Uzawa.
 
     Parameters
@@ -56,9 +49,6 @@ class AugmentedLagrangian:
 
     def __post_init__(self) -> None:
         check_number("the penalty rho", self.rho, low=0.0)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def solves(self, law: Law) -> bool:
         """The exact variant solves every law; Uzawa's holds friction bounds, which associated
@@ -78,7 +68,7 @@ class AugmentedLagrangian:
             yield point
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
-        r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        r, lam = start or at_rest(problem)
         rho, low = (
             1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0),
             problem.law.lowest,

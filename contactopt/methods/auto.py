@@ -4,17 +4,14 @@ proximal loop.
 0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
    falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
-   force at all) while its residual falls. Elastic bodies end here (reports/newton_steps), each step
-   one dense linear system. Where its sortings go round in a circle near a solution, a few proximal
-   steps from the best of its points break out of it.
+   force at all) while its residual falls. Elastic bodies end here (reports/newton_steps). Where its
+   sortings go round in a circle near a solution, a few proximal steps break out of it.
 2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
-   deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. They need no
-   symmetric Q and no backend. Where these fail, it ends if a proof is found that there is no
-   solution (contactopt.problem.feasibility).
+   deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
+   fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
 3. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
    linear systems of it.
-4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex
-   programs.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
 5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early
    says nothing of the next; then the proximal loop from the best of all points, its weight falling
    slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved the
@@ -23,8 +20,7 @@ proximal loop.
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
-It ends where the driver's certificate or limits say so. There is no proof that it finds a solution:
-Coulomb's problem may have none.
+It ends where the driver's certificate or limits say so.
 """
 
 from __future__ import annotations
@@ -42,6 +38,7 @@ from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import Repeated
+from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.constants import (
     CLOSE,
     CONE_PROGRAMS,
@@ -62,8 +59,9 @@ from contactopt.methods.constants import (
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
-from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.methods.method import NATIVE, Iterate, Known
+from contactopt.methods.kernels.sparse_blocks import block_matrix
+from contactopt.methods.method import Iterate, Known, Method, at_rest
+from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
@@ -73,10 +71,20 @@ from contactopt.problem import InterfaceProblem, infeasibility
 logger = logging.getLogger(__name__)
 
 SAME = 1e-6  # relative difference of two residuals of a stage that goes round in a circle
+NO_PROGRESS = "Newton's method made no progress, so interior points and the proximal loop take over"
+NO_PROGRESS_NESTED = (
+    "Newton's method on nested grids made no progress; it goes on with the finest grid alone"
+)
+NO_PROGRESS_PRODUCTS = (
+    "Newton's method made no progress with products, so all that follows looks at the entries of Q"
+)
+NO_PROGRESS_JAMMED = (
+    "the proximal loop got nowhere and goes on from the best point, by other paths to begin with"
+)
 
 
 @dataclass(frozen=True)
-class Auto:
+class Auto(Method):
     """The default method. It has no number to choose.
 
     Parameters
@@ -93,166 +101,104 @@ class Auto:
     def __post_init__(self) -> None:
         find_preconditioner(self.preconditioner)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
-            reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
+        loose = sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q))
+        if loose:
+            reached = start or at_rest(problem)
         else:
             if isinstance(problem.Q, Convolution):
-                start = yield from self._nested(problem, start)
-                note(
-                    logger,
-                    "Newton's method on nested grids made no progress; it goes on with the finest"
-                    " grid alone",
-                )
-            reached = yield from self._newton(problem, start, self.preconditioner)
+                points = Nested().with_residuals(problem, start)
+                best, _ = yield from _followed(points, lambda steps, since: since >= PATIENCE)
+                start = best or start
+                note(logger, NO_PROGRESS_NESTED)
+            reached = yield from _newton(problem, start, self.preconditioner)
             if isinstance(problem.Q, InterfaceOperator):
-                note(
-                    logger,
-                    "Newton's method made no progress with products, so all that follows looks at"
-                    " the entries of Q",
-                )
+                note(logger, NO_PROGRESS_PRODUCTS)
                 try:
                     problem = problem.explicit()
                 except InputError as error:
                     note(logger, f"the default method ends with Newton's steps: {error}")
                     return
-                reached = yield from self._newton(problem, None, None)  # its steps are exact now
-            note(
-                logger,
-                "Newton's method made no progress, so interior points and the proximal loop take"
-                " over",
-            )
-        from contactopt.methods.cone import AcaryCadoux
+                reached = yield from _newton(problem, None, None)  # its steps are exact now
+            note(logger, NO_PROGRESS)
+        yield from _Robust(problem).iterates(start, reached)
 
-        matrix = block_matrix(problem.Q, problem.dim)
-        if start is not None and sp.issparse(problem.Q):
-            reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
-        elif not sp.issparse(problem.Q):
+
+class _Robust:
+    """The stages after Newton's method, on a problem whose Q is an array or sparse.
+
+    A stage yields its iterates, and returns the best of its points or a better one that it was
+    given.
+    """
+
+    def __init__(self, problem: InterfaceProblem):
+        self.problem, self.matrix = problem, block_matrix(problem.Q, problem.dim)
+        self.sparse = sp.issparse(problem.Q)
+        self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
+        self.evaluate = proximal_equations(problem, self.matrix).evaluate
+
+    def better(self, *points: Iterate) -> Iterate:
+        """The point with the least residual, the first of equal ones."""
+        return min(points, key=lambda point: self.evaluate(*point)[0])
+
+    def iterates(
+        self, start: Iterate | None, reached: Iterate
+    ) -> Generator[Iterate | Known, None, None]:
+        problem = self.problem
+        if self.sparse and start is not None:
+            reached = yield from self.proximal(start, POLISH, LEAST_ALPHA)
+        elif not self.sparse:
             residual = coulomb_equations(problem).evaluate(*reached)[0]
             if residual <= NEARBY * np.linalg.norm(reached[0]):
-                reached = yield from self._proximal(
-                    problem, matrix, reached, 1, LEAST_ALPHA, aim=residual / 2
-                )
-        interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
-        if interior:
+                reached = yield from self.proximal(reached, 1, LEAST_ALPHA, aim=residual / 2)
+        if self.conic:
             for full in (True, False):
-                reached = yield from self._interior(
-                    problem, matrix, reached, interior_iterates(problem, matrix, Path(full))
-                )
+                path = interior_iterates(problem, self.matrix, Path(full))
+                reached = yield from self.interior(reached, path)
         if infeasibility(problem) is not None:  # the driver says so
             return
-        if interior:
-            turning = homotopy_iterates(problem, matrix, TURNING)
-            reached = yield from self._interior(problem, matrix, reached, turning)
-            if problem.symmetric and not sp.issparse(problem.Q):
-                reached = yield from self._cones(problem, reached)
-        if sp.issparse(problem.Q):
-            yield from self._jammed(problem, matrix, reached)
-            return
+        if self.conic:
+            turning = homotopy_iterates(problem, self.matrix, TURNING)
+            reached = yield from self.interior(reached, turning)
+            if problem.symmetric and not self.sparse:
+                reached = yield from self.cones(reached)
+        yield from self.jammed(reached) if self.sparse else self.restarted(reached)
+
+    def restarted(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
+        """Without end: the proximal loop from `reached`, and then from random forces."""
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self._proximal(
-                problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha
-            )
-            r = random.normal(size=problem.q.shape)
+            last = yield from self.proximal(reached, ROUND * 2**restarts, Proximal.alpha)
+            r = random.normal(size=self.problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
-            reached = problem.law.nearest(r, r[:, 0]), last[1]
+            reached = self.problem.law.nearest(r, r[:, 0]), last[1]
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
-    @staticmethod
-    def _jammed(
-        problem: InterfaceProblem, matrix: Blocks, reached: Iterate
-    ) -> Generator[Iterate | Known, None, None]:
+    def jammed(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Without end: paths drawn at random, and the gentle proximal loop from the best point so
         far.
         """
-        from contactopt.methods.cone import AcaryCadoux
-
-        random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
-        interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
+        problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
-            if interior and restarts:
+            if self.conic and restarts:
                 turning = homotopy_iterates(problem, matrix, TURNING * 2**restarts, random)
-                reached = yield from Auto._interior(problem, matrix, reached, turning)
-            for _ in range(PATHS if interior else 0):
+                reached = yield from self.interior(reached, turning)
+            for _ in range(PATHS if self.conic else 0):
                 path = Path.random(random, problem.contacts)
-                reached = yield from Auto._interior(
-                    problem, matrix, reached, interior_iterates(problem, matrix, path)
-                )
+                points = interior_iterates(problem, matrix, path)
+                reached = yield from self.interior(reached, points)
             patience = SPARSE_ROUND * 2**restarts
-            last = yield from Auto._proximal(
-                problem, matrix, reached, patience, GENTLE_ALPHA, gentle=True
-            )
-            reached = min(reached, last, key=lambda point: evaluate(*point)[0])
-            note(
-                logger,
-                "the proximal loop got nowhere and goes on from the best point, by other paths to"
-                " begin with",
-            )
+            last = yield from self.proximal(reached, patience, GENTLE_ALPHA, gentle=True)
+            reached = self.better(reached, last)
+            note(logger, NO_PROGRESS_JAMMED)
 
-    @staticmethod
-    def _nested(
-        problem: InterfaceProblem, start: Iterate | None
-    ) -> Generator[Iterate | Known, None, Iterate | None]:
-        """Iterates of the nested method while they change for the better; returns the best."""
-        from contactopt.methods.nested import Nested
-
-        points = Nested().steps(problem, start)
-        reached, _ = yield from _followed(points, lambda steps, since: since >= PATIENCE)
-        return reached or start
-
-    @staticmethod
-    def _newton(
-        problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
-    ) -> Generator[Iterate | Known, None, Iterate]:
-        """Newton's iterates; returns the best.
-
-        What comes next needs the entries of Q. Where there are many, or bodies are solved by
-        iteration, these are dear, and Newton's method goes on until its own products have cost as
-        much.
-
-        A start that leads nowhere is given up for the solution of the bonded problem, from which
-        Newton's method begins where it has none.
-        """
-        operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
-
-        def tired(steps: int, since: int) -> bool:
-            dear = (
-                operator is not None
-                and (operator.coupled is not None or problem.q.size > FEW_ENTRIES)
-                and operator.products < problem.q.size
-            )
-            return (since >= PATIENCE or steps > NEWTON_STEPS) and not dear
-
-        method, warm, least = Newton(preconditioner=preconditioner), start, np.inf
-        if start is not None:
-            first = lambda steps, since: since >= PATIENCE or steps > NEWTON_STEPS  # noqa: E731
-            found, least = yield from _followed(method.steps(problem, start), first)
-            warm = found or start
-            note(
-                logger,
-                "Newton's method made no progress from the given start and begins anew without it",
-            )
-        found, residual = yield from _followed(method.steps(problem, None), tired)
-        return (found if residual < least else warm) or cold_start(problem)
-
-    @staticmethod
-    def _cones(
-        problem: InterfaceProblem, start: Iterate
-    ) -> Generator[Iterate | Known, None, Iterate]:
-        """A few cone programs; returns the best point, `start` if there was none better."""
-        from contactopt.methods.cone import AcaryCadoux
-
-        if not AcaryCadoux().solves(problem.law):
-            return start
-        evaluate = coulomb_equations(problem).evaluate
-        points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(problem))
+    def cones(self, start: Iterate) -> Generator[Iterate | Known, None, Iterate]:
+        """A few cone programs."""
+        evaluate = coulomb_equations(self.problem).evaluate
+        points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(self.problem))
         try:
             found, residual = yield from _followed(
                 points, lambda steps, since: steps >= CONE_PROGRAMS
@@ -262,42 +208,25 @@ class Auto:
             return start
         return found if found is not None and residual < evaluate(*start)[0] else start
 
-    @staticmethod
-    def _interior(
-        problem: InterfaceProblem,
-        matrix: Blocks,
-        start: Iterate,
-        points: Iterator[tuple[Iterate, float]],
+    def interior(
+        self, start: Iterate, points: Iterator[tuple[Iterate, float]]
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Points with their errors and, where they came near to a solution, a few proximal steps
         for the last digits.
-
-        Returns the last point or a better `start`.
         """
         found, best = yield from _followed(points, lambda steps, since: False)
         reached = found or start
         if best < CLOSE:
-            alpha = max(LEAST_ALPHA, 100 * best)
-            reached = yield from Auto._proximal(problem, matrix, reached, POLISH, alpha)
-        evaluate = proximal_equations(problem, matrix).evaluate
-        return min(start, reached, key=lambda point: evaluate(*point)[0])
+            reached = yield from self.proximal(reached, POLISH, max(LEAST_ALPHA, 100 * best))
+        return self.better(start, reached)
 
-    @staticmethod
-    def _proximal(
-        problem: InterfaceProblem,
-        matrix: Blocks,
-        start: Iterate,
-        patience: int,
-        alpha: float,
-        gentle: bool = False,
-        aim: float = np.inf,
+    def proximal(
+        self, start: Iterate, patience: int, alpha: float, gentle: bool = False, aim: float = np.inf
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns
-        the last.
-
-        aim  residual that the first of these rounds must reach
+        the last. `aim` is the residual that the first of these rounds must reach.
         """
-        equations = proximal_equations(problem, matrix)
+        equations = proximal_equations(self.problem, self.matrix)
         best, target, point = np.inf, aim, start
         for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
             try:
@@ -312,6 +241,40 @@ class Auto:
         if point is start:  # not a single subproblem could be solved from there
             yield point
         return point
+
+
+def _newton(
+    problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
+) -> Generator[Iterate | Known, None, Iterate]:
+    """Newton's iterates; returns the best.
+
+    What comes next needs the entries of Q. Where there are many, or bodies are solved by iteration,
+    these are dear, and Newton's method goes on until its own products have cost as much. A start
+    that leads nowhere is given up for the solution of the bonded problem, from which Newton's
+    method begins where it has none.
+    """
+    Q = problem.Q
+    dear = isinstance(Q, InterfaceOperator) and (
+        Q.coupled is not None or problem.q.size > FEW_ENTRIES
+    )
+
+    def tired(steps: int, since: int) -> bool:
+        return since >= PATIENCE or steps > NEWTON_STEPS
+
+    def spent(steps: int, since: int) -> bool:
+        cheaper = dear and isinstance(Q, InterfaceOperator) and Q.products < problem.q.size
+        return tired(steps, since) and not cheaper
+
+    method, warm, least = Newton(preconditioner=preconditioner), start, np.inf
+    if start is not None:
+        found, least = yield from _followed(method.with_residuals(problem, start), tired)
+        warm = found or start
+        note(
+            logger,
+            "Newton's method made no progress from the given start and begins anew without it",
+        )
+    found, residual = yield from _followed(method.with_residuals(problem, None), spent)
+    return (found if residual < least else warm) or cold_start(problem)
 
 
 def _followed(

@@ -1,19 +1,18 @@
 """Coulomb friction in 2D as a linear complementarity problem (LCP), solved by Lemke's method.
 
-Split r_t = -mu r_n + x and u_t = v - y with v, y >= 0. Then 0 <= x = r_t + mu r_n and 0 <= mu r_n -
-r_t = 2 mu r_n - x say
-|r_t| <= mu r_n, x v = 0 says r_t = -mu r_n where u_t > 0, (2 mu r_n - x) y = 0 says r_t = mu r_n where u_t < 0: the law is
-    0 <= (r_n, x, y)  complementary to  (u_n, v = u_t + y, 2 mu r_n - x) >= 0,   u = Q r + V lambda
-                      + q,  r linear in (r_n, x).
-A free lambda is a - b with a, b >= 0, complementary to -(V' r + s) >= 0 and V' r + s >= 0: together
-they are the balance. Lemke's method pivots with the covering vector of ones; lexicographic ties
-keep degenerate problems from cycling. It may end on a ray (rare: measured for mu >= 2 only). Then a
-form with 4k unknowns is tried, r_t = b - c with b, c >= 0 and |u_t| bounded by y: its matrix is
-copositive for every Q >= 0 and mu, so that for positive definite Q and plates that press no ray
-exists, up to rounding. If that ends on a ray too there is no answer. About m = 3k to 4k pivots of 2
-m^2 operations: for small problems. Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring
-(1986), A mathematical programming approach to three-dimensional contact problems with friction;
-Stewart, Trinkle (1996) for the copositive form.
+Split r_t = -mu r_n + x and u_t = v - y with v, y >= 0. Then 0 <= x = r_t + mu r_n and
+0 <= mu r_n - r_t = 2 mu r_n - x say |r_t| <= mu r_n, x v = 0 says r_t = -mu r_n where u_t > 0,
+(2 mu r_n - x) y = 0 says r_t = mu r_n where u_t < 0: the law is
+    0 <= (r_n, x, y)  complementary to  (u_n, v = u_t + y, 2 mu r_n - x) >= 0,
+with u = Q r + V lambda + q and r linear in (r_n, x). A free lambda is a - b with a, b >= 0,
+complementary to -(V' r + s) >= 0 and V' r + s >= 0: together they are the balance. Lemke's method
+pivots with the covering vector of ones; lexicographic ties keep degenerate problems from cycling.
+It may end on a ray (rare: measured for mu >= 2 only). Then a form with 4k unknowns is tried, r_t =
+b - c with b, c >= 0 and |u_t| bounded by y: its matrix is copositive for every Q >= 0 and mu, so
+that for positive definite Q and plates that press no ray exists, up to rounding.
+
+Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring (1986), A mathematical programming
+approach to three-dimensional contact problems with friction; Stewart, Trinkle (1996).
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.linear.deadline import check_time
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import NATIVE, Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
 
@@ -35,7 +34,7 @@ PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 
 @dataclass(frozen=True)
-class Lemke:
+class Lemke(Method):
     """Lemke's method on the linear complementarity problem, for plane problems. It has no settings.
 
     It raises InputError in 3D and for more than 300 contacts.
@@ -71,17 +70,10 @@ class Lemke:
 def complementarity_problem(
     problem: InterfaceProblem, copositive: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Write a problem in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda
-    last in z.
+    """A problem of k contacts in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0.
 
-    Parameters
-    ----------
-    problem : The interface problem of k contacts under Coulomb's law.
-    copositive : Whether the form with 4 k unknowns is written, whose matrix is copositive.
-
-    Returns
-    -------
-    M (m, m), q (m,) and C (2 k, c).
+    `copositive` chooses the form with 4 k unknowns. Returns M (m, m), q (m,) and C (2 k, c) with r
+    = C z[:c]; lambda is last in z.
     """
     k, p = problem.contacts, len(problem.s)
     normal, tangent, eye = np.eye(2 * k)[:, ::2], np.eye(2 * k)[:, 1::2], np.eye(k)
@@ -97,17 +89,8 @@ def complementarity_problem(
 
 
 def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """Solve a linear complementarity problem by complementary pivots on w - M z - z0 = q.
-
-    Parameters
-    ----------
-    M : (m, m) matrix.
-    q : (m,) right-hand side.
-
-    Returns
-    -------
-    A solution z (m,) with z >= 0, M z + q >= 0 and z'(M z + q) = 0; None if the pivots end on a
-    ray.
+    """A solution z (m,) >= 0 with M z + q >= 0 and z'(M z + q) = 0, by complementary pivots on
+    w - M z - z0 = q; None if the pivots end on a ray.
     """
     m = len(q)
     if np.all(q >= 0):

@@ -5,17 +5,14 @@ Both solve, over Coulomb's cones,
     min  r' Q r / 2 + (q + mu s n)' r    subject to  |r_t| <= mu r_n,  V' r + s_plates = 0.
 `Relaxation` solves it once with s = 0. That is another law, friction with an associated flow rule:
 where a contact slips its gap opens by mu |u_t|, so that a block dragged along a plane rises from
-it. It gets stick, open contacts and problems without slip right; where contacts slip, forces and
-approach are off by a term that grows with mu. `AcaryCadoux` repeats it with s = |u_t| of the last
-answer, which takes the opening back; a fixed point is exactly a solution of Coulomb's problem. On a
-problem whose law is associated friction both solve that law, in one program. Each outer iteration
-costs one SOCP, whose matrices are handed over once; the answer is made exact by Newton steps on r =
-P(r - u), P the projection on the cones. Converges linearly where mu times the coupling of slip and
-dilatancy is small; there is no proof. Where Q is badly rank-deficient the Newton steps may fail,
-and the certificate stays at what the backend's accuracy gives. The SOCP has an answer unless loads
-pull the bodies apart or friction cannot hold a plate that is dragged. Source: Acary, Cadoux,
-Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via convex
-optimization.
+it. `AcaryCadoux` repeats it with s = |u_t| of the last answer, which takes the opening back; a
+fixed point is exactly a solution of Coulomb's problem. On a problem whose law is associated
+friction both solve that law, in one program. The answer of each program is made exact by Newton
+steps on r = P(r - u), P the projection on the cones; where Q is badly rank-deficient these may
+fail, and the certificate stays at what the backend's accuracy gives.
+
+Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb
+friction problem via convex optimization.
 """
 
 from __future__ import annotations
@@ -30,8 +27,8 @@ from contactopt.errors import InputError
 from contactopt.methods.backends import CONIC, find
 from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.direct import CoulombSOCP
-from contactopt.methods.kernels.semismooth import crossover
-from contactopt.methods.method import Iterate
+from contactopt.methods.kernels.semismooth import Projection, crossover
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone_derivative
 from contactopt.problem.laws.law import Law
@@ -40,7 +37,7 @@ BRIDGES = ("clarabel", "cvxpy")
 
 
 @dataclass(frozen=True)
-class AcaryCadoux:
+class AcaryCadoux(Method):
     """The fixed point of Acary and Cadoux: one cone program after another.
 
     Parameters
@@ -96,17 +93,8 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 def cone_program(
     problem: InterfaceProblem, bridge: str, backend: str
 ) -> Callable[[np.ndarray], Iterate]:
-    """Prepare the cone program of the module's head for one opening after the other.
-
-    Parameters
-    ----------
-    problem : The interface problem of k contacts.
-    bridge : A name in BRIDGES.
-    backend : A name in CONIC, where the bridge is cvxpy.
-
-    Returns
-    -------
-    A function of the opening mu s (k,) [length] that returns r (k, dim) and multipliers (p,).
+    """The cone program of the module's head, as a function of the opening mu s (k,) [length] that
+    returns r (k, dim) and multipliers (p,).
     """
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
@@ -125,14 +113,7 @@ def cone_program(
             r, lam = answer["r"], answer["approach"]
         else:
             r, lam = direct.solve(c.ravel())
-        return crossover(
-            problem.Q,
-            c.ravel(),
-            V,
-            s_plates,
-            lambda y: coulomb_cone_derivative(y, problem.mu),
-            r.reshape(c.shape),
-            lam,
-        )
+        project: Projection = lambda y: coulomb_cone_derivative(y, problem.mu)  # noqa: E731
+        return crossover(problem.Q, c.ravel(), V, s_plates, project, r.reshape(c.shape), lam)
 
     return solve

@@ -7,7 +7,7 @@ E = diag(m), w = u_t.
 
 Inequalities. Two states that obey Signorini have D r_n . D u_n <= 0; two that obey friction with
 bounds g, g' have
-    D r_t . D w <= sum_i |D g_i| |D w_i|                                                                        (F)
+    D r_t . D w <= sum_i |D g_i| |D w_i|                                                     (F)
 by maximal dissipation, in 2D and 3D. With L = diag(L_i) > 0, one number per contact, and b^2 the
 largest eigenvalue of L^-1/2 Q_tt L^-1/2, the right side is at most mu b |E D r_n|_L |D w| in the
 norm of Q_tt^-1 when g = mu E r_n. If the plates move along the normals only (V_t = 0), D r_n lies
@@ -17,7 +17,8 @@ Let a^2 be the largest eigenvalue of (E L E, S) on Z, k^2 = b^2 times that of (E
 and c^2 < 1 that of (Q_nt Q_tt^-1 Q_tn, Q_nn) on Z: the coupling of normal and tangential
 directions. Then, for every load q, s:
  1. Two solutions: x^2 + y^2 <= mu a b x y with x = |D r_n|_S, y = |D w|: equal if mu < 2 / (a b).
-    Two Tresca steps from bounds that differ by d: x <= (mu a b / 2) |d|, so the Tresca iteration contracts there too.
+    Two Tresca steps from bounds that differ by d: x <= (mu a b / 2) |d|, so the Tresca iteration
+    contracts there too.
  2. Normal problem: |D r_n| <= c |D r_t|, norms of Q_nn and Q_tt. Tangential problem for two r_n
     that differ by d: (F) gives |D r_t|^2 <= (c^2 + mu^2 k^2) |d|^2, so that the alternating
     iteration contracts if c^2 (c^2 + mu^2 k^2) < 1; put together for one Tresca step they give x^2
@@ -42,12 +43,11 @@ alternating iteration, where stick follows r_n one step late. Their spectral rad
 convergence near this solution, exact unless a contact is between two states; global convergence,
 other solutions and the solution's change of state with mu are not covered: a heuristic there.
 
-Relaxation. The cone program  min r'Qr/2 + q'r, |r_t| <= mu r_n, V'r + s = 0  asks for u_n >= mu
-                              |u_t| and r . u = 0. Its
-solution solves Coulomb's problem if and only if no loaded contact with friction slips in it (there
-it has u_n = mu |u_t|, Coulomb u_n = 0). mu = 0 is enough, and so is stick of all that touches if
-the rest opens by more than mu |u_t|; Q_nt = 0 is not. It is solved, and its answer certified for
-both problems. All of this is dense linear algebra, O(n^3), and one cone program.
+Relaxation. The cone program  min r'Qr/2 + q'r, |r_t| <= mu r_n, V'r + s = 0  asks for
+u_n >= mu |u_t| and r . u = 0. Its solution solves Coulomb's problem if and only if no loaded
+contact with friction slips in it (there it has u_n = mu |u_t|, Coulomb u_n = 0). mu = 0 is enough,
+and so is stick of all that touches if the rest opens by more than mu |u_t|; Q_nt = 0 is not. It is
+solved, and its answer certified for both problems.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ class Thresholds:
     """Bounds of the largest friction coefficient, all coefficients scaled together [-].
 
     unique       below it there is one solution
-    tresca       below it the Tresca iteration contracts;   alternating  below it the alternating
-                 iteration contracts
+    tresca       below it the Tresca iteration contracts
+    alternating  below it the alternating iteration contracts
     """
 
     unique: float
@@ -144,33 +144,17 @@ class Diagnosis:
     local: Local | None = None
 
     def __str__(self) -> str:
-        def threshold(name: str, what: str, field: str) -> str:
-            low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
-            if self.exact:
-                return f"{name}: {what} for every load if and only if mu < {low:.4g}"
-            sure = (
-                f"{what} for every load if mu < {low:.3g}"
-                if low > 0
-                else f"{what} is not guaranteed"
-            )
-            return f"{name}: {sure}" + (
-                "" if np.isnan(high) else f"; it is lost for some load at mu = {high:.3g}"
-            )
-
         lines = [
             f"{count(self.contacts, 'contact')} in {self.dim}D, mu = {self.mu:g}",
             f"Q: rank {self.rank} of {self.size} (held components: {self.held}), condition"
-            f" {self.condition:.2g}, asymmetry {self.asymmetry:.1g}"
-            + (
-                ", not positive semidefinite"
-                if self.least < -self.size * np.finfo(float).eps
-                else ""
-            ),
-            threshold("number of solutions", "uniqueness", "unique"),
-            threshold("Tresca iteration", "convergence", "tresca"),
-            threshold("alternating iteration", "convergence", "alternating"),
+            f" {self.condition:.2g}, asymmetry {self.asymmetry:.1g}",
+            self._threshold("number of solutions", "uniqueness", "unique"),
+            self._threshold("Tresca iteration", "convergence", "tresca"),
+            self._threshold("alternating iteration", "convergence", "alternating"),
             f"convex relaxation: {self.relaxation}",
         ]
+        if self.least < -self.size * np.finfo(float).eps:
+            lines[1] += ", not positive semidefinite"
         if self.local is not None:
             at = self.local
             lines.append(
@@ -180,20 +164,21 @@ class Diagnosis:
             )
         return "\n".join(lines)
 
+    def _threshold(self, name: str, what: str, field: str) -> str:
+        """What is guaranteed up to which friction, and where it is lost."""
+        low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
+        if self.exact:
+            return f"{name}: {what} for every load if and only if mu < {low:.4g}"
+        text = f"{name}: {what} is not guaranteed"
+        if low > 0:
+            text = f"{name}: {what} for every load if mu < {low:.3g}"
+        return text if np.isnan(high) else f"{text}; it is lost for some load at mu = {high:.3g}"
+
     def __repr__(self) -> str:
-        guaranteed = (
-            f"unique below mu = {self.guaranteed.unique:.3g}"
-            if self.guaranteed.unique
-            else "uniqueness not guaranteed"
-        )
         contacts = f"{count(self.contacts, 'contact')} in {self.dim}D"
-        return line(
-            "Diagnosis",
-            contacts,
-            f"mu = {self.mu:g}",
-            f"rank {self.rank} of {self.size}",
-            guaranteed,
-        )
+        unique, rank = self.guaranteed.unique, f"rank {self.rank} of {self.size}"
+        sure = f"unique below mu = {unique:.3g}" if unique else "uniqueness not guaranteed"
+        return line("Diagnosis", contacts, f"mu = {self.mu:g}", rank, sure)
 
     def _repr_html_(self) -> str:
         parts = (text.partition(": ") for text in str(self).splitlines()[1:])
@@ -201,8 +186,7 @@ class Diagnosis:
 
 
 def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Diagnosis:
-    """Say what is known of a problem before it is solved and, given a solution, of the iterations
-    near it.
+    """Say what is known of a problem before it is solved and, given one, near its solution.
 
     Parameters
     ----------
@@ -231,36 +215,34 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     eigenvalues = la.eigvalsh((problem.Q + problem.Q.T) / 2)
     top = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
     counted = eigenvalues[eigenvalues > len(eigenvalues) * np.finfo(float).eps * top]
-    uniform = _uniform_slip(scaled, shape)
-    exact = (
-        problem.contacts == 1 and problem.dim == 2 and _normal_plates(scaled) and uniform.unique > 0
-    )
+    skew = np.linalg.norm(problem.Q - problem.Q.T)
+    uniform, one = _uniform_slip(scaled, shape), problem.contacts == 1 and problem.dim == 2
+    exact = one and _normal_plates(scaled) and uniform.unique > 0
     local = None
     if solution is not None:
-        residual = natural_map_residual(problem, solution.reactions, solution.multipliers)
+        answer = solution.reactions, solution.multipliers
+        residual = natural_map_residual(problem, *answer)
         if residual > DISTINCT:
             raise InputError(
                 "diagnose needs a solution of this problem; the residual of this one is"
                 f" {residual:.1e}."
             )
-        local = _local(
-            scaled, *scales.to_dimensionless(solution.reactions, solution.multipliers), largest
-        )
+        local = _local(scaled, *scales.to_dimensionless(*answer), largest)
     return Diagnosis(
-        problem.contacts,
-        problem.dim,
-        largest,
-        len(eigenvalues),
-        int(np.sum(~np.any(problem.Q, axis=1))),
-        len(counted),
-        float(eigenvalues.min(initial=0.0)) / top,
-        float(counted.max() / counted.min()) if len(counted) else np.inf,
-        float(np.linalg.norm(problem.Q - problem.Q.T) / (np.linalg.norm(problem.Q) or 1.0)),
-        uniform if exact else _guaranteed(scaled, shape),
-        uniform,
-        exact,
-        _relaxation(scaled),
-        local,
+        contacts=problem.contacts,
+        dim=problem.dim,
+        mu=largest,
+        size=len(eigenvalues),
+        held=int(np.sum(~np.any(problem.Q, axis=1))),
+        rank=len(counted),
+        least=float(eigenvalues.min(initial=0.0)) / top,
+        condition=float(counted.max() / counted.min()) if len(counted) else np.inf,
+        asymmetry=float(skew / (np.linalg.norm(problem.Q) or 1.0)),
+        guaranteed=uniform if exact else _guaranteed(scaled, shape),
+        uniform_slip=uniform,
+        exact=exact,
+        relaxation=_relaxation(scaled),
+        local=local,
     )
 
 
@@ -284,22 +266,16 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
             return Thresholds(0.0, 0.0, 0.0)
         if Z.shape[1] == 0:  # the plates determine every normal force
             return Thresholds(np.inf, np.inf, np.inf)
-        coupling = (
-            Z.T
-            @ Q[np.ix_(n, t)]
-            @ la.cho_solve(la.cho_factor(Q[np.ix_(t, t)]), Q[np.ix_(t, n)])
-            @ Z
-        )
+        factor = la.cho_factor(Q[np.ix_(t, t)])
+        coupling = Z.T @ Q[np.ix_(n, t)] @ la.cho_solve(factor, Q[np.ix_(t, n)]) @ Z
         normal = Z.T @ Q[np.ix_(n, n)] @ Z
         weight = np.diag(Q)[t].reshape(len(n), -1).mean(axis=1)
         root = np.sqrt(np.repeat(weight, problem.dim - 1))
         b2 = _largest(Q[np.ix_(t, t)] / np.outer(root, root), np.eye(len(t)))
         bound = Z.T @ ((shape**2 * weight)[:, None] * Z)
         ab = np.sqrt(b2 * _largest(bound, normal - coupling))
-        c2, ck = (
-            _largest(coupling, normal),
-            np.sqrt(b2 * _largest(bound, normal) * _largest(coupling, normal)),
-        )
+        c2 = _largest(coupling, normal)
+        ck = np.sqrt(b2 * _largest(bound, normal) * c2)
     except la.LinAlgError:
         return Thresholds(0.0, 0.0, 0.0)
     first, second = _over(2.0, ab), _over(np.sqrt(max(0.0, 1 - c2**2)), ck)
@@ -307,16 +283,12 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
 
 
 def _largest(A: np.ndarray, B: np.ndarray) -> float:
-    """Largest eigenvalue of A x = value B x, at least 0; LinAlgError if B is not positive definite."""
-    last = len(A) - 1
-    return max(
-        0.0,
-        float(
-            la.eigh((A + A.T) / 2, (B + B.T) / 2, eigvals_only=True, subset_by_index=(last, last))[
-                0
-            ]
-        ),
-    )
+    """Largest eigenvalue of A x = value B x, at least 0; LinAlgError if B is not positive
+    definite.
+    """
+    symmetric = (A + A.T) / 2, (B + B.T) / 2
+    last = (len(A) - 1,) * 2
+    return max(0.0, float(la.eigh(*symmetric, eigvals_only=True, subset_by_index=last)[0]))
 
 
 def _over(a: float, b: float) -> float:
@@ -335,10 +307,8 @@ def _uniform_slip(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
             values = la.eigvals(_solve(matrix, right)[: len(n)])
         except la.LinAlgError:
             return Thresholds(np.nan, np.nan, np.nan)
-        radius, real = (
-            max(radius, np.abs(values).max()),
-            max(real, np.abs(_real(values)).max(initial=0.0)),
-        )
+        radius = max(radius, np.abs(values).max())
+        real = max(real, np.abs(_real(values)).max(initial=0.0))
     return Thresholds(_over(1.0, real), _over(1.0, radius), _over(1.0, radius))
 
 
@@ -366,11 +336,8 @@ def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: f
     k, dim = r.shape
     bound, force = problem.mu * np.abs(r[:, 0]), np.linalg.norm(r[:, 1:], axis=1)
     status = contact_status(problem, r)
-    closed, stick, slip = (
-        status.touching,
-        status.stick,
-        status.slip & (problem.mu > 0) & (force > 0),
-    )
+    closed, stick = status.touching, status.stick
+    slip = status.slip & (problem.mu > 0) & (force > 0)
     counts = int(stick.sum()), int(slip.sum()), int((~closed).sum())
     if not np.any(closed):
         return Local(*counts, 0.0, 0.0, np.inf, np.inf)
@@ -407,13 +374,8 @@ def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: f
     except la.LinAlgError:
         return Local(*counts, np.nan, np.nan, np.nan, np.nan)
     slow, rate = (float(np.abs(x).max(initial=0.0)) for x in (late, values))
-    return Local(
-        *counts,
-        slow,
-        rate,
-        _over(largest, rate),
-        _over(largest, float(_real(values).max(initial=0.0))),
-    )
+    real = float(_real(values).max(initial=0.0))
+    return Local(*counts, slow, rate, _over(largest, rate), _over(largest, real))
 
 
 def _relaxation(problem: InterfaceProblem) -> str:

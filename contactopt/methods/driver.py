@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,13 @@ import scipy.sparse as sp
 from contactopt.checks import check_number, real_array
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
-from contactopt.linear.operators import InterfaceOperator, diagonal, loosened
+from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
 from contactopt.linear.stacked import Stacked
-from contactopt.methods import Repeated, default_method, find_method, solvers_of
-from contactopt.methods.method import Iterate, Known, Method, solves
+from contactopt.methods import Repeated, default_method, find_method, solvers_of, solves
+from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.notes import collected
 from contactopt.problem import (
+    Infeasible,
     InterfaceProblem,
     Scales,
     Solution,
@@ -36,14 +37,10 @@ CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
-# residual above which a method that has worked for long may be at a problem without a solution
-FAR = 0.1
-# seconds of work after which the proof is first looked for; then after ten times as long, and so on
-DOUBT = 1.0
+FAR = 0.1  # residual above which a method that works for long may be at one without a solution
+DOUBT = 1.0  # seconds of work before the proof is first looked for, then ten times as long, ...
 SAME = 1e-11  # relative distance at which two iterates are the same state
-# repeated states in a row after which a method is not going anywhere; some change course before
-# that
-CONFIRM = 8
+CONFIRM = 8  # repeated states in a row of a method that goes nowhere; some change course before
 
 
 def solve(
@@ -97,10 +94,9 @@ def solve(
     if not isinstance(time_limit, (int, float, np.number)) or not time_limit >= 0:
         raise InputError(f"time_limit must be a number of seconds, at least 0; got {time_limit!r}.")
     chosen = _method_for(problem, method, settings)
+    limits = _Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
-        solution = _run(
-            problem, chosen, tol, max_iterations, time_limit, change_tol, start, progress
-        )
+        solution = _run(problem, chosen, limits, start)
     return replace(solution, notes=tuple(notes))
 
 
@@ -127,18 +123,22 @@ def _method_for(
     return method
 
 
+@dataclass(frozen=True)
+class _Limits:
+    """When a solve ends, as `solve` says, and whom it tells of each iteration."""
+
+    tol: float
+    change_tol: float | None
+    max_iterations: int
+    time_limit: float
+    progress: Callable[[int, float], None] | None
+
+
 def _run(
-    problem: InterfaceProblem,
-    method: Method,
-    tol: float,
-    max_iterations: int,
-    time_limit: float,
-    change_tol: float | None,
-    start: Solution | None,
-    progress: Callable[[int, float], None] | None,
+    problem: InterfaceProblem, method: Method, limits: _Limits, start: Solution | None
 ) -> Solution:
     if problem.contacts == 0:
-        return _without_contacts(problem, method, tol)
+        return _without_contacts(problem, method, limits.tol)
     _check_equilibrium(problem)
     if not problem.symmetric and not getattr(method, "unsymmetric", False):
         name = type(method).__name__.lower()
@@ -150,27 +150,10 @@ def _run(
         problem = problem.explicit()
     scaled, scales = dimensionless(isotropic(problem))
     scales = replace(scales, stretch=problem.law.stretch(problem.dim))
-    recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
-    operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
-    steps = method.iterate(
-        scaled, None if start is None else _dimensionless_start(start, problem, scales)
-    )
-    ended: Status | None = None
-    repeated: Status | None = None
-    message = ""
-    proof, doubt = None, DOUBT
-    while ended is None and proof is None:
-        begin = time.perf_counter()
-        iterate, ended, message = _next(steps, recorder.left(), repeated)
-        recorder.clock += time.perf_counter() - begin
-        repeated = None
-        if iterate is not None:
-            ended = recorder.record(iterate, _counts(operator))
-        if iterate is not None and ended in (Status.STALLED, Status.CYCLING):
-            ended, repeated = None, ended
-        if ended is None and recorder.residual > FAR and recorder.clock > doubt:
-            proof, doubt = infeasibility(problem, recorder.clock / 10), 10 * recorder.clock
-    status = Status.SOLVED if recorder.residual <= tol else ended or Status.INFEASIBLE
+    recorder = _Recorder(problem, scales, limits)
+    first = None if start is None else _dimensionless_start(start, problem, scales)
+    ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
+    status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
     if proof is not None:
@@ -190,14 +173,38 @@ def _run(
     )
 
 
+def _follow(
+    steps: Iterator[Iterate | Known], scaled: InterfaceProblem, recorder: _Recorder
+) -> tuple[Status | None, str, Infeasible | None]:
+    """Take iterates until they end, or a proof is found that there is no solution.
+
+    Returns how the iteration ended, why, and the proof.
+    """
+    ended: Status | None = None
+    repeated: Status | None = None
+    message, proof, doubt = "", None, DOUBT
+    while ended is None and proof is None:
+        begin = time.perf_counter()
+        iterate, ended, message = _next(steps, recorder.left(), repeated)
+        recorder.clock += time.perf_counter() - begin
+        repeated = None
+        if iterate is not None:
+            ended = recorder.record(iterate, _counts(scaled.Q))
+            if ended in (Status.STALLED, Status.CYCLING):
+                ended, repeated = None, ended
+        if ended is None and recorder.residual > FAR and recorder.clock > doubt:
+            proof, doubt = infeasibility(recorder.problem, recorder.clock / 10), 10 * recorder.clock
+    return ended, message, proof
+
+
 def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None
 ) -> tuple[Iterate | Known | None, Status | None, str]:
     """The next iterate of a method with `left` seconds to go; without one, how the iteration ended
     and why.
 
-    repeated  how the last iterates repeat earlier ones; a method that does not go on in another way
-              ends so
+    `repeated` says how the last iterates repeat earlier ones. A method that does not go on in
+    another way ends so.
     """
     try:
         # what overflows is seen below
@@ -226,29 +233,26 @@ def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
         return None
 
 
-def _counts(operator: InterfaceOperator | None) -> dict[str, float]:
-    """What a method has spent so far: products with Q and, where it works on the bodies themselves,
-    V-cycles.
+def _counts(Q: Interface) -> dict[str, float]:
+    """What a method has spent so far: products with an operator Q and, where it works on the bodies
+    themselves, V-cycles.
     """
-    if operator is None:
+    if not isinstance(Q, InterfaceOperator):
         return {}
-    counts: dict[str, float] = {"products": operator.products}
-    return counts if operator.coupled is None else counts | {"cycles": operator.coupled.cycles}
+    counts: dict[str, float] = {"products": Q.products}
+    return counts if Q.coupled is None else counts | {"cycles": Q.coupled.cycles}
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
-    """No contact: no force.
-
-    It solves the problem unless a plate needs forces that balance its load.
+    """No contact, so no force: it solves the problem unless a plate needs forces that balance its
+    load.
     """
-    r, multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+    r, multipliers = at_rest(problem)
     residual = natural_map_residual(problem, r, multipliers)
-    status = Status.SOLVED if residual <= tol else Status.SETTLED
-    message = (
-        status.sentence
-        if residual <= tol
-        else "there is no contact that could balance the load on the plate"
-    )
+    status, message = Status.SOLVED, Status.SOLVED.sentence
+    if residual > tol:
+        status = Status.SETTLED
+        message = "there is no contact that could balance the load on the plate"
     return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
 
 
@@ -273,15 +277,13 @@ class _Recorder:
     clock counts the method's own seconds, certified those of the certificate.
     """
 
-    def __init__(self, problem, scales, tol, change_tol, max_iterations, time_limit, progress):  # type: ignore[no-untyped-def]
+    def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits):
         self.began = time.perf_counter()
-        self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
-        self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
-        self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+        self.problem, self.scales, self.limits = problem, scales, limits
+        self.reactions, self.multipliers = at_rest(problem)
         self.displacements: Stacked | None = None
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
-        self.previous = self.reactions
         self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
@@ -293,26 +295,24 @@ class _Recorder:
         Where products cost iterations it is computed to a digit as long as it is far from the
         tolerance.
         """
+        self.displacements, point = None, (self.reactions, self.multipliers)
         if known:
-            length = self.scales.length
-            moved = replace(known[0], value=known[0].value * length)
-            X = known[0].displacements
+            length, X = self.scales.length, known[0].displacements
             self.displacements = None if X is None else X * length
-            return natural_map_residual(self.problem, self.reactions, self.multipliers, moved=moved)
-        self.displacements = None
+            moved = replace(known[0], value=known[0].value * length)
+            return natural_map_residual(self.problem, *point, moved=moved)
         rough = loosened(self.problem.Q, ROUGH)
         if rough is not self.problem.Q:
-            residual = natural_map_residual(
-                replace(self.problem, Q=rough), self.reactions, self.multipliers
-            )
-            if residual > max(100 * ROUGH, 10 * self.tol):
+            residual = natural_map_residual(replace(self.problem, Q=rough), *point)
+            if residual > max(100 * ROUGH, 10 * self.limits.tol):
                 return residual
-        return natural_map_residual(self.problem, self.reactions, self.multipliers)
+        return natural_map_residual(self.problem, *point)
 
     @np.errstate(all="ignore")  # numbers beyond the range of floats have no certificate
     def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
+        previous, limits = self.reactions, self.limits
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         if self.lengthless:
             # The same forces solve the problem with u = V lambda = 0, and rounding has no length to
@@ -321,32 +321,28 @@ class _Recorder:
         begin = time.perf_counter()
         self.residual = self._certificate(known)
         self.certified += time.perf_counter() - begin
-        change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
-        self.previous = self.reactions
+        change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])
-        repeats = [
-            m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME
-        ]
+        same = [_relative(state, old) < SAME for old in reversed(self.recent)]
         self.recent = [*self.recent[1 - CYCLE :], state]
-        self.history.append(
-            {"residual": self.residual, "change": change, "seconds": self.clock} | counts
-        )
-        if self.progress is not None:
-            self.progress(len(self.history), self.residual)
-        if self.residual <= self.tol:
+        row = {"residual": self.residual, "change": change, "seconds": self.clock}
+        self.history.append(row | counts)
+        if limits.progress is not None:
+            limits.progress(len(self.history), self.residual)
+        if self.residual <= limits.tol:
             return Status.SOLVED
-        if self.change_tol is not None and len(self.history) > 1 and change <= self.change_tol:
+        if limits.change_tol is not None and len(self.history) > 1 and change <= limits.change_tol:
             return Status.SETTLED
-        self.repeated = self.repeated + 1 if repeats else 0
+        self.repeated = self.repeated + 1 if any(same) else 0
         if self.repeated >= CONFIRM:
-            return Status.STALLED if repeats[0] == 1 else Status.CYCLING
-        if len(self.history) >= self.max_iterations:
+            return Status.STALLED if same[0] else Status.CYCLING
+        if len(self.history) >= limits.max_iterations:
             return Status.ITERATION_LIMIT
         return Status.TIME_LIMIT if self.left() <= 0 else None
 
     def left(self) -> float:
         """Seconds that the time limit leaves."""
-        return self.time_limit - (time.perf_counter() - self.began)
+        return self.limits.time_limit - (time.perf_counter() - self.began)
 
 
 def _relative(new: np.ndarray, old: np.ndarray) -> float:
@@ -369,14 +365,10 @@ def _check_equilibrium(problem: InterfaceProblem) -> None:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
-        size = np.abs(column).max(initial=0.0)
-        push = column[:, 0] * np.sign(s)  # what normal reactions add to s
-        if (
-            size > 0
-            and np.all(np.abs(column[:, 1:]) <= 1e-9 * size)
-            and s != 0
-            and np.all(push >= -1e-9 * size)
-        ):
+        rounding = 1e-9 * np.abs(column).max(initial=0.0)
+        along = rounding > 0 and np.all(np.abs(column[:, 1:]) <= rounding)
+        # what normal reactions add to s
+        if s != 0 and along and np.all(column[:, 0] * np.sign(s) >= -rounding):
             raise InputError(
                 "the load on the plate pulls the bodies apart: no equilibrium; press them together."
             )

@@ -62,40 +62,27 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
     BackendError : if the solver HiGHS fails
     """
     check_number("limit", limit, low=0.0)
-    if problem.dim != 2 or not _coulomb(problem) or problem.contacts > MOST_CONTACTS:
+    law = problem.law
+    coulomb = law.unilateral and law.proportional and not law.dilatant
+    if problem.dim != 2 or not coulomb or problem.contacts > MOST_CONTACTS:
         raise InputError(
             f"all_solutions needs a 2D problem of Coulomb's law with at most {MOST_CONTACTS}"
             " contacts; use solve."
         )
     scaled, scales = dimensionless(problem)
     program, found = _Program(scaled), list[Solution]()
-    while len(found) < limit:
-        states, point = program.search()
-        if states is None or point is None:
-            break
-        r, lam = program.point(states, point)
+    while len(found) < limit and (combination := program.search()) is not None:
+        states, near = combination
+        r, lam = program.point(states, near)
         reactions, multipliers = scales.to_physical(r, lam)
         residual = natural_map_residual(problem, reactions, multipliers)
         possible = np.eye(4, dtype=bool)[states]
         if residual <= CERTIFIED:
             possible |= _states_of(scaled, r, lam)
-            found.append(
-                Solution(
-                    reactions,
-                    multipliers,
-                    Status.SOLVED,
-                    residual,
-                    program.searches,
-                    "all_solutions",
-                )
-            )
+            answer = reactions, multipliers, Status.SOLVED, residual
+            found.append(Solution(*answer, program.searches, "all_solutions"))
         program.exclude(possible)
     return found
-
-
-def _coulomb(problem: InterfaceProblem) -> bool:
-    law = problem.law
-    return law.unilateral and law.proportional and not law.dilatant
 
 
 class _Program:
@@ -136,10 +123,8 @@ class _Program:
         )
         self.integer = np.concatenate([np.zeros(2 * k + p), np.ones(4 * k)])
 
-    def search(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States (k,) and unknowns (2k + p,) of a combination not yet excluded; None, None if there
-        is none.
-        """
+    def search(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """States (k,) and unknowns (2k + p,) of a combination not yet excluded, if there is one."""
         self.searches += 1
         n, k = len(self.problem.Q) + len(self.problem.s), self.problem.contacts
         answer = milp(
@@ -149,7 +134,7 @@ class _Program:
             integrality=self.integer,
         )
         if answer.status == 2:  # infeasible
-            return None, None
+            return None
         if answer.x is None:
             raise BackendError(f"MILP backend 'highs' failed: {answer.message}")
         return np.argmax(answer.x[n:].reshape(4, k), axis=0), answer.x[:n]
@@ -185,10 +170,8 @@ class _Program:
 def _states_of(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> np.ndarray:
     """Which states (k, 4) a point has, more than one where it is degenerate."""
     u = problem.displacements(r, lam)
-    near_r, near_u = (
-        SAME * np.abs(r).max(initial=0.0),
-        SAME * max(np.abs(u).max(), np.abs(problem.q).max()),
-    )
+    near_r = SAME * np.abs(r).max(initial=0.0)
+    near_u = SAME * max(np.abs(u).max(), np.abs(problem.q).max())
     u_n, u_t, r_n, r_t = np.abs(u[:, 0]), u[:, 1], r[:, 0], r[:, 1]
     shut, bound = u_n <= near_u, problem.mu * r_n
     return np.stack(
@@ -213,7 +196,7 @@ def _bounds(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray, np.ndarr
             np.append(np.zeros(k), -1.0),
             A_ub=np.hstack([-np.eye(k), np.ones((k, 1))]),
             b_ub=np.zeros(k),
-            A_eq=np.hstack([np.vstack([V_n.T]), np.zeros((p, 1))]),
+            A_eq=np.hstack([V_n.T, np.zeros((p, 1))]),
             b_eq=-problem.s,
             bounds=[(0, None)] * k + [(0, 1.0)],
         )

@@ -4,40 +4,37 @@ section 5.1).
 Normal problem, r_t fixed: the QP (21), solved by conjugate gradients with bounds
 (contactopt.methods.kernels.mprgp) and made exact by active set steps. Tangential problem, r_n
 fixed: the friction force is the Lagrange multiplier of the bound on the slip rate; Uzawa's ascent
-on it,
-    r_t <- projection of r_t - rho u_t on the discs |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
+    r_t <- projection of r_t - rho u_t on |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
 is repeated until it has converged. It minimises the convex program (22) of `alternating`;
 tangentially moving plates keep their balance within the projection. rho = 1 / largest eigenvalue of
-Q_tt, so that the inner iteration always converges, linearly at a rate 1 - 1 / condition number of
-Q_tt: cheap iterations, one product with Q_tt each, but many. The outer loop contracts or cycles
-exactly as `alternating` does (moderate mu, weak coupling); relaxation < 1 helps there. Sources:
-Uzawa's method in Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational
-Inequalities; Panagiotopoulos (1975) for the alternation.
+Q_tt, so that the inner iteration always converges.
+
+Sources: Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational Inequalities, for
+Uzawa's method; Panagiotopoulos (1975) for the alternation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
+from contactopt.methods.alternating import TwoStage
 from contactopt.methods.constants import EIGENVALUE_MARGIN, ROUGH_NORMAL, SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.kernels.mprgp import largest_eigenvalue, smalbe
 from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
-from contactopt.problem.laws.law import Law
 
 INNER = 5000  # Uzawa steps in one tangential problem
 
 
 @dataclass(frozen=True)
-class Lagrangian:
+class Lagrangian(TwoStage):
     """Uzawa's iteration on the friction forces inside the two-stage iteration.
 
     Parameters
@@ -47,28 +44,8 @@ class Lagrangian:
 
     relaxation: float = 1.0
 
-    def __post_init__(self) -> None:
-        check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
-    def solves(self, law: Law) -> bool:
-        return law.bounded and not law.dilatant
-
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        r_n, r_t, lam = r[:, 0], r[:, 1:], lam.copy()
-        # columns with normal entries
-        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
-        normal, tangential = Part(problem, pushes, 0), Part(problem, ~pushes, 1)
-        change = 1.0
-        while True:
-            r_n, lam[pushes] = normal.exact(r_n, r_t, lam)
-            new, lam[~pushes] = tangential.uzawa(r_t, r_n, lam, max(SHARPER * change, SHARPEST))
-            change = float(np.linalg.norm(new - r_t)) / max(1.0, float(np.linalg.norm(new)))
-            r_t = new + (1 - self.relaxation) * (r_t - new)
-            yield np.concatenate([r_n[:, None], r_t], axis=1), lam.copy()
+    def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
+        return Normal(problem, pushes, 0), Tangential(problem, ~pushes, 1)
 
 
 class Part:
@@ -78,45 +55,55 @@ class Part:
 
     def __init__(self, problem: InterfaceProblem, own: np.ndarray, first: int):
         blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-        here, there = (
-            (blocks[:, :1], blocks[:, 1:]) if first == 0 else (blocks[:, 1:], blocks[:, :1])
-        )
+        here, there = blocks[:, :1], blocks[:, 1:]
+        if first:
+            here, there = there, here
         rows, others = here.ravel(), there.ravel()
         self.problem, self.own, self.shape = problem, own, here.shape
         self.q, self.V, self.V_there = problem.q.ravel()[rows], problem.V[rows], problem.V[others]
         self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
         self.step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(self.Q) or 1.0)
 
-    def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Linear term, own rigid motions and their resultants, given the other components' forces."""
+    def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Linear term, own rigid motions and resultants, given the other components' forces."""
         c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
         return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
 
-    def exact(
-        self, r_n: np.ndarray, r_t: np.ndarray, lam: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The normal QP."""
-        low = self.problem.law.lowest
-        c, V, s = self.data(r_t, lam)
-        rough = smalbe(self.Q, c, low, V.T, -s, r_n, lam[self.own], ROUGH_NORMAL)
-        project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
-        r, new = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
-        return r[:, 0], new
 
-    def uzawa(
-        self, r_t: np.ndarray, r_n: np.ndarray, lam: np.ndarray, accuracy: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The tangential program, until a step moves r_t by at most accuracy times the first step."""
-        c, V, s = self.data(r_n, lam)
-        radius, own, first = self.problem.law.bound(r_n), lam[self.own], 0.0
+class Normal(Part):
+    """The normal QP."""
+
+    def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
+        low = self.problem.law.lowest
+        c, V, s = self.data(r[:, 1:], lam)
+        rough = smalbe(self.Q, c, low, V.T, -s, r[:, 0], lam[self.own], ROUGH_NORMAL)
+        project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
+        r_n, own = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
+        return np.concatenate([r_n, r[:, 1:]], axis=1), own
+
+
+class Tangential(Part):
+    """The tangential program, until a step moves r_t by no more than `accuracy` of its size: a
+    hundredth of what the last solve moved it.
+    """
+
+    accuracy = SHARPER
+
+    def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
+        c, V, s = self.data(r[:, 0], lam)
+        r_t, radius, own = r[:, 1:], self.problem.law.bound(r[:, 0]), lam[self.own]
+        project: Projection = lambda y: disc_derivative(y, radius)  # noqa: E731
         for _ in range(INNER):
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
-            new, own = project_balanced(
-                lambda y: disc_derivative(y, radius), y, V, s, self.step, own
-            )
-            move = float(np.linalg.norm(new - r_t))
-            r_t, first = new, max(first, move)
-            if move <= accuracy * max(1.0, float(np.linalg.norm(r_t))):
+            new, own = project_balanced(project, y, V, s, self.step, own)
+            move, r_t = _over(new, r_t), new
+            if move <= self.accuracy:
                 break
-        return r_t, own
+        self.accuracy = max(SHARPER * _over(r_t, r[:, 1:]), SHARPEST)
+        return np.concatenate([r[:, :1], r_t], axis=1), own
+
+
+def _over(new: np.ndarray, old: np.ndarray) -> float:
+    """How far forces moved, over their size."""
+    return float(np.linalg.norm(new - old)) / max(1.0, float(np.linalg.norm(new)))

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from contactopt.problem import InterfaceProblem, Law
+from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
-
-
 Known = tuple[np.ndarray, np.ndarray, Moved]  # the same, and Q r
+NATIVE = "native"  # in place of a backend's name: our own linear algebra
 
 
 class Method(Protocol):
-    """What every method offers, as the head of this module says."""
+    """What every method offers, as the head of contactopt.methods says."""
 
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
@@ -33,6 +32,7 @@ class Method(Protocol):
         ------
         Reactions (k, dim), multipliers (p,) and, where the method knows it, Q r as a Moved.
         """
+        ...
 
     def backends(self, dim: int) -> tuple[str, str]:
         """Name the backends that the method needs.
@@ -49,25 +49,9 @@ class Method(Protocol):
         ------
         InputError : If one cannot be used.
         """
+        return NATIVE, NATIVE
 
 
-NATIVE = "native"  # in place of a backend's name: our own linear algebra
-
-
-def solves(method: Any, law: Law) -> bool:
-    """Say whether a method solves problems of a law.
-
-    A method that says nothing about it solves all.
-
-    Parameters
-    ----------
-    method : The method, an object with `iterate`.
-    law : The law of a problem.
-
-    Returns
-    -------
-    The answer of the method's own `solves` for the law in the variables in which methods see it
-    (`Law.plain`), if it has one.
-    """
-    predicate = getattr(method, "solves", None)
-    return predicate is None or bool(predicate(law.plain))
+def at_rest(problem: InterfaceProblem) -> Iterate:
+    """No force, and no motion of the plates."""
+    return np.zeros(problem.q.shape), np.zeros(len(problem.s))

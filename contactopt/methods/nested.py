@@ -5,10 +5,11 @@ The problem is solved on coarse grids first, where it costs little to find out w
 and slip; each solution starts the next finer grid. The steps are those of the primal-dual active
 set method (`newton`), whose linear systems are solved by PCG or GMRES in single precision to the
 accuracy that the step is worth, while residuals are computed in double precision. Without friction
-only the normal components are computed. Sources: Polonsky, Keer (1999), A numerical method for
-solving rough contact problems based on the multi-level multi-summation and conjugate gradient
-techniques, for contact by FFT and conjugate gradients; Hueber, Stadler, Wohlmuth (2008) for the
-active sets; Eisenstat, Walker (1996) for the accuracy of steps.
+only the normal components are computed.
+
+Sources: Polonsky, Keer (1999), A numerical method for solving rough contact problems based on the
+multi-level multi-summation and conjugate gradient techniques; Hueber, Stadler, Wohlmuth (2008) for
+the active sets; Eisenstat, Walker (1996) for the accuracy of steps.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from contactopt.methods.constants import (
     NESTED_TIGHTEST,
 )
 from contactopt.methods.kernels.levels import Evaluation, Level, Point, step
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
@@ -47,7 +48,7 @@ NEAR = 1e-8
 
 
 @dataclass(frozen=True)
-class Nested:
+class Nested(Method):
     """No settings."""
 
     implicit: ClassVar[bool] = True
@@ -55,14 +56,11 @@ class Nested:
     def solves(self, law: Law) -> bool:
         return True
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        for point, _ in self.steps(problem, start):
+        for point, _ in self.with_residuals(problem, start):
             yield point
 
-    def steps(
+    def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate, float]]:
         """Iterates on the finest grid with the residual of the equations."""

@@ -3,17 +3,15 @@ Coulomb friction.
 
 Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law
 (contactopt.problem.laws): each step sorts the contacts into open, sticking and slipping and solves
-one linear system of the closed ones: dense, n^3/3 to 2 n^3/3 operations, by sparse factors where Q
-is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that the step is worth
-(Eisenstat, Walker 1996), some ten products with Q each (contactopt.methods.kernels.krylov). Where
+one linear system of the closed ones: dense, by sparse factors where Q is sparse, or, where Q is an
+operator, by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker 1996). Where
 the bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
-(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution; the number of
-steps hardly depends on the mesh (reports/newton_steps). Motions that friction alone holds, and no
-sticking contact, follow from a convex problem before each step
-(contactopt.methods.kernels.balance). Not globally convergent: rank-deficient Q (rigid bodies,
-redundant contacts) or strong friction may make it cycle, which is what `proximal` is for. Sources:
-Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
-three-dimensional contact problems with Coulomb friction.
+(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution. Motions that
+friction alone holds, and no sticking contact, follow from a convex problem before each step
+(contactopt.methods.kernels.balance).
+
+Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm
+for three-dimensional contact problems with Coulomb friction.
 """
 
 from __future__ import annotations
@@ -41,7 +39,7 @@ from contactopt.methods.kernels.alart_curnier import (
 from contactopt.methods.kernels.balance import loose_motions, settled
 from contactopt.methods.kernels.coupled_newton import coupled_steps
 from contactopt.methods.kernels.krylov import model_of
-from contactopt.methods.method import NATIVE, Iterate, Known
+from contactopt.methods.method import Iterate, Known, Method
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
@@ -53,7 +51,7 @@ SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 
 
 @dataclass(frozen=True)
-class Newton:
+class Newton(Method):
     """Newton's method on the equations of Alart and Curnier.
 
     Parameters
@@ -78,31 +76,18 @@ class Newton:
             )
         find_preconditioner(self.preconditioner)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        for point, _ in self.steps(problem, start):
+        for point, _ in self.with_residuals(problem, start):
             yield point
 
-    def steps(
+    def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
-        """Iterate as `iterate` does, and tell the residual of the equations.
+        """Iterates, each with the residual of the equations that its step began with.
 
-        Parameters
-        ----------
-        problem, start : As for `iterate`.
-
-        Yields
-        ------
-        An iterate, and the residual of the equations that its step began with.
-
-        Raises
-        ------
-        InputError : If the linear algebra that was asked for does not fit Q.
+        Raises InputError if the linear algebra that was asked for does not fit Q.
         """
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:

@@ -7,10 +7,10 @@ eliminated and S the Schur complement, (S + l I) r_t = Q_tn v_n / Q_nn - v_t, an
 one equation for l with a root in a known interval: linear in 2D (closed form), solved by
 safeguarded Newton steps in 3D. Plates enter by the method of multipliers: the sweep works on Q +
 tau V V', q + V (lambda + tau s), and lambda grows by tau (V' r + s) after it; tau V' V = 10 mean
-compliances. A sweep costs one product with Q and k local problems of some microseconds each. No
-factorisation, works for rank-deficient Q; converges linearly, slowly where each contact feels all
-others, and may not converge for strong friction. Source: Jourdan, Alart, Jean (1998), A
-Gauss-Seidel like algorithm to solve frictional contact problems.
+compliances.
+
+Source: Jourdan, Alart, Jean (1998), A Gauss-Seidel like algorithm to solve frictional contact
+problems.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import scipy.sparse as sp
 from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import Interface
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws.law import Law
@@ -38,7 +38,7 @@ OFTEN = 100  # contacts between two looks at the clock
 
 
 @dataclass(frozen=True)
-class NSGS:
+class NSGS(Method):
     """Nonsmooth Gauss-Seidel: the law at one contact after another.
 
     Parameters
@@ -52,9 +52,6 @@ class NSGS:
 
     def __post_init__(self) -> None:
         check_number("the relaxation", self.relaxation, low=0.0, high=2.0)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def solves(self, law: Law) -> bool:
         return law.proportional and not law.dilatant

@@ -3,19 +3,16 @@ exactly.
 
 The paper's sub-solver for the normal problem (section 5.1). With kappa the penalty factor it
 replaces r_n >= 0, u_n >= 0, r_n u_n = 0 by the law r_n = kappa max(-u_n, 0) of the remaining gap
-u_n = (Q r + V lambda + q)_n. Read backwards the law is r_n >= 0, u_n + r_n / kappa >= 0, r_n (u_n +
-r_n / kappa) = 0: Signorini's conditions with the compliance Q_nn + I / kappa. So the dual of the
-penalised program,
-    min  r_n'(Q_nn + I / kappa) r_n / 2 + (q_n + Q_nt r_t)' r_n    subject to  r_n >= 0  and the
-         balance,
+u_n = (Q r + V lambda + q)_n. Read backwards the law is r_n >= 0, u_n + r_n / kappa >= 0,
+r_n (u_n + r_n / kappa) = 0: Signorini's conditions with the compliance Q_nn + I / kappa. So the
+dual of the penalised program,
+    min  r_n'(Q_nn + I / kappa) r_n / 2 + (q_n + Q_nt r_t)' r_n   subject to  r_n >= 0, the balance,
 is the same normal QP and needs no iteration of its own. Likewise Q_tt + I / kappa_t is friction
-regularised by a slip
-|r_t| / kappa_t before the bound is reached. The regularised problem is solved by `auto`, at its cost: a few dense
-linear systems, better conditioned than without penalty, so that it converges wherever `auto` does.
-What a factor buys: penetration r_n / kappa, so an error, and a certificate of the true problem,
-proportional to 1 / kappa. The iteration ends with the regularised problem solved, as `settled`
-where 1 / kappa is above the tolerance. Source: Kikuchi, Oden (1988), Contact Problems in
-Elasticity, chapter 6; Wriggers (2006), Computational Contact Mechanics.
+regularised by a slip |r_t| / kappa_t before the bound is reached. The regularised problem is solved
+by `auto`; penetration, error and certificate of the true problem are proportional to 1 / kappa.
+
+Sources: Kikuchi, Oden (1988), Contact Problems in Elasticity, chapter 6; Wriggers (2006),
+Computational Contact Mechanics.
 """
 
 from __future__ import annotations
@@ -29,7 +26,7 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.linear.operators import shifted
 from contactopt.methods.auto import Auto
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem, natural_map_residual
 
 # certificate of the regularised problem, relative to the error 1 / factor that the penalty makes
@@ -37,7 +34,7 @@ EXACT = 1e-3
 
 
 @dataclass(frozen=True)
-class Penalty:
+class Penalty(Method):
     """The penalty method. The regularised problem is solved by `auto`.
 
     Parameters
@@ -55,9 +52,6 @@ class Penalty:
         check_number("the penalty factor", self.factor, low=0.0)
         if self.tangential_factor is not None:
             check_number("the tangential penalty factor", self.tangential_factor, low=0.0)
-
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         softened = self.regularised(problem)

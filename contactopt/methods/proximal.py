@@ -4,11 +4,10 @@ form of Q.
 Outer iterate r_j solves Coulomb's problem with u = Q r + V lambda + q + alpha (r - r_{j-1}), a
 problem whose compliance Q + alpha I has full rank, by Newton steps from r_{j-1} with a line search.
 alpha falls by 5 after a success and rises by 8 after a failure, so that the loop ends as Newton's
-method where that converges. The fixed points are exactly the solutions of Coulomb's problem; there
-is no proof of convergence for Coulomb friction. Cost: one linear system per Newton step, dense, or
-by a sparse factorisation where Q is sparse. Q need not be symmetric. Source: Acary, Bremond, Huber
-(2018), section on proximal-point algorithms; Rockafellar (1976). The multiplier form of the same
-loop is the augmented Lagrangian method with penalty 1 / alpha.
+method where that converges. The fixed points are exactly the solutions of Coulomb's problem. The
+multiplier form of the same loop is the augmented Lagrangian method with penalty 1 / alpha.
+
+Sources: Acary, Bremond, Huber (2018), section on proximal-point algorithms; Rockafellar (1976).
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from contactopt.methods.constants import (
 from contactopt.methods.kernels.alart_curnier import cold_start
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.methods.kernels.sparse_newton import ProximalEquations
-from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 
 # of the proximal term; where even the largest fails, the loop ends
@@ -40,7 +39,7 @@ LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
 
 
 @dataclass(frozen=True)
-class Proximal:
+class Proximal(Method):
     """The proximal point method, whose subproblems are solved by Newton's method.
 
     Parameters
@@ -55,28 +54,16 @@ class Proximal:
     def __post_init__(self) -> None:
         check_number("alpha", self.alpha, low=0.0)
 
-    def backends(self, dim: int) -> tuple[str, str]:
-        return NATIVE, NATIVE
-
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
         bonded = isinstance(problem.Q, np.ndarray)
-        zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
-        point = start or (cold_start(problem) if bonded else zero)
+        point = start or (cold_start(problem) if bonded else at_rest(problem))
         yield from proximal_iterates(equations, point, self.alpha)
 
 
 def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEquations:
-    """Write Alart and Curnier's equations of a dimensionless problem, without a proximal term.
-
-    Parameters
-    ----------
-    problem : The dimensionless interface problem.
-    matrix : Its Q, ready for block systems.
-
-    Returns
-    -------
-    The equations, which `at` gives a centre and a weight.
+    """Alart and Curnier's equations of a dimensionless problem, without a proximal term: `at` gives
+    them a centre and a weight. `matrix` is the problem's Q, ready for block systems.
     """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
     return ProximalEquations(
@@ -87,23 +74,15 @@ def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEqu
 def proximal_iterates(
     equations: ProximalEquations, point: Iterate, alpha: float, gentle: bool = False
 ) -> Iterator[Iterate]:
-    """Solve one proximal subproblem after another.
+    """The solution of one proximal subproblem after another, or of a failed one the point that
+    Newton's method left it at.
 
-    Parameters
-    ----------
-    equations : The equations of the problem.
-    point : Forces (k, dim) and multipliers (p,) to start from.
-    alpha : The first weight of the proximal term.
-    gentle : Whether alpha changes slowly, so that few subproblems fail: for problems on which every
-        smaller alpha soon fails.
-
-    Yields
-    ------
-    The solution of each subproblem, or of a failed one the point that Newton's method left it at.
+    `alpha` is the first weight of the proximal term. It changes slowly if the loop is gentle, so
+    that few subproblems fail: for problems on which every smaller alpha soon fails.
     """
-    (fall, rise), easy = (
-        ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
-    )
+    fall, rise, easy = FALL, RISE, SUBPROBLEM_STEPS
+    if gentle:
+        fall, rise, easy = GENTLE_FALL, GENTLE_RISE, EASY
     while alpha < LARGEST_WEIGHT:
         new, solved, steps = equations.at(point[0], alpha).solve(*point)
         yield new

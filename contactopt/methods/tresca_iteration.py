@@ -5,12 +5,12 @@ Each outer iteration solves ONE convex problem, normal and tangential forces tog
 a box-constrained QP with one tangential direction, an SOCP with two, and then sets g = mu |r_n|.
 Its answer is made exact by Newton steps on r = P(r - u), P the projection on half-lines and discs.
 The first bounds are those of the bonded problem if a plate presses the bodies together, else zero:
-then the first iterate is contact without friction. Converges linearly, at a rate proportional to mu
-times the coupling of normal and tangential forces; beyond a critical mu it cycles, and relaxation <
-1 then often helps. A fixed point is exactly a solution of Coulomb's problem. Bounds too small for a
-plate that is dragged tangentially leave the convex problem without an answer. Sources:
-Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for the
-numerical realization of contact problems with Coulomb friction.
+then the first iterate is contact without friction. A fixed point is exactly a solution of Coulomb's
+problem. Bounds too small for a plate that is dragged tangentially leave the convex problem without
+an answer.
+
+Sources: Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for
+the numerical realization of contact problems with Coulomb friction.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from contactopt.methods.backends import CONIC, QP, find
 from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.qp import BoxQP
 from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.method import Iterate
+from contactopt.methods.method import Iterate, Method
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws.law import Law
 
 
 @dataclass(frozen=True)
-class Tresca:
+class Tresca(Method):
     """The fixed point of Tresca: convex programs with friction bounds of the solution before.
 
     Parameters
@@ -96,13 +96,9 @@ class TrescaProblem:
         """r (k, dim) and the multipliers (p,) for the bounds g (k,)."""
         problem, c = self.problem, self.problem.q.ravel()
         if isinstance(self.solver, BoxQP):
-            low, high = (
-                np.stack([self.low, -g], axis=1),
-                np.stack([np.full(len(g), np.inf), g], axis=1),
-            )
-            r, lam = self.solver.solve(
-                c, -problem.s, low.ravel(), high.ravel(), start=start.ravel()
-            )
+            low = np.stack([self.low, -g], axis=1).ravel()
+            high = np.stack([np.full(len(g), np.inf), g], axis=1).ravel()
+            r, lam = self.solver.solve(c, -problem.s, low, high, start=start.ravel())
         else:
             answer = self.solver.solve(g=g)
             r, lam = answer["r"], answer["approach"]

@@ -5,14 +5,13 @@ saves.
     >>> print(found)                          # what was found, in sentences
     >>> result = contactopt.run(found.scene)  # all that is exact is applied
 
-Four kinds of simplification are looked for, the exact ones first:
+Three kinds of simplification are looked for, the exact ones first:
 
 | module | what may be left out | error |
 |---|---|---|
 | `sections.py` | the third dimension, of prisms between rollers | none |
 | `mirrors.py` | one half, across each plane of mirror symmetry | none |
-| `joints.py` | slip of pairs that stick, friction of pairs that hardly rub | measured on a coarse mesh |
-| `large_bodies.py` | the mesh, where the contact is small beside the bodies | estimated |
+| `joints.py` | slip of pairs that stick, friction of pairs that hardly rub | measured coarsely |
 
 "Exact" means that the certificate of the whole was computed from the solution of the smaller scene,
 and is that of a solution (`proof.py`).

@@ -5,27 +5,14 @@
 
 # What counts as equal (contactopt.simplification.images). The proof on the whole has the last word.
 NEAR = 1e-9  # distance of nodes from their images, over the size of the scene
-# difference of loads, of gaps and of friction from their images, over their own values
-EQUAL = 1e-9
+EQUAL = 1e-9  # difference of loads, gaps and friction from their images, over their own values
 ROUNDED = 1e-12  # the same over the largest value anywhere: what rounding leaves where a gap closes
-# intervals of each edge of a facet at whose ends gaps and friction are compared, along the axis,
-# too
-BETWEEN = 8
+BETWEEN = 8  # intervals of each edge of a facet at whose ends gaps and friction are compared
 
 # Proofs (contactopt.simplification.proof).
 PROVED = 1e-6  # certificate of the whole with the forces and displacements of the part, at most
 MOST = 2_000_000  # displacement unknowns of the largest whole that is assembled for a proof
 
-# Half-spaces instead of bodies (contactopt.simplification.large_bodies).
-# error of the peak pressure times (size of the body over the contact half-width)^2, in the plane
-FINITE = 0.45
-# error of the peak pressure over the square of the largest slope of the gap inside the contact
-STEEP = 0.15
-WORST = 0.05  # estimated error up to which half-spaces are offered
-ACROSS = {2: 128, 3: 32}  # points across the contact half-width of the half-spaces, by dimension
-REACH = 1.5  # half side of their points over the contact half-width
-
 # Bonded and frictionless pairs (contactopt.simplification.joints).
 SHARE = 0.8  # of its friction bound that no contact of a pair may use for the pair to be tied
-# largest tangential traction over the largest pressure below which friction is left out
-SMOOTH = 1e-2
+SMOOTH = 1e-2  # largest tangential traction over the largest pressure, where friction is left out

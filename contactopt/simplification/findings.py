@@ -20,8 +20,7 @@ ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 class Simplification:
     """Something that may be left out of a scene.
 
-    name      'plane strain', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless
-              contacts'
+    name      'plane strain', 'mirror symmetry', 'tied contacts' or 'frictionless contacts'
     what      one sentence that says what is left out
     why       one or two sentences that say why, and how the error is known
     before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and

@@ -8,7 +8,7 @@ forces are those of both together. No element is cut.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -31,11 +31,7 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
     scene, near = whole.scene, NEAR * whole.size
     component = scene.components[int(np.argmax(np.abs(plane.normal)))]
     heights = {name: float(np.mean(plane.height(mesh.p))) for name, mesh in whole.meshes.items()}
-    kept = {
-        name
-        for name, image in images.bodies.items()
-        if name in heights and (image == name or heights[name] > 0)
-    }
+    kept = {name for name in heights if images.bodies[name] == name or heights[name] > 0}
     pairs = tuple(pair for pair in scene.pairs if _keeps(pair, whole, images, kept, plane))
     rigid = {name for pair in pairs for name in pair.bodies if name in whole.rigid}
     bodies: list[Any] = []
@@ -44,18 +40,7 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
             bodies.append(_half_part(whole, images, part, plane, component))
         elif isinstance(part, Rigid) and part.name in rigid:
             bodies.append(_half_rigid(images, part, component))
-    if scene.contacts or len(pairs) != 1 or len(bodies) != 2:
-        made = replace(
-            scene,
-            upper=None,
-            lower=None,
-            mu=None,
-            law="coulomb",
-            bodies=tuple(bodies),
-            contacts=pairs,
-        )
-    else:
-        made = with_pairs(replace(scene, upper=bodies[0], lower=bodies[1]), pairs)
+    made = with_pairs(scene, tuple(bodies), pairs, copies=2 * scene.copies)
     there = {("body", name) for name in kept | rigid} | {("pair", pair.name) for pair in pairs}
     partner = {("body", name): ("body", image) for name, image in images.bodies.items()}
     partner |= {("pair", name): ("pair", image) for name, image in images.pairs.items()}
@@ -67,7 +52,7 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
         sign = -1.0 if key not in there and key in turned_over else 1.0
         return key if key in there else partner[key], np.where(own, x, plane.image(x)), sign * turns
 
-    return replace(made, copies=2 * scene.copies), fold
+    return made, fold
 
 
 def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
@@ -109,55 +94,45 @@ def roller(whole: Whole) -> str:
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]
-        surfaces = [
-            mesh.facets[:, mesh.boundaries[s]].ravel() for s in whole.scene.surfaces_of(part)
-        ]
+        facets = [mesh.boundaries[surface] for surface in whole.scene.surfaces_of(part)]
+        contacts = mesh.facets[:, np.concatenate(facets)]
         for support in part.supports:
             nodes = np.unique(mesh.facets[:, mesh.boundaries[support.boundary]])
             for component in support.displacement or {}:
                 row = mesh.p[whole.scene.components.index(component), nodes]
-                if np.ptp(row) < NEAR * whole.size and len(
-                    np.intersect1d(nodes, np.concatenate(surfaces))
-                ):
+                if np.ptp(row) < NEAR * whole.size and np.isin(nodes, contacts).any():
                     return f"the support on {support.boundary!r} of body '{name}'"
     return ""
 
 
 def _keeps(pair: Any, whole: Whole, images: Images, kept: set[str], plane: Plane) -> bool:
-    """Whether a pair belongs to the half: of two that are images one stays, on the positive side."""
+    """Whether a pair belongs to the half: of two images one stays, on the positive side."""
     elastic = [name for name in pair.bodies if name in whole.meshes]
     if any(name not in kept for name in elastic):
         return False
     if images.pairs[pair.name] == pair.name or any(images.bodies[name] != name for name in elastic):
         return True  # cut by the plane, or the image is a pair of the body on the other side
-    corners = [
-        whole.corners(pair.bodies[i], whole.surface_of(pair, i))
-        for i in (0, 1)
-        if whole.surface_of(pair, i)
+    middles = [
+        float(plane.height(whole.corners(*surface)).mean()) for surface in whole.surfaces(pair)
     ]
-    farthest = max((float(plane.height(c).mean()) for c in corners), key=abs)
-    return (
-        farthest > 0
-        if abs(farthest) > NEAR * whole.size
-        else bool(pair.name < images.pairs[pair.name])
-    )
+    farthest = max(middles, key=abs)
+    if abs(farthest) > NEAR * whole.size:
+        return farthest > 0
+    return bool(pair.name < images.pairs[pair.name])
 
 
 def _half_rigid(images: Images, part: Rigid, component: str) -> Rigid:
     """Held along the normal if the plane cuts it, with both forces if it stands for two."""
     if images.bodies[part.name] != part.name:
         return replace(part, force=_doubled(part.force))
-    return replace(
-        part,
-        force=_without(part.force, component),
-        displacement=_without(part.displacement, component),
+    force, displacement = (
+        values and _without(values, component) for values in (part.force, part.displacement)
     )
+    return replace(part, force=force, displacement=displacement)
 
 
-def _without(values: Any, component: str) -> Any:
-    return (
-        {name: value for name, value in values.items() if name != component} if values else values
-    )
+def _without(values: Mapping[str, float], component: str) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name != component}
 
 
 def _doubled(values: Any) -> Any:
@@ -167,7 +142,7 @@ def _doubled(values: Any) -> Any:
 def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component: str) -> Part:
     name, own = part.name, whole.meshes[part.name].boundaries or {}
     if images.bodies[name] != name:
-        loads = [
+        loads: list[Any] = [
             replace(load, force=_doubled(load.force)) if isinstance(load, Plate) else load
             for load in part.loads
         ]
@@ -179,27 +154,26 @@ def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component
     def there(boundary: str) -> bool:
         return bool(plane.height(whole.corners(name, boundary)).max() > NEAR * whole.size)
 
-    supports = [item for item in part.supports if there(item.boundary)] + [
-        Support(cut, {component: 0.0})
-    ]
-    made: list[Any] = []
+    supports = [item for item in part.supports if there(item.boundary)]
+    supports.append(Support(cut, {component: 0.0}))
+    loads = []
     for number, load in enumerate(part.loads):
         if not isinstance(load, Plate):
             if not hasattr(load, "boundary") or there(load.boundary):
-                made.append(load)
+                loads.append(load)
         elif (name, number) in images.own:
-            made.append(replace(load, force=_without(load.force, component)))
+            loads.append(replace(load, force=_without(load.force, component)))
             if component in load.force and not load.glued:
                 supports.append(Support(load.boundary, {component: 0.0}))
         elif there(load.boundary):
-            made.append(replace(load, force=_doubled(load.force)))
+            loads.append(replace(load, force=_doubled(load.force)))
     surfaces = [surface for surface in whole.scene.surfaces_of(part) if there(surface)]
     curves = {surface: part.curve_of(surface) for surface in surfaces}
     return replace(
         part,
         mesh=of_mesh(part.mesh, half_mesh(plane, cut)),
         supports=tuple(supports),
-        loads=tuple(made),
+        loads=tuple(loads),
         contact=part.contact if part.contact in surfaces else surfaces[0],
         curve={surface: curve for surface, curve in curves.items() if curve is not None} or None,
     )

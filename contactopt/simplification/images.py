@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -65,8 +66,12 @@ class Images:
 
     bodies: Mapping[str, str]
     pairs: Mapping[str, str]
-    own: frozenset[tuple[str, int]]
-    swapped: frozenset[str]
+    own: set[tuple[str, int]]
+    swapped: set[str]
+
+
+class _Differs(Exception):
+    """Half a sentence that says what has no mirror image; empty where that is a surface."""
 
 
 def images_under(whole: Whole, plane: Plane) -> Images | str | None:
@@ -75,7 +80,12 @@ def images_under(whole: Whole, plane: Plane) -> Images | str | None:
     Half a sentence if the meshes lie on themselves and the rest does not; None if they do not.
     """
     nodes = _images_of_meshes(whole, plane)
-    return None if nodes is None else _Comparison(whole, plane, nodes).images()
+    if nodes is None:
+        return None
+    try:
+        return _Comparison(whole, plane, nodes).images()
+    except _Differs as reason:
+        return str(reason) or None
 
 
 def equal_functions(one: Any, other: Any, here: np.ndarray, there: np.ndarray) -> bool:
@@ -129,28 +139,43 @@ def _cells(cells: np.ndarray) -> np.ndarray:
     return np.asarray(made[:, np.lexsort(made)])
 
 
-def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[tuple[str, str, Any, Any, Any]]:
-    """Of a body: words, boundary, projection on components, values there, the object."""
+class _Condition(NamedTuple):
+    """A support, load, force or normal: words, boundary, projection (dim, dim) on the components
+    that have values, these values (dim,), and the object of the scene.
+    """
+
+    kind: str
+    where: str
+    space: np.ndarray
+    values: np.ndarray
+    item: Any
+
+
+def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
+    """All of a body."""
+    whole = np.eye(len(components))
     if not isinstance(part, Part):
         for what in ("force", "displacement"):
-            yield what, "", *held_space(components, getattr(part, what) or {}), None
+            yield _Condition(what, "", *held_space(components, getattr(part, what) or {}), None)
         normal = np.zeros(len(components)) if part.normal is None else np.array(part.normal, float)
-        yield "normal", "", np.eye(len(components)), normal / (np.linalg.norm(normal) or 1.0), None
+        yield _Condition("normal", "", whole, normal / (np.linalg.norm(normal) or 1.0), None)
         return
     for item in (*part.supports, *part.loads):
         where, kind = getattr(item, "boundary", ""), type(item).__name__.lower()
         if isinstance(item, (Support, Plate)):
             values = item.displacement if isinstance(item, Support) else item.force
             kind += "" if getattr(item, "glued", True) else " that slides"
-            yield kind, where, *held_space(components, values), item
+            yield _Condition(kind, where, *held_space(components, values), item)
         else:
             kind = kind.replace("bodyforce", "force per volume")
-            yield kind, where, np.eye(len(components)), np.array(item.value, float), item
+            yield _Condition(kind, where, whole, np.array(item.value, float), item)
 
 
 @dataclass(frozen=True, eq=False)
 class _Comparison:
-    """A scene beside its image under one reflection; `nodes` as _images_of_meshes()."""
+    """A scene beside its image under one reflection; `nodes` as _images_of_meshes(). Each function
+    raises _Differs where something has no image.
+    """
 
     whole: Whole
     plane: Plane
@@ -163,130 +188,125 @@ class _Comparison:
         own = mesh.facets[:, mesh.boundaries[boundary]]
         return np.array_equal(_cells(nodes[own]), _cells(there.facets[:, there.boundaries[other]]))
 
-    def images(self) -> Images | str | None:
-        """As images_under()."""
+    def images(self) -> Images:
         own: set[tuple[str, int]] = set()
         for name, (image, _) in self.nodes.items():
             part, other = self.whole.parts[name], self.whole.parts[image]
-            for surface in self.whole.scene.surfaces_of(part):
-                if not any(
-                    self.fits(name, surface, s) for s in self.whole.scene.surfaces_of(other)
-                ):
-                    return None
+            twins = self._surfaces(part, other)
             if part.material != other.material:
-                return f"the bodies '{name}' and '{image}' have different materials"
-            reason = self._conditions_differ(part, other, own) or self._curves_differ(part, other)
-            if reason:
-                return reason
+                raise _Differs(f"the bodies '{name}' and '{image}' have different materials")
+            own |= self._plates(part, other)
+            for surface, twin in twins.items():
+                self._compare_curves(part, surface, other.curve_of(twin))
         return self._with_pairs({name: image for name, (image, _) in self.nodes.items()}, own)
 
-    def _conditions_differ(self, part: Any, image: Any, own: set[tuple[str, int]]) -> str:
-        """Half a sentence about a support, load, force or normal that has no image; fills `own`."""
-        components, H = self.whole.scene.components, self.plane.reflection
+    def _surfaces(self, part: Part, image: Part) -> dict[str, str]:
+        """The image of each surface that contacts use."""
+        twins = {}
+        for surface in self.whole.scene.surfaces_of(part):
+            others = self.whole.scene.surfaces_of(image)
+            found = [other for other in others if self.fits(part.name, surface, other)]
+            if not found:
+                raise _Differs
+            twins[surface] = found[0]
+        return twins
+
+    def _plates(self, part: Any, image: Any) -> set[tuple[str, int]]:
+        """(body, number of a load) of plates that are their own images, if all supports, loads,
+        forces and normals have images.
+        """
+        components, H, found = self.whole.scene.components, self.plane.reflection, set()
         others = list(_conditions(image, components))
-        for kind, where, P, v, item in _conditions(part, components):
-            for other_kind, there, Q, w, other in others:
-                size = max(np.abs(v).max(), np.abs(w).max())
-                same = np.allclose(H @ P @ H, Q, atol=EQUAL) and np.all(
-                    np.abs(H @ v - w) <= EQUAL * size
+        for one in _conditions(part, components):
+            for two in others:
+                size = max(np.abs(one.values).max(), np.abs(two.values).max())
+                same = one.kind == two.kind and bool(
+                    np.allclose(H @ one.space @ H, two.space, atol=EQUAL)
+                    and np.all(np.abs(H @ one.values - two.values) <= EQUAL * size)
                 )
-                if (
-                    kind == other_kind
-                    and same
-                    and (not where or self.fits(part.name, where, there))
-                ):
-                    if item is other and isinstance(item, Plate):
-                        own.add((part.name, part.loads.index(item)))
+                if same and (not one.where or self.fits(part.name, one.where, two.where)):
+                    if one.item is two.item and isinstance(one.item, Plate):
+                        found.add((part.name, part.loads.index(one.item)))
                     break
             else:
-                place = f" on {where!r}" if where else ""
-                return f"the {kind}{place} of body '{part.name}' has no mirror image"
-        return ""
+                place = f" on {one.where!r}" if one.where else ""
+                raise _Differs(f"the {one.kind}{place} of body '{part.name}' has no mirror image")
+        return found
 
-    def _curves_differ(self, part: Part, image: Part) -> str:
-        for surface in self.whole.scene.surfaces_of(part):
-            surfaces = self.whole.scene.surfaces_of(image)
-            other = next(image.curve_of(s) for s in surfaces if self.fits(part.name, surface, s))
-            curve, x = part.curve_of(surface), self.whole.acting(part.name, surface)
-            if curve is None and other is None:
-                continue
-            if curve is not None and other is not None:
-                apart = np.abs(self.plane.image(curve(x)) - other(self.plane.image(x)))
-                if apart.max() <= ROUNDED * self.whole.size:
-                    continue
-            return f"the curve of body '{part.name}' is not symmetric"
-        return ""
+    def _compare_curves(self, part: Part, surface: str, other: Any) -> None:
+        curve, x = part.curve_of(surface), self.whole.acting(part.name, surface)
+        if curve is None and other is None:
+            return
+        if curve is not None and other is not None:
+            apart = np.abs(self.plane.image(curve(x)) - other(self.plane.image(x)))
+            if apart.max() <= ROUNDED * self.whole.size:
+                return
+        raise _Differs(f"the curve of body '{part.name}' is not symmetric")
 
-    def _with_pairs(self, images: dict[str, str], own: set[tuple[str, int]]) -> Images | str:
-        """With the images of pairs and rigid bodies; half a sentence if one has none or is cut."""
+    def _with_pairs(self, images: dict[str, str], own: set[tuple[str, int]]) -> Images:
+        """With the images of pairs and rigid bodies, none of which may be cut."""
         found: dict[str, str] = {}
         swapped: set[str] = set()
         for pair in self.whole.scene.pairs:
             if images.get(pair.bodies[0]) == pair.bodies[1]:
-                return (
+                raise _Differs(
                     f"the contact '{pair.name}' lies in this plane itself, between a body and its"
                     " own mirror image"
                 )
-            reasons = [f"the contact '{pair.name}' has no mirror image"]
-            for other in (pair, *self.whole.scene.pairs):
-                order = self._facing(pair, other, images)
-                reason = "" if order is None else self._pair_differs(pair, other, order)
-                if order is not None and not reason:
-                    found[pair.name] = other.name
-                    images |= {
-                        pair.bodies[side]: other.bodies[there] for side, there in enumerate(order)
-                    }
-                    swapped |= {pair.name} if order == (1, 0) else set()
-                    break
-                reasons = [reason, *reasons] if reason and len(reasons) == 1 else reasons
-            else:
-                return reasons[0]
+            other, order = self._image_of(pair, images)
+            found[pair.name] = other.name
+            images |= {pair.bodies[side]: other.bodies[there] for side, there in enumerate(order)}
+            if order == (1, 0):
+                swapped.add(pair.name)
         if any(images[image] != name for name, image in images.items()):
-            return "rigid bodies are not each other's images"
-        return Images(images, found, frozenset(own), frozenset(swapped))
+            raise _Differs("rigid bodies are not each other's images")
+        return Images(images, found, own, swapped)
 
-    def _facing(
-        self, pair: Contact, other: Contact, images: Mapping[str, str]
-    ) -> tuple[int, int] | None:
-        """Which sides of the other pair are the images of the upper and the lower one."""
-        for order in ((0, 1), (1, 0)):
-            for side, there in enumerate(order):
-                body, image = pair.bodies[side], other.bodies[there]
-                if images.get(body, image) != image or (body in self.nodes) != (
-                    image in self.nodes
-                ):
-                    break
-                surfaces = self.whole.surface_of(pair, side), self.whole.surface_of(other, there)
-                if body in self.nodes and not self.fits(body, *surfaces):
-                    break
-            else:
-                return order
-        return None
+    def _image_of(
+        self, pair: Contact, images: Mapping[str, str]
+    ) -> tuple[Contact, tuple[int, int]]:
+        """The image of a pair, and which of its sides are those of the upper and the lower one."""
+        reason = None
+        for other, order in product((pair, *self.whole.scene.pairs), ((0, 1), (1, 0))):
+            if all(self._faces(pair, side, other, order[side], images) for side in (0, 1)):
+                try:
+                    self._compare_pairs(pair, other, order)
+                    return other, order
+                except _Differs as found:
+                    reason = reason or found
+        raise reason or _Differs(f"the contact '{pair.name}' has no mirror image")
 
-    def _pair_differs(self, pair: Contact, other: Contact, order: tuple[int, int]) -> str:
-        """Half a sentence if two pairs have different laws, friction, gaps or rigid bodies."""
+    def _faces(
+        self, pair: Contact, side: int, other: Contact, there: int, images: Mapping[str, str]
+    ) -> bool:
+        """Whether a side of one pair may be the image of a side of the other one."""
+        body, image = pair.bodies[side], other.bodies[there]
+        if images.get(body, image) != image or (body in self.nodes) != (image in self.nodes):
+            return False
+        surface = self.whole.surface_of(pair, side)
+        return not surface or self.fits(body, surface, self.whole.surface_of(other, there))
+
+    def _compare_pairs(self, pair: Contact, other: Contact, order: tuple[int, int]) -> None:
+        """Laws, friction, gaps and rigid bodies."""
         if (pair.law, pair.coupling) != (other.law, other.coupling):
-            return f"the contact '{pair.name}' has another law or coupling than its mirror image"
-        functions: list[tuple[str, Any, Any]] = [
-            (f"friction of contact '{pair.name}'", pair.mu, other.mu)
-        ]
+            raise _Differs(
+                f"the contact '{pair.name}' has another law or coupling than its mirror image"
+            )
+        functions: list[tuple[str, Any, Any]] = []
+        functions.append((f"friction of contact '{pair.name}'", pair.mu, other.mu))
         for side, there in enumerate(order):
             one = self.whole.rigid.get(pair.bodies[side])
             two = self.whole.rigid.get(other.bodies[there])
             if one is not None and two is not None:
-                reason = self._conditions_differ(one, two, set())
-                if reason:
-                    return reason
+                self._plates(one, two)
                 gap, image = (0.0 if each.gap is None else each.gap for each in (one, two))
                 functions.append((f"gap of rigid body '{one.name}'", gap, image))
-        x = np.concatenate(
-            [self.whole.acting(*surface) for surface in self.whole.surfaces(pair)], axis=1
-        )
-        for what, here, there_too in functions:
-            if any(np.ndim(each) for each in (here, there_too) if not callable(each)):
-                return (
+        surfaces = [self.whole.acting(*surface) for surface in self.whole.surfaces(pair)]
+        x = np.concatenate(surfaces, axis=1)
+        for what, here, twin in functions:
+            if any(np.ndim(each) for each in (here, twin) if not callable(each)):
+                raise _Differs(
                     f"the {what} is no function of the place, and has no image to compare it with"
                 )
-            if not equal_functions(here, there_too, x, self.plane.image(x)):
-                return f"the {what} is not symmetric"
-        return ""
+            if not equal_functions(here, twin, x, self.plane.image(x)):
+                raise _Differs(f"the {what} is not symmetric")

@@ -20,7 +20,7 @@ from contactopt.readings.quantities import elastic_energy
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import SHARE, SMOOTH
 from contactopt.simplification.findings import Simplification
-from contactopt.simplification.whole import sizes_of, with_pairs
+from contactopt.simplification.whole import whole_of, with_pairs
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 ROUGH = Options(tol=1e-6)
@@ -62,28 +62,20 @@ def _offer(
     if not names:
         return None
     pairs = [replace(pair, law=law, mu=0.0) if pair.name in names else pair for pair in scene.pairs]
-    made = with_pairs(scene, tuple(pairs))
+    made = with_pairs(scene, scene.parts, tuple(pairs))
     other = coarse(made)
     if not other.solution.solved:
         return None
-    listed = ("contact " if len(names) == 1 else "contacts ") + ", ".join(
-        f"'{each}'" for each in names
-    )
+    listed = ", ".join(f"'{each}'" for each in names)
+    what = what.format(f"{'contact' if len(names) == 1 else 'contacts'} {listed}")
     why = (
         f"On a coarse mesh {why}. The error is the largest change of energy, contact forces and"
         " largest pressures on that mesh."
     )
     check: Callable[[Solved], str] = lambda simple: verdict(names, simple)  # noqa: E731
-    sizes = sizes_of(scene), sizes_of(made)
-    return Simplification(
-        f"{law} contacts",
-        what.format(listed),
-        why,
-        *sizes,
-        made,
-        error=_change(solved, other),
-        check=check,
-    )
+    error, name = _change(solved, other), f"{law} contacts"
+    sizes = whole_of(scene).sizes, whole_of(made).sizes
+    return Simplification(name, what, why, *sizes, made, error=error, check=check)
 
 
 def _use_of_friction(solved: Solved, pair: Pair, value: Any) -> float:
@@ -92,10 +84,8 @@ def _use_of_friction(solved: Solved, pair: Pair, value: Any) -> float:
     mu = value(solved.reduction.problem.coordinates[:, pair.contacts]) if callable(value) else value
     if np.any(r[:, 0] <= 1e-6 * np.abs(r[:, 0]).max(initial=0.0)):
         return float("inf")
-    used = np.linalg.norm(r[:, 1:], axis=1) / np.maximum(
-        np.asarray(mu, dtype=float) * r[:, 0], 1e-300
-    )
-    return float(used.max(initial=0.0))
+    bound = np.maximum(np.asarray(mu, dtype=float) * r[:, 0], 1e-300)
+    return float((np.linalg.norm(r[:, 1:], axis=1) / bound).max(initial=0.0))
 
 
 def _rubbing(solved: Solved, pair: Pair) -> float:
@@ -135,16 +125,13 @@ def _verdict_on_ties(friction: Mapping[str, Any]) -> Callable[[list[str], Solved
     def verdict(names: list[str], solved: Solved) -> str:
         broken = []
         for pair in solved.reduction.problem.pairs:
-            used = (
-                _use_of_friction(solved, pair, friction[pair.name]) if pair.name in names else 0.0
-            )
+            used = _use_of_friction(solved, pair, friction[pair.name]) if pair.name in names else 0
             if used > 1:
                 broken.append(f"'{pair.name}' would {'open' if np.isinf(used) else 'slip'}")
         if not broken:
             return "The tied contacts stay closed and below their friction bound, as was assumed."
-        return (
-            f"The assumption is violated: {', '.join(broken)}; solve the scene with friction there."
-        )
+        wrong = ", ".join(broken)
+        return f"The assumption is violated: {wrong}; solve the scene with friction there."
 
     return verdict
 

@@ -14,7 +14,7 @@ from contactopt.errors import InputError
 from contactopt.simplification.findings import PARTS, Simplification
 from contactopt.simplification.halves import half_of, roller
 from contactopt.simplification.images import Images, Plane, images_under
-from contactopt.simplification.whole import Whole, sizes_of, whole_of
+from contactopt.simplification.whole import Whole, whole_of
 
 ACROSS = 1e-6  # cosine below which two normals are across each other
 UNIQUE = "Exact wherever the solution is unique."
@@ -28,43 +28,35 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
     """One half after the other, across planes of symmetry, and what is in the way."""
     planes, notes = find_planes(whole)
     components = whole.scene.components
-    if planes and whole.scene.copies == 1 and (name := roller(whole)):
-        return [], [
-            *notes,
-            (
-                f"The scene is symmetric across the plane {planes[0].words(components)}, but is not"
-                f" cut: in a part of the bodies {name}, which holds a contact along one axis, would"
-                " count as a plane of symmetry, too."
-            ),
-        ]
-    if not planes and not notes and whole.scene.copies == 1 and whole.scene.kind != "axisymmetric":
+    uncut = whole.scene.copies == 1
+    if planes and uncut and (name := roller(whole)):
+        told = (
+            f"The scene is symmetric across the plane {planes[0].words(components)}, but is not"
+            f" cut: in a part of the bodies {name}, which holds a contact along one axis, would"
+            " count as a plane of symmetry, too."
+        )
+        return [], [*notes, told]
+    if not planes and not notes and uncut and whole.scene.kind != "axisymmetric":
         notes.append(NONE)
     found: list[Simplification] = []
     for plane in planes:
         images, where = images_under(whole, plane), plane.words(components)
         if not isinstance(images, Images):
             continue
+        told = f"The scene is symmetric across the plane {where}"
         if np.count_nonzero(plane.normal) > 1:
-            if not found and whole.scene.copies == 1:
-                notes.append(
-                    f"The scene is symmetric across the plane {where}; turn it so that this is"
-                    " across an axis."
-                )
+            if not found and uncut:
+                notes.append(f"{told}; turn it so that this is across an axis.")
             continue
         try:
             scene, fold = half_of(whole, plane, images)
             made = whole_of(scene)
         except InputError as error:
-            notes.append(
-                f"The scene is symmetric across the plane {where}, but is not cut: {error}"
-            )
+            notes.append(f"{told}, but is not cut: {error}")
             continue
-        assert made is not None
-        what = (
-            f"The {PARTS[2 ** (len(found) + 1)]} on one side of the plane {where} stands for the"
-            " whole."
-        )
-        sizes = sizes_of(whole.scene), sizes_of(scene)
+        part = PARTS[2 ** (len(found) + 1)]
+        what = f"The {part} on one side of the plane {where} stands for the whole."
+        sizes = whole.sizes, made.sizes
         found.append(Simplification("mirror symmetry", what, _why(images), *sizes, scene, (fold,)))
         whole = made
     return found, notes

@@ -44,21 +44,14 @@ def certificate_of_whole(
 ) -> float:
     """How far the whole is from solved by what the part's solution says of it.
 
-    Parameters
-    ----------
-    whole : The scene that the part stands for, of elastic and rigid bodies.
-    elements, zone : The numbers for which the meshes of both were made.
-    part : The part, solved.
-    folds : How the whole lies on the part, one step after the other.
-
-    Returns
-    -------
-    The largest of the errors in the head of this module [-]; infinite where nodes or contacts of
-    the whole have no place in the part.
+    This is the largest of the errors in the head of this module [-]; infinite where nodes or
+    contacts of the whole have no place in the part. `elements` and `zone` are the numbers for which
+    the meshes of both were made, and `folds` say how the whole lies on the part, one step after the
+    other.
     """
-    bodies: dict[str, Any] = {
-        each.name: assemble(whole, each, elements, zone) for each in whole.parts
-    }
+    bodies: dict[str, Any] = {}
+    for each in whole.parts:
+        bodies[each.name] = assemble(whole, each, elements, zone)
     spread = Spread(part, folds)
     errors = [0.0]
     try:
@@ -79,10 +72,10 @@ def certificate_of_whole(
         return np.inf
     for each in whole.parts:
         U, F = moves[each.name], forces[each.name]
-        rigid = isinstance(each, Rigid)
-        errors.append(
-            _rigid(whole, each, U, F) if rigid else _elastic(bodies[each.name].body, U, F)
-        )
+        if isinstance(each, Rigid):
+            errors.append(_rigid(whole, each, U, F))
+        else:
+            errors.append(_elastic(bodies[each.name].body, U, F))
     return max(errors) if np.all(np.isfinite(errors)) else np.inf
 
 
@@ -101,7 +94,7 @@ class Spread:
         self.measure = yardsticks(reduction.problem, solution.reactions, d, u - d)
 
     def folded(self, key: Key, x: np.ndarray) -> tuple[Key, np.ndarray, np.ndarray]:
-        """Where places of the whole lie in the part, and the matrices (k, dim, dim') for vectors."""
+        """Where places of the whole lie in the part, and the matrices for vectors, as in Fold."""
         turns = np.tile(np.eye(len(x)), (x.shape[1], 1, 1))
         for fold in self.folds:
             key, x, more = fold(key, x)
@@ -109,7 +102,7 @@ class Spread:
         return key, x, turns
 
     def displacement(self, each: Any, body: Any) -> np.ndarray:
-        """U (n,) of a body of the whole; of a rigid one its translation, and zeros for its forces."""
+        """U (n,) of a body of the whole; of a rigid one its translation, then zeros."""
         if isinstance(each, Rigid):
             dim = len(body.components)
             key, _, turns = self.folded(("body", each.name), np.zeros((dim, 1)))
@@ -151,34 +144,27 @@ def _elastic(body: Assembly, U: np.ndarray, force: np.ndarray) -> float:
     """How far an elastic body is from equilibrium, and from what its supports ask for."""
     inner = body.A @ U
     missing = inner - body.load - force
-    plates = body.motion.T @ missing - body.plate_forces
-    scale = max(
-        float(np.abs(each).max(initial=0.0))
-        for each in (inner, body.load, force, body.plate_forces)
-    )
+    left = np.concatenate([missing[body.free], body.motion.T @ missing - body.plate_forces])
+    scale = np.concatenate([inner, body.load, force, body.plate_forces])
     driven = body.motion / np.maximum(body.motion.sum(axis=0), 1.0)
     beyond = U - body.prescribed
     beyond = beyond - body.motion @ (driven.T @ beyond)
     beyond[body.free] = 0.0
-    left = np.abs(np.concatenate([missing[body.free], plates])).max(initial=0.0)
-    size = float(np.abs(U).max(initial=0.0))
-    return float(
-        max(left / max(scale, 1e-300), np.abs(beyond).max(initial=0.0) / max(size, 1e-300))
-    )
+    return max(_over(left, scale), _over(beyond, U))
+
+
+def _over(errors: np.ndarray, scale: np.ndarray) -> float:
+    """The largest error over the largest entry of the scale."""
+    size = float(np.abs(scale).max(initial=0.0))
+    return float(np.abs(errors).max(initial=0.0)) / max(size, 1e-300)
 
 
 def _rigid(whole: Scene, body: Any, U: np.ndarray, force: np.ndarray) -> float:
     """How far a rigid body is from the balance of its forces, and from where it is held."""
     errors = [0.0]
     for number, name in enumerate(whole.components):
+        own, asked = U[: whole.dim], (body.displacement or {}).get(name, 0.0)
         if name in (body.force or {}):
-            asked, wrong, own = (
-                body.force[name],
-                force[number] + body.force[name],
-                force[: whole.dim],
-            )
-        else:
-            asked = (body.displacement or {}).get(name, 0.0)
-            wrong, own = U[number] - asked, U[: whole.dim]
-        errors.append(abs(wrong) / max(float(np.abs(own).max()), abs(asked), 1e-300))
-    return float(max(errors))
+            own, asked = force[: whole.dim], -body.force[name]
+        errors.append(_over(own[[number]] - asked, np.append(own, asked)))
+    return max(errors)

@@ -10,11 +10,10 @@ from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import MOST, PROVED
 from contactopt.simplification.findings import Found, Simplification, Simplified
 from contactopt.simplification.joints import coarse, offered_joints
-from contactopt.simplification.large_bodies import offered_half_spaces
 from contactopt.simplification.mirrors import mirrored
 from contactopt.simplification.proof import certificate_of_whole
 from contactopt.simplification.sections import section
-from contactopt.simplification.whole import sizes_of, whole_of
+from contactopt.simplification.whole import Whole, has_meshes, whole_of
 from contactopt.solving.solve_scene import Options, Solved
 from contactopt.solving.zone import solve_zone
 
@@ -27,9 +26,9 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
     scene : Of elastic and rigid bodies. Scenes of half-spaces are returned as they are.
     solve : Whether to solve the part that stands for the scene, which proves that it does
         (contactopt.simplification.proof), and to solve the scene once on a coarse mesh, which shows
-        contacts that neither open nor slip, contacts whose friction hardly acts, and contacts that
-        are small beside their bodies. Without it only symmetries are looked for, and nothing is
-        called exact. A mesh that is given is not made coarser.
+        contacts that neither open nor slip, and contacts whose friction hardly acts. Without it
+        only symmetries are looked for, and nothing is called exact. A mesh that is given is not
+        made coarser.
 
     Returns
     -------
@@ -41,24 +40,20 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
     """
     if not isinstance(scene, Scene):
         raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
-    if whole_of(scene) is None:
+    if not has_meshes(scene):
         told = "Half-spaces have no mesh, and nothing that could be left out."
         return Simplified(scene, scene, (), (told,))
     if not solve:
-        found, notes = next(_chains(scene))
+        found, notes = next(_chains(whole_of(scene)))
         return Simplified(scene, found[-1].scene if found else scene, tuple(found), tuple(notes))
     made, part = proved_part(scene, Options())
     if part is None or not scene.given:
         part = coarse(made.scene)
     if not part.solution.solved:
-        told = (
-            f"The scene was not solved on a coarse mesh ({part.solution.message}); contacts were"
-            " not looked at."
-        )
+        why = part.solution.message
+        told = f"The scene was not solved on a coarse mesh ({why}); contacts were not looked at."
         return replace(made, notes=(*made.notes, told))
-    more = offered_joints(made.scene, part)
-    spot, notes = offered_half_spaces(made.scene, part)
-    return replace(made, found=(*made.found, *more, *spot), notes=(*made.notes, *notes))
+    return replace(made, found=(*made.found, *offered_joints(made.scene, part)))
 
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
@@ -71,17 +66,13 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
 
     Returns
     -------
-    The report, whose `scene` is the given one where nothing was proved, and the solution of that
-    part on its own mesh; None in place of it where nothing was proved.
-
-    Raises
-    ------
-    InputError : As simplify().
+    The report, and the solution of its `scene` on that scene's own mesh. Where nothing was proved
+    the scene is the given one, and the solution is None.
     """
     notes: list[str] = []
     chain: list[Simplification] = []
     part = None
-    for found, told in _chains(scene) if whole_of(scene) else ():
+    for found, told in _chains(whole_of(scene)) if has_meshes(scene) else ():
         chain, more, part = _proved(scene, found, options)
         notes += [note for note in (*told, *more) if note not in notes]
         if chain:
@@ -92,14 +83,11 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
     return made, part
 
 
-def _chains(scene: Scene) -> Iterator[Found]:
+def _chains(whole: Whole) -> Iterator[Found]:
     """Simplifications that follow each other, at first those of a section, if there is one."""
-    whole = whole_of(scene)
-    assert whole is not None
     found, notes = section(whole)
-    flat = whole_of(found[0].scene) if found else None
-    if flat is not None:
-        more, told = mirrored(flat)
+    if found:
+        more, told = mirrored(whole_of(found[0].scene))
         yield [*found, *more], [*notes, *told]
     more, told = mirrored(whole)
     yield more, [*notes, *told]
@@ -110,7 +98,7 @@ def _proved(
 ) -> tuple[list[Simplification], list[str], Solved | None]:
     """As much of a chain as the certificate of the whole proves, and its solution."""
     notes: list[str] = []
-    unknowns = sizes_of(scene)[0]
+    unknowns = chain[0].before[0] if chain else 0
     while chain:
         last = chain[-1]
         part = solve_zone(last.scene, options=options)

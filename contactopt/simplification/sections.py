@@ -22,7 +22,7 @@ from contactopt.simplification.constants import NEAR, ROUNDED
 from contactopt.simplification.findings import Simplification
 from contactopt.simplification.images import equal_functions
 from contactopt.simplification.proof import Key
-from contactopt.simplification.whole import Whole, of_mesh, sizes_of
+from contactopt.simplification.whole import Whole, of_mesh, whole_of, with_pairs
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,8 @@ def _prisms(whole: Whole) -> Iterator[_Prism]:
     if any(mesh.refdom.__name__ != "RefHex" for mesh in whole.meshes.values()):
         return
     for axis in range(3):
-        prism = _Prism(
-            whole, axis, (float(whole.points[axis].min()), float(whole.points[axis].max()))
-        )
+        along = whole.points[axis]
+        prism = _Prism(whole, axis, (float(along.min()), float(along.max())))
         for mesh in whole.meshes.values():
             first, last = (np.unique(mesh.facets[:, prism.on_end(mesh, end)]) for end in prism.ends)
             if not len(first) or len(first) != len(last):
@@ -105,11 +104,11 @@ def _spoils(prism: _Prism) -> str:
         if len(ends):
             return f"the ends of body '{name}' are not held along the axis"
         for load in part.loads:
-            if load.force.get(component) if isinstance(load, Plate) else load.value[prism.axis]:
+            force = load.force.get(component) if isinstance(load, Plate) else load.value[prism.axis]
+            if force:
+                kind = type(load).__name__.lower()
                 where = "" if isinstance(load, BodyForce) else f" on {load.boundary!r}"
-                return (
-                    f"the {type(load).__name__.lower()}{where} of body '{name}' acts along the axis"
-                )
+                return f"the {kind}{where} of body '{name}' acts along the axis"
     for pair in whole.scene.pairs:
         gaps = [whole.rigid[name].gap for name in pair.bodies if name in whole.rigid]
         functions = [function for function in (pair.mu, *gaps) if function is not None]
@@ -138,7 +137,7 @@ def _simplification(prism: _Prism, component: str) -> Simplification:
         f"The bodies are prisms along {component}, their ends are held along it, and nothing"
         " changes or acts along it. Exact wherever the solution is unique."
     )
-    sizes = sizes_of(prism.whole.scene), sizes_of(scene)
+    sizes = prism.whole.sizes, whole_of(scene).sizes
     return Simplification("plane strain", what, why, *sizes, scene, (fold,))
 
 
@@ -167,15 +166,12 @@ def _flattened(prism: _Prism) -> Scene:
             for support in part.supports
             if support.boundary in there and values(support.displacement) != {}
         ]
-        loads = [
-            (
-                replace(load, force=values(load.force))
-                if isinstance(load, Plate)
-                else replace(load, value=tuple(load.value[axis] for axis in axes))
-            )
-            for load in part.loads
-            if isinstance(load, BodyForce) or load.boundary in there
-        ]
+        loads: list[Any] = []
+        for load in part.loads:
+            if isinstance(load, Plate) and load.boundary in there:
+                loads.append(replace(load, force=values(load.force)))
+            elif isinstance(load, BodyForce) or load.boundary in there:
+                loads.append(replace(load, value=tuple(load.value[axis] for axis in axes)))
         found = {name: part.curve_of(name) for name in scene.surfaces_of(part)}
         curves = {name: curve(function) for name, function in found.items() if function is not None}
         made = replace(part, supports=tuple(supports), loads=tuple(loads), curve=curves or None)
@@ -183,8 +179,5 @@ def _flattened(prism: _Prism) -> Scene:
 
     pairs = tuple(replace(pair, mu=below(pair.mu)) for pair in scene.pairs)
     parts = tuple(part_of(part) for part in scene.parts)
-    changed: dict[str, Any] = {"bodies": parts, "contacts": pairs}
-    if not scene.contacts:
-        changed = {"upper": parts[0], "lower": parts[1], "mu": pairs[0].mu}
     depth = scene.thickness * (prism.ends[1] - prism.ends[0])
-    return replace(scene, kind="plane-strain", thickness=depth, **changed)
+    return with_pairs(scene, parts, pairs, kind="plane-strain", thickness=depth)

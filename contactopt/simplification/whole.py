@@ -1,4 +1,4 @@
-"""A scene with the meshes of its bodies: how large it is, and where its gaps and its friction act."""
+"""A scene with the meshes of its bodies: how large it is, and where its gaps and friction act."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import skfem
 from contactopt.bodies.body import check_mesh
 from contactopt.meshes.cells import SHAPES
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+from contactopt.scenes.scene import Part, Rigid, Scene
 from contactopt.simplification.constants import BETWEEN
 
 
@@ -44,6 +44,24 @@ class Whole:
         """Largest extent [length]."""
         return float(np.ptp(self.points, axis=1).max())
 
+    @cached_property
+    def sizes(self) -> tuple[int, int]:
+        """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
+
+        Contacts are the nodes of the finer surface of each pair; supports are not taken off.
+        """
+        numbers, contacts = {}, 0
+        for name, mesh in self.meshes.items():
+            element = SHAPES[mesh.refdom.__name__][1][self.scene.degree]()
+            numbers[name] = skfem.Dofs(mesh, element)
+        for pair in self.scene.pairs:
+            if pair.law != "tied":
+                contacts += max(
+                    len(numbers[body].get_facet_dofs(self.meshes[body].boundaries[at]).flatten())
+                    for body, at in self.surfaces(pair)
+                )
+        return self.scene.dim * sum(int(each.N) for each in numbers.values()), contacts
+
     def corners(self, body: str, boundary: str) -> np.ndarray:
         """(dim, corners, m) of the facets of a boundary [length]."""
         mesh = self.meshes[body]
@@ -62,14 +80,12 @@ class Whole:
     def acting(self, body: str, boundary: str) -> np.ndarray:
         """(dim, s) nodes of a boundary and points between them, on its curve as well."""
         if (body, boundary) not in self._acting:
-            corners, curve = self.corners(body, boundary), self.parts[body].curve_of(boundary)
-            x = lattice_points(corners)
-            on = (
-                x
-                if curve is None
-                else np.concatenate([x, np.asarray(curve(x), dtype=float)], axis=1)
+            x, curve = (
+                lattice_points(self.corners(body, boundary)),
+                self.parts[body].curve_of(boundary),
             )
-            self._acting[body, boundary] = on
+            curved = [] if curve is None else [np.asarray(curve(x), dtype=float)]
+            self._acting[body, boundary] = np.concatenate([x, *curved], axis=1)
         return self._acting[body, boundary]
 
     @cached_property
@@ -90,10 +106,13 @@ def lattice_points(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("dcm,cs->dsm", corners, weights).reshape(len(corners), -1))
 
 
-def whole_of(scene: Scene) -> Whole | None:
-    """The scene with its meshes; None where a body is a half-space or lives elsewhere."""
-    if not all(isinstance(part, (Part, Rigid)) for part in scene.parts):
-        return None
+def has_meshes(scene: Scene) -> bool:
+    """Whether all bodies are elastic with meshes, or rigid."""
+    return all(isinstance(part, (Part, Rigid)) for part in scene.parts)
+
+
+def whole_of(scene: Scene) -> Whole:
+    """The scene with its meshes."""
     parts = [part for part in scene.parts if isinstance(part, Part)]
     meshes = {part.name: part.build_mesh(scene.elements, scene.zone) for part in parts}
     for part in parts:
@@ -101,50 +120,19 @@ def whole_of(scene: Scene) -> Whole | None:
     return Whole(scene, meshes)
 
 
-def sizes_of(scene: Scene) -> tuple[int, int]:
-    """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
-
-    Contacts are the nodes of the finer surface of each pair; supports are not taken off.
+def with_pairs(
+    scene: Scene, bodies: tuple[Any, ...], pairs: tuple[Contact, ...], **others: Any
+) -> Scene:
+    """The scene with other bodies, pairs of surfaces and fields, in its short form if it has one
+    and they fit.
     """
-    unknowns, nodes = 0, {}
-    for part in scene.parts:
-        if isinstance(part, Part):
-            mesh = part.build_mesh(scene.elements, scene.zone)
-            numbers = skfem.Dofs(mesh, SHAPES[mesh.refdom.__name__][1][scene.degree]())
-            unknowns += scene.dim * int(numbers.N)
-            for name in scene.surfaces_of(part):
-                nodes[part.name, name] = len(
-                    numbers.get_facet_dofs(mesh.boundaries[name]).flatten()
-                )
-        elif isinstance(part, HalfSpace):
-            grid = [len(row) for row in part.ticks(scene.elements, scene.zone, scene.dim - 1)]
-            unknowns += scene.dim * int(np.prod(grid))
-            nodes[part.name, "contact"] = int(np.prod(grid))
-    usual = {part.name: getattr(part, "contact", "contact") for part in scene.parts}
-    counts = [
-        max(
-            nodes.get((body, name or usual[body]), 0)
-            for body, name in zip(pair.bodies, pair.surfaces)
-        )
-        for pair in scene.pairs
-        if pair.law != "tied"
-    ]
-    return unknowns, sum(counts)
-
-
-def with_pairs(scene: Scene, pairs: tuple[Contact, ...]) -> Scene:
-    """The scene with other pairs of surfaces, in its short form if it has one and they fit."""
-    if scene.contacts or len(pairs) != 1:
-        return replace(
-            scene,
-            upper=None,
-            lower=None,
-            mu=None,
-            law="coulomb",
-            bodies=scene.parts,
-            contacts=pairs,
-        )
-    return replace(scene, mu=pairs[0].mu, law=pairs[0].law)
+    if not scene.contacts and len(pairs) == 1 and len(bodies) == 2:
+        upper, lower = bodies
+        others |= {"upper": upper, "lower": lower, "mu": pairs[0].mu, "law": pairs[0].law}
+    else:
+        others |= {"upper": None, "lower": None, "mu": None, "law": "coulomb"}
+        others |= {"bodies": bodies, "contacts": pairs}
+    return replace(scene, **others)
 
 
 def of_mesh(mesh: Any, change: Callable[[Any], Any]) -> Any:

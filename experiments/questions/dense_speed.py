@@ -19,11 +19,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactopt.methods.apg import disc_qp
+from contactopt.methods.apg import accelerate
 from contactopt.methods.backends import CONIC, QP, Backend
 from contactopt.methods.backends.conic import DiscSOCP
 from contactopt.methods.backends.qp import BoxQP
-from contactopt.methods.kernels.mprgp import box_qp, mprgp
+from contactopt.methods.constants import EIGENVALUE_MARGIN
+from contactopt.methods.kernels.mprgp import box_qp, largest_eigenvalue, mprgp
 from contactopt.problem.cones import disc
 from experiments.report import write
 
@@ -35,6 +36,55 @@ ACCURACIES = (1e-7, 1e-8, 1e-9)
 LARGE = ("proxqp", "piqp", "daqp", "osqp", "scs")
 DISCS = (16, 32)  # grids
 NODES = (256, 1024, 2048)
+ROUNDS = 20  # of disc_qp
+
+
+def disc_qp(
+    Q: np.ndarray,
+    c: np.ndarray,
+    radius: np.ndarray,
+    start: np.ndarray | None = None,
+    tol: float = 1e-10,
+) -> tuple[np.ndarray, bool]:
+    """Solve min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)),
+    natively.
+
+    It works in rounds: the gradient is taken in double precision at the start of a round and its
+    change in single precision, which halves the memory traffic. Q is (k d, k d), c and start (k,
+    d), radius (k,). Returns t (k, d), and whether the natural map |t - P(t - step (Q t + c))| is at
+    most tol max(|t|, step |c|).
+    """
+    single, none = Q.astype(np.float32), np.zeros(0)
+    step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(single) or 1.0)
+    t = disc(np.zeros_like(c) if start is None else start, radius)
+    before = np.inf
+    for _ in range(ROUNDS):
+        u = (Q @ t.ravel()).reshape(t.shape) + c
+        # unit of the certificate
+        size = max(float(np.linalg.norm(t)), step * float(np.linalg.norm(c)))
+        error = float(np.linalg.norm(t - disc(t - step * u, radius)))
+        if error <= tol * size:
+            return t, True
+        # single precision is not enough here: the last rounds in double precision
+        if error > 0.5 * before:
+            single = Q
+
+        def gradient(
+            y: np.ndarray, t: np.ndarray = t, u: np.ndarray = u, unit: float = error
+        ) -> np.ndarray:
+            change = ((y - t) / unit).astype(single.dtype)  # noqa: B023
+            return u + unit * (single @ change.ravel()).reshape(y.shape).astype(float)  # noqa: B023
+
+        before = error
+        t, _ = accelerate(
+            gradient,
+            lambda y, lam: (disc(y, radius), lam),
+            t,
+            none,
+            step,
+            max(1e-4 * error, 0.3 * tol * size),
+        )
+    return t, False
 
 
 def half_plane(k: int, half: float = 0.5) -> tuple[np.ndarray, np.ndarray]:

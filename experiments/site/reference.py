@@ -304,7 +304,8 @@ def settings(backend: Any) -> str:
 
 def method_page(site: Path, name: str) -> str:
     """What a method is, its settings, what was written about it by hand, its docstring."""
-    module, cls, what = METHODS[name]
+    file, cls, what = METHODS[name]
+    module = f"contactopt.methods.{file}"
     method = getattr(importlib.import_module(module), cls)
     rows = [(f"`{f.name}`", f"`{f.default!r}`") for f in dataclasses.fields(method)]
     listed = (

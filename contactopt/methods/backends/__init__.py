@@ -32,8 +32,9 @@ TIGHT = 1e-9  # accuracy asked of every backend, in dimensionless units
 class Backend:
     """A solver behind qpsolvers (kind 'qp') or cvxpy (kind 'conic'), by its name there.
 
-    module    what must be importable;   package  what pip installs;   sparse  the matrix form it
-              wants
+    module    what must be importable
+    package   what pip installs
+    sparse    the matrix form it wants
     clock     its setting for a time limit [s], "" if it has none
     steps     its setting for a limit of iterations, if these can be many and there is no clock
     """
@@ -49,13 +50,11 @@ class Backend:
 
     def tightened(self) -> Backend:
         """The same backend, asked for a thousand times the accuracy."""
-        tighter = {
-            key: value / 1e3 if value == TIGHT else value for key, value in self.settings.items()
-        }
-        return replace(self, settings=tighter)
+        tight = {key: value / 1e3 for key, value in self.settings.items() if value == TIGHT}
+        return replace(self, settings=dict(self.settings) | tight)
 
     def timed(self) -> dict[str, Any]:
-        """Its settings, with the time that is left to the solve that runs where it takes a limit."""
+        """Its settings, with the time that is left to the solve where it takes a limit."""
         check_time()
         left = time_left()
         return dict(self.settings) | ({self.clock: left} if self.clock and isfinite(left) else {})
@@ -96,72 +95,29 @@ class Backend:
 
 
 _CLARABEL = {"tol_gap_abs": TIGHT, "tol_gap_rel": TIGHT, "tol_feas": TIGHT}
-_ECOS = {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}
-_CVXOPT = {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}
-_SCS = {"eps_abs": TIGHT, "eps_rel": TIGHT}
+_CONE = {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}
+_DAQP = {"primal_tol": TIGHT, "dual_tol": TIGHT}
+_EPS = {"eps_abs": TIGHT, "eps_rel": TIGHT}
+_HIGHS = {"primal_feasibility_tolerance": TIGHT, "dual_feasibility_tolerance": TIGHT}
+_OSQP = _EPS | {"max_iter": 200_000, "polishing": True}
+_PROXQP = {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 1_000}
+_SCS = _EPS | {"max_iters": 200_000}
+_SHORT = _CONE | {"max_iters": 100}
 
 QP: dict[str, Backend] = {
     b.name: b
     for b in (
-        Backend(
-            "proxqp",
-            "qp",
-            "proxsuite",
-            "proxsuite",
-            {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 1_000},
-            steps="max_iter",
-        ),
-        Backend(
-            "clarabel", "qp", "clarabel", "clarabel", _CLARABEL, sparse=True, clock="time_limit"
-        ),
-        Backend(
-            "osqp",
-            "qp",
-            "osqp",
-            "osqp",
-            {"eps_abs": TIGHT, "eps_rel": TIGHT, "max_iter": 200_000, "polishing": True},
-            sparse=True,
-            clock="time_limit",
-        ),
-        Backend(
-            "daqp",
-            "qp",
-            "daqp",
-            "daqp",
-            {"primal_tol": TIGHT, "dual_tol": TIGHT},
-            clock="time_limit",
-        ),
-        Backend("ecos", "qp", "ecos", "ecos", _ECOS, sparse=True),
-        Backend(
-            "highs",
-            "qp",
-            "highspy",
-            "highspy",
-            {"primal_feasibility_tolerance": TIGHT, "dual_feasibility_tolerance": TIGHT},
-            sparse=True,
-            clock="time_limit",
-        ),
-        Backend("piqp", "qp", "piqp", "piqp", {"eps_abs": TIGHT, "eps_rel": TIGHT}),
+        Backend("proxqp", "qp", "proxsuite", "proxsuite", _PROXQP, steps="max_iter"),
+        Backend("clarabel", "qp", "clarabel", "clarabel", _CLARABEL, True, "time_limit"),
+        Backend("osqp", "qp", "osqp", "osqp", _OSQP, True, "time_limit"),
+        Backend("daqp", "qp", "daqp", "daqp", _DAQP, clock="time_limit"),
+        Backend("ecos", "qp", "ecos", "ecos", _CONE, True),
+        Backend("highs", "qp", "highspy", "highspy", _HIGHS, True, "time_limit"),
+        Backend("piqp", "qp", "piqp", "piqp", _EPS),
         Backend("quadprog", "qp", "quadprog", "quadprog"),
-        Backend(
-            "scs",
-            "qp",
-            "scs",
-            "scs",
-            _SCS | {"max_iters": 200_000},
-            sparse=True,
-            clock="time_limit_secs",
-        ),
-        Backend("cvxopt", "qp", "cvxopt", "cvxopt", _CVXOPT),
-        Backend(
-            "qpalm",
-            "qp",
-            "qpalm",
-            "qpalm",
-            {"eps_abs": TIGHT, "eps_rel": TIGHT},
-            sparse=True,
-            clock="time_limit",
-        ),
+        Backend("scs", "qp", "scs", "scs", _SCS, True, "time_limit_secs"),
+        Backend("cvxopt", "qp", "cvxopt", "cvxopt", _CONE),
+        Backend("qpalm", "qp", "qpalm", "qpalm", _EPS, True, "time_limit"),
     )
 }
 
@@ -169,13 +125,9 @@ CONIC: dict[str, Backend] = {
     b.name: b
     for b in (
         Backend("clarabel", "conic", "clarabel", "clarabel", _CLARABEL, clock="time_limit"),
-        Backend(
-            "scs", "conic", "scs", "scs", _SCS | {"max_iters": 200_000}, clock="time_limit_secs"
-        ),
-        Backend("ecos", "conic", "ecos", "ecos", _ECOS | {"max_iters": 100}, steps="max_iters"),
-        Backend(
-            "cvxopt", "conic", "cvxopt", "cvxopt", _CVXOPT | {"max_iters": 100}, steps="max_iters"
-        ),
+        Backend("scs", "conic", "scs", "scs", _SCS, clock="time_limit_secs"),
+        Backend("ecos", "conic", "ecos", "ecos", _SHORT, steps="max_iters"),
+        Backend("cvxopt", "conic", "cvxopt", "cvxopt", _SHORT, steps="max_iters"),
     )
 }
 
@@ -183,17 +135,8 @@ CONIC: dict[str, Backend] = {
 def attempts(
     solver: Any, solve: Callable[[Any], Answer]
 ) -> Iterator[tuple[str, Callable[[], Answer]]]:
-    """List the attempts of a bridge for `semismooth.certified`: with its backend as it is, then at
-    tighter settings.
-
-    Parameters
-    ----------
-    solver : A bridge, such as BoxQP or DiscSOCP.
-    solve : A function of a bridge that returns its answer.
-
-    Yields
-    ------
-    The name of the backend, and a function without arguments that makes the attempt.
+    """Two attempts for `semismooth.certified`, by a backend's name and a function that makes them:
+    a bridge, such as BoxQP or DiscSOCP, with its backend as it is, then at tighter settings.
     """
     for backend in (solver.backend, solver.backend.tightened()):
         bridge = replace(solver, backend=backend)
@@ -201,20 +144,8 @@ def attempts(
 
 
 def find(name: str, table: Mapping[str, Backend]) -> Backend:
-    """Find a backend by its name.
-
-    Parameters
-    ----------
-    name : A name in the table.
-    table : QP or CONIC.
-
-    Returns
-    -------
-    The backend.
-
-    Raises
-    ------
-    InputError : If it is unknown or not installed, with what to do.
+    """The backend of a name in QP or CONIC; InputError, with what to do, if it is unknown or not
+    installed.
     """
     if name not in table:
         kind = next(iter(table.values())).kind

@@ -38,7 +38,8 @@ while True:
     except EOFError:
         break
     try:
-        found = qpsolvers.solve_problem(qpsolvers.Problem(**arguments), name, initvals=start, **settings)
+        problem = qpsolvers.Problem(**arguments)
+        found = qpsolvers.solve_problem(problem, name, initvals=start, **settings)
         answer = found.x, found.y
     except Exception as error:
         answer = str(error) or type(error).__name__

@@ -39,10 +39,6 @@ class Conic:
             self.program.parameters[name].value = value
         run(self.backend, self.program.problem)
         variables = {name: np.asarray(v.value) for name, v in self.program.variables.items()}
-        if not all(np.all(np.isfinite(v)) for v in variables.values()):
-            raise BackendError(
-                f"conic backend '{self.backend.name}' gave an answer that is not finite."
-            )
         return variables | {name: np.nan_to_num(m) for name, m in self.program.multipliers.items()}
 
 
@@ -74,26 +70,14 @@ class DiscSOCP:
         if len(b):
             self.parameters["b"].value = b
         run(self.backend, self.program)
-        t = np.asarray(self.variable.value)
-        if not np.all(np.isfinite(t)):
-            raise BackendError(
-                f"conic backend '{self.backend.name}' gave an answer that is not finite."
-            )
         y = self.program.constraints[-1].dual_value if len(b) else np.zeros(0)
-        return t, np.asarray(y, dtype=float).reshape(len(b))
+        return np.asarray(self.variable.value), np.asarray(y, dtype=float).reshape(len(b))
 
 
 def run(backend: Backend, problem: Any) -> None:
-    """Solve a cvxpy problem. The answer stands in its variables.
+    """Solve a cvxpy problem, whose variables then hold the answer.
 
-    Parameters
-    ----------
-    backend : The conic backend.
-    problem : The cvxpy problem.
-
-    Raises
-    ------
-    BackendError : If the backend crashes or leaves no answer. The message names it.
+    Raises BackendError, which names the backend, if it crashes or leaves no finite answer.
     """
     import cvxpy as cp
 
@@ -107,22 +91,16 @@ def run(backend: Backend, problem: Any) -> None:
         check_time()
     except (cp.SolverError, ValueError, ArithmeticError) as error:
         raise BackendError(f"conic backend '{backend.name}' failed: {error}") from error
-    if any(v.value is None for v in problem.variables()):
+    answer = [variable.value for variable in problem.variables()]
+    if any(value is None for value in answer):
         raise BackendError(f"conic backend '{backend.name}' gave no answer: {problem.status}.")
+    if not all(np.all(np.isfinite(value)) for value in answer):
+        raise BackendError(f"conic backend '{backend.name}' gave an answer that is not finite.")
 
 
 def check_semidefinite(Q: np.ndarray) -> None:
-    """Check that a matrix is positive semidefinite but for rounding, by a Cholesky factorisation.
-
+    """BackendError unless Q is positive semidefinite but for rounding, by a Cholesky factorisation:
     cvxpy's own test of convexity fails at random and on small numbers.
-
-    Parameters
-    ----------
-    Q : (n, n) matrix.
-
-    Raises
-    ------
-    BackendError : If it is not.
     """
     try:
         la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)

@@ -38,38 +38,23 @@ class CoulombSOCP:
         check_semidefinite(Q)
         k, p = len(mu), V.shape[1]
         dim, rough = len(Q) // k, mu > 0
-        blocks = np.arange(k * dim).reshape(k, dim)
+        blocks, smooth = np.arange(k * dim).reshape(k, dim), ~rough
         scale = np.ones((k, dim))
         scale[rough, 0] = mu[rough]
         rows = -sp.diags(scale.ravel()).tocsr()
-        smooth = ~rough
-        A = sp.vstack(
-            [
-                sp.csr_matrix(V.T),
-                rows[blocks[smooth, 1:].ravel()],
-                rows[blocks[smooth, 0]],
-                rows[blocks[rough].ravel()],
-            ],
-            format="csc",
-        )
-        cones = [
-            (clarabel.ZeroConeT, p + smooth.sum() * (dim - 1)),
-            (clarabel.NonnegativeConeT, smooth.sum()),
-        ]
-        listed = [cone(int(size)) for cone, size in cones if size] + [
-            clarabel.SecondOrderConeT(dim)
-        ] * int(rough.sum())
+        order = blocks[smooth, 1:].ravel(), blocks[smooth, 0], blocks[rough].ravel()
+        A = sp.vstack([sp.csr_matrix(V.T), *(rows[own] for own in order)], format="csc")
+        equal, above = p + int(smooth.sum()) * (dim - 1), int(smooth.sum())
+        cones = [clarabel.ZeroConeT(equal)] if equal else []
+        cones += [clarabel.NonnegativeConeT(above)] if above else []
+        cones += [clarabel.SecondOrderConeT(dim)] * int(rough.sum())
         settings = clarabel.DefaultSettings()
-        for name, value in backend.settings.items():
+        fixed = {"verbose": False, "max_threads": 1, "presolve_enable": False}  # it forbids updates
+        for name, value in (dict(backend.settings) | fixed).items():
             setattr(settings, name, value)
-        settings.verbose, settings.presolve_enable, settings.max_threads = (
-            False,
-            False,
-            1,
-        )  # no presolve: it forbids updates
         b = np.concatenate([-s, np.zeros(A.shape[0] - p)])
         P = sp.triu(sp.csc_matrix(Q), format="csc")
-        return cls(clarabel.DefaultSolver(P, np.zeros(len(Q)), A, b, listed, settings), p)
+        return cls(clarabel.DefaultSolver(P, np.zeros(len(Q)), A, b, cones, settings), p)
 
     def solve(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r (k dim,) and the multipliers lambda (p,) of the balance; BackendError if there is no

@@ -47,32 +47,21 @@ class BoxQP:
         """
         import qpsolvers
 
-        P, A = (
-            (sp.csc_matrix(self.P), sp.csc_matrix(self.A))
-            if self.backend.sparse
-            else (self.P, self.A)
-        )
-        rows = {"A": A, "b": b} if len(b) else {}
-        arguments = {
-            "P": P,
-            "q": c,
-            "lb": _finite_or_none(low),
-            "ub": _finite_or_none(high),
-            **rows,
-        }
+        form = sp.csc_matrix if self.backend.sparse else np.asarray
+        arguments = {"P": form(self.P), "q": c}
+        arguments |= {"A": form(self.A), "b": b} if len(b) else {}
+        for name, bound in (("lb", low), ("ub", high)):
+            arguments[name] = bound if np.any(np.isfinite(bound)) else None
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 if Child.needed(self.backend, len(c)):
-                    x, y = self.child.solve(
-                        arguments, self.backend.name, start, self.backend.timed()
-                    )
+                    settings = self.backend.timed()
+                    x, y = self.child.solve(arguments, self.backend.name, start, settings)
                 else:
-                    problem = qpsolvers.Problem(**arguments)
+                    problem, name = qpsolvers.Problem(**arguments), self.backend.name
                     for settings in self.backend.rounds():
-                        answer = qpsolvers.solve_problem(
-                            problem, self.backend.name, initvals=start, **settings
-                        )
+                        answer = qpsolvers.solve_problem(problem, name, initvals=start, **settings)
                         if answer.found:
                             break
                     x, y = answer.x, answer.y
@@ -87,7 +76,3 @@ class BoxQP:
             )
         y = y if y is not None and np.size(y) == len(b) else np.zeros(len(b))
         return np.asarray(x), np.nan_to_num(np.asarray(y, dtype=float))
-
-
-def _finite_or_none(bound: np.ndarray) -> np.ndarray | None:
-    return bound if np.any(np.isfinite(bound)) else None

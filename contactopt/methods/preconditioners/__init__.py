@@ -11,14 +11,14 @@ Q itself. In 3D the sum of P21 along both directions of the contact surface is P
 P maps a relative displacement, the residual b - Q r of an iteration, to a force. P21 extends that
 displacement by zero, which is right only for displacements that vanish at the ends (H00^1/2). They
 do not vanish at a free edge. The matrix that P22 inverts, like Q, acts on forces. There are none
-outside the contact, so that extending them by zero is right. The third preconditioner,
-    `neumann`, the square root of the Laplacian of the contact line or surface (contactopt.methods.preconditioners.neumann),
-needs no extension, for its cosine transforms leave the ends free. A contact line that is closed by
-itself needs none for P21 and P22 either: the circulant matrices act on its own nodes. Contacts are
-found on their line or grid in the problem's chart, so that it does not matter how the bodies are
-turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions
-of the two bodies against each other, first of all the sway of a slender body: `deflated` solves for
-them exactly (balancing, Mandel 1993).
+outside the contact, so that extending them by zero is right. The third preconditioner, `neumann`,
+the square root of the Laplacian of the contact line or surface, needs no extension, for its cosine
+transforms leave the ends free. A contact line that is closed by itself needs none for P21 and P22
+either: the circulant matrices act on its own nodes. Contacts are found on their line or grid in the
+problem's chart, so that it does not matter how the bodies are turned. Each preconditioner acts on
+every component by itself. What is left are a few smooth motions of the two bodies against each
+other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing,
+Mandel 1993).
 
 Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a
 cheap product G, which `neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G
@@ -57,8 +57,7 @@ class Preconditioner(LinearOperator):
     blocks  the unknowns of each pair of surfaces; P couples none of them with each other, and each
             has a scale of its own
     factors (n,) by what deflation multiplied P: how much stiffer the contacts are than the diagonal
-    of Q says, once smooth
-            motions are taken out of it
+            of Q says, once smooth motions are taken out of it
     """
 
     def __init__(
@@ -72,22 +71,17 @@ class Preconditioner(LinearOperator):
         super().__init__(np.dtype(float), (n, n))
         self.factors = np.ones(n) if factors is None else factors
         self.product, self.blocks = product, tuple(blocks) or (slice(0, n),)
-        self.model = (
-            None
-            if model is None
-            else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
-        )
+        self.model = model and LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
         return np.asarray(self.product(x.ravel()))
 
-    def _rmatvec(self, x: np.ndarray) -> np.ndarray:
-        return self._matvec(x)
+    _rmatvec = _matvec
 
 
-# name -> (module, function (problem, mask (k, dim) of what cannot move) giving products (k, dim) ->
-# (k, dim) with P and, where
-# it is cheap, P^-1, for a Q of mean diagonal one, what it is)
+# name -> (module, function, what it is). The function of a problem and of a mask (k, dim) of what
+# cannot move gives products (k, dim) -> (k, dim) with P and, where it is cheap, with P^-1, else
+# None, for a Q of mean diagonal one.
 PRECONDITIONERS = {
     "p21": (
         "contactopt.methods.preconditioners.circulant",
@@ -113,15 +107,8 @@ PRECONDITIONERS = {
 
 
 def find_preconditioner(name: str | None) -> None:
-    """Check that there is a preconditioner of a name. None and 'none' are choices of the methods.
-
-    Parameters
-    ----------
-    name : The name that the user gave.
-
-    Raises
-    ------
-    InputError : If there is none.
+    """InputError unless there is a preconditioner of that name, or it is None or 'none', which are
+    choices of the methods.
     """
     if name not in (None, "none", *PRECONDITIONERS):
         raise InputError(
@@ -130,25 +117,12 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q, (k dim, k dim).
+    """The named approximate inverse of problem.Q, (k dim, k dim), in a block for each pair of
+    surfaces.
 
-    Each pair of surfaces has its own block of it.
-
-    Of Q it uses the mean of the diagonal, and which components cannot move.
-
-    Parameters
-    ----------
-    problem : of k contacts on a line, a closed curve or a rectangular grid
-    name : a key of PRECONDITIONERS
-
-    Returns
-    -------
-    Preconditioner, whose `model` is None where its inverse is not cheap.
-
-    Raises
-    ------
-    InputError : for an unknown name, for fewer than 3 contacts a side, and for contacts on no line
-        and no rectangular grid. The caller says what it does instead.
+    Of Q it uses the mean of the diagonal, and which components cannot move. Raises InputError for
+    an unknown name, and for contacts that the preconditioner does not fit; the caller says what it
+    does instead.
     """
     find_preconditioner(name)
     if len(problem.pairs) > 1:
@@ -176,36 +150,23 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
 def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Preconditioner:
     """One preconditioner from those of the pairs of surfaces."""
     rows = [slice(pair.start * problem.dim, pair.stop * problem.dim) for pair in problem.pairs]
-
-    def product(x: np.ndarray) -> np.ndarray:
-        return np.concatenate([part @ x[own] for part, own in zip(parts, rows)])
-
     models = [part.model for part in parts if part.model is not None]
 
-    def model(x: np.ndarray) -> np.ndarray:
-        return np.concatenate([part @ x[own] for part, own in zip(models, rows)])
+    def beside(operators: Sequence[LinearOperator]) -> GridMap:
+        return lambda x: np.concatenate([act @ x[own] for act, own in zip(operators, rows)])
 
-    return Preconditioner(
-        problem.q.size, product, model if len(models) == len(parts) else None, rows
-    )
+    model = beside(models) if len(models) == len(parts) else None
+    return Preconditioner(problem.q.size, beside(parts), model, rows)
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Write smooth motions on every pair of surfaces as columns: polynomials of the place, in every
-    component.
+    """Forces (k dim, j) that are smooth on every pair of surfaces: polynomials of the place, in
+    every component.
 
     On a pair that is far from all others they are constant and linear. Forces whose waves are
     longer than the distance to the next pair reach it through the body in between, which no model
     of one pair knows. A thin slice of a body bends under them as a plate does. Therefore the degree
     grows with the length of a pair over that distance.
-
-    Parameters
-    ----------
-    problem : The interface problem of k contacts.
-
-    Returns
-    -------
-    (k dim, j) forces.
     """
     parts = [
         _smooth_motions(part_of(problem, pair), degree)
@@ -224,14 +185,10 @@ def degrees(problem: InterfaceProblem) -> list[int]:
     trees = [KDTree(own) for own in points]
     found = []
     for own, tree in zip(points, trees):
-        apart = min(
-            (float(np.median(other.query(own)[0])) for other in trees if other is not tree),
-            default=np.inf,
-        )
-        length = float(np.linalg.norm(np.ptp(own, axis=0)))
-        found.append(
-            int(np.clip(length / (WAVES * apart) if apart > 0 else MOST_WAVES, 1, MOST_WAVES))
-        )
+        distances = [float(np.median(t.query(own)[0])) for t in trees if t is not tree]
+        apart, length = min(distances, default=np.inf), np.linalg.norm(np.ptp(own, axis=0))
+        degree = length / (WAVES * apart) if apart > 0 else MOST_WAVES
+        found.append(int(np.clip(degree, 1, MOST_WAVES)))
     return found
 
 
@@ -272,16 +229,6 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
     Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods
     using multiple secant equations.
-
-    Parameters
-    ----------
-    P : The preconditioner, with its model G of Q if it has one.
-    Q : (n, n) interface operator.
-    Z : (n, j) the columns.
-
-    Returns
-    -------
-    The preconditioner, with the model that belongs to it.
     """
     Z, QZ = _orthonormal(Z, np.asarray(Q @ Z))
     c = _scales(P, Q, QZ) if len(P.blocks) > 1 else _scale(P, Q, Z, QZ)
@@ -352,21 +299,11 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
 
 
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
-    """Make an approximate inverse of U'QU + diag(added).
+    """An approximate inverse (m, m) of U'QU + diag(added).
 
-    U selects the unknowns of an active set, or directions in which contacts may still move. With a
-    model G of Q it is (U'GU + diag(added))^-1 by an inner PCG; without one it is U'PU (paper,
-    section 5.2).
-
-    Parameters
-    ----------
-    P : The preconditioner, with its model G of Q if it has one.
-    U : (n, m) sparse matrix with orthonormal columns.
-    added : (m,) at least zero.
-
-    Returns
-    -------
-    (m, m).
+    U (n, m) selects the unknowns of an active set, or directions in which contacts may still move;
+    its columns are orthonormal. With a model G of Q it is (U'GU + diag(added))^-1 by an inner PCG;
+    without one it is U'PU (paper, section 5.2).
     """
     m = U.shape[1]
     rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
@@ -382,16 +319,6 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
 
 
 def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
-    """Write the matrix whose columns are the unit vectors of some unknowns.
-
-    Parameters
-    ----------
-    n : Number of all unknowns.
-    unknowns : (m,) the chosen ones.
-
-    Returns
-    -------
-    U (n, m).
-    """
+    """The matrix (n, m) whose columns are the unit vectors of some of n unknowns."""
     m = len(unknowns)
     return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

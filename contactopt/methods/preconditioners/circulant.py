@@ -7,26 +7,18 @@ from scipy.fft import fft, ifft, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.methods.preconditioners.grid import Grid, GridMap, GridMaps, on_grid
-from contactopt.problem import InterfaceProblem
+from contactopt.methods.preconditioners.grid import Grid, GridMap, OnGrid
 
 # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
 INNER = 1e-13
 
 
 def seminorm(m: float) -> np.ndarray:
-    """Compute the first column of the sparse circulant matrix of the H^1/2 seminorm, eq (27).
+    """The first column (2 m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27), for a
+    closed curve of 2 m nodes.
 
     It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the
     kernel of a seminorm.
-
-    Parameters
-    ----------
-    m : Half the number of nodes of the closed curve.
-
-    Returns
-    -------
-    (2 m,) column.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
@@ -38,71 +30,17 @@ def seminorm(m: float) -> np.ndarray:
 
 
 def norm(m: float, h: float) -> np.ndarray:
-    """Compute the first column of the circulant matrix of the H^1 norm, eq (28).
-
-    Parameters
-    ----------
-    m : Half the number of nodes of the closed curve.
-    h : The distance of two nodes.
-
-    Returns
-    -------
-    (2 m,) column.
+    """The first column (2 m,) of the circulant matrix of the H^1 norm, eq (28), for a closed curve
+    of 2 m nodes at the distance h.
     """
     column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
     return column
 
 
-def p21(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-    """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts.
-
-    Parameters
-    ----------
-    problem : whose contacts lie on a line or a rectangular grid of their chart
-    held : (k, dim) mask of the components that cannot move
-
-    Returns
-    -------
-    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
-
-    Raises
-    ------
-    InputError : if the contacts lie on no such grid
-    """
-    return on_grid(problem, held, extended)
-
-
-def p22(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-    """P22 of eq (26) on the contact line.
-
-    Parameters
-    ----------
-    problem : whose contacts lie on a line or a rectangular grid of their chart
-    held : (k, dim) mask of the components that cannot move
-
-    Returns
-    -------
-    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
-
-    Raises
-    ------
-    InputError : if the contacts lie on no such grid
-    """
-    return on_grid(problem, held, inverse_of_extended)
-
-
 def extended(grid: Grid) -> tuple[GridMap, None]:
     """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq
-    (29).
-
-    Parameters
-    ----------
-    grid : of the contacts
-
-    Returns
-    -------
-    The product of P with arrays (*shape, dim), and None because its inverse is not cheap.
+    (29). The inverse is not cheap.
     """
     if grid.closed:
         symbol, smallest = _closed_symbol(*grid.shape)
@@ -115,22 +53,11 @@ def extended(grid: Grid) -> tuple[GridMap, None]:
 
 
 def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
-    """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients.
+    """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients, and
+    its inverse.
 
     The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do
-    not matter.
-
-    Parameters
-    ----------
-    grid : of the contacts, a line
-
-    Returns
-    -------
-    The products of P and of its inverse with arrays (k, dim).
-
-    Raises
-    ------
-    InputError : on a surface, where the paper defines no P22
+    not matter. Raises InputError on a surface, where the paper defines no P22.
     """
     if len(grid.shape) > 1:
         raise InputError(
@@ -153,6 +80,10 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     return solve, product
 
 
+p21 = OnGrid(extended)
+p22 = OnGrid(inverse_of_extended)
+
+
 def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
     """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that
     is not zero.
@@ -172,32 +103,13 @@ def _circular(symbol: np.ndarray) -> GridMap:
 
 
 def closed_curve(k: int) -> int:
-    """Choose half the number of nodes of the closed curve.
-
-    Parameters
-    ----------
-    k : Number of contacts.
-
-    Returns
-    -------
-    A power of two, at least k.
-    """
+    """Half the number of nodes of the closed curve: a power of two, at least k contacts."""
     return int(2 ** np.ceil(np.log2(k)))
 
 
 def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
-    """Make the product E' C E along one axis of k nodes, for a circulant matrix C and the extension
-    E by zero.
-
-    Parameters
-    ----------
-    symbol : (m + 1,) eigenvalues of C, which is real and symmetric, of size 2 m.
-    k : Number of nodes along the axis.
-    axis : The axis of the grid.
-
-    Returns
-    -------
-    The product on arrays on the grid.
+    """The product E' C E along one axis of k nodes of arrays on the grid, for the extension E by
+    zero and the circulant matrix C of size 2 m that has the real eigenvalues `symbol` (m + 1,).
     """
     n = 2 * (len(symbol) - 1)
 

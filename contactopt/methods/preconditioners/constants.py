@@ -17,29 +17,20 @@ WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m
 experiments.questions.several_pairs`.
 """
 
-# Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is
-SPLIT = 0.3
+SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies'
 # resistance of `laplacian` to tangential waves along their own direction; 1 / (1 - SPLIT)^2 - 1 for
 # a half-space
 ALONG = 2.0
 # share by which bilinear elements lower the compliance of the shortest tangential waves along their
 # own direction
 DISPERSION = 0.28
-# power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
-CELL = 0.45
-# power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a
-# quarter-space
-EDGE = 0.2
-# unknowns of a surface up to which `laplacian` takes its inverse root from eigenvectors: some 300
-# products pay for them
-EIGENVECTORS = 800
-# shift over the least eigenvalue of a piece of the surface that is as long as this one
-PIECE = 0.25
+CELL = 0.45  # power of a node's cell that weights it: 1/2 where the spacing varies slowly
+EDGE = 0.2  # power of the share of it that an edge leaves: 0 for half-, 1/4 for quarter-spaces
+EIGENVECTORS = 800  # unknowns of a surface up to which the inverse root is by eigenvectors
+PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long
 THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
 # area of a cell in the chart over that in space, or one over it, beyond which the chart has no
 # directions there
 DISTORTED = 2.0
-# length of a pair of surfaces over its distance to the next pair that is worth one more degree of
-# smooth motions
-WAVES = 3.0
-MOST_WAVES = 12  # the highest degree
+WAVES = 3.0  # length of a pair over its distance to the next that is worth one more degree
+MOST_WAVES = 12  # the highest degree of smooth motions

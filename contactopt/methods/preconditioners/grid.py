@@ -1,4 +1,4 @@
-"""The grid of the contacts: a line, a closed curve or a rectangle of nodes that transforms work on."""
+"""The grid of the contacts: a line, a closed curve or a rectangle that transforms work on."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from contactopt.problem.chart import nodal_weights
 GridMap = Callable[[np.ndarray], np.ndarray]  # linear map of arrays (*shape, dim)
 GridMaps = tuple[GridMap, GridMap | None]  # products with P and, where it is cheap, with P^-1
 EVEN = 1e-6  # relative difference of spacings that counts as none
+NO_GRID = (
+    "the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,22 +48,10 @@ class Grid:
 
 
 def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
-    """Find the line, closed curve or rectangular grid on which the contacts lie.
+    """The line, closed curve or rectangular grid on which the contacts lie, and the contacts (k,)
+    in its order.
 
     The search takes place in the chart, where a rectangular grid may be turned by any angle.
-
-    Parameters
-    ----------
-    problem : of k contacts; its chart and its nodal areas are used
-    held : (k, dim) mask of the components that cannot move
-
-    Returns
-    -------
-    Grid, and the contacts (k,) in its order.
-
-    Raises
-    ------
-    InputError : if the contacts lie on no such grid, or if it has fewer than 3 contacts a side
     """
     if problem.dim == 2:
         return _line(problem, held)
@@ -79,67 +70,68 @@ def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndar
     order = np.lexsort(places[::-1])
     full = min(shape) > 2 and np.prod(shape) == problem.contacts
     if not full or np.any(np.diff(np.ravel_multi_index(places, shape)[order]) != 1):
-        raise InputError(
-            "the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a"
-            " side."
-        )
+        raise InputError(NO_GRID)
     oblique = not np.array_equal(turn, np.eye(2))
     if oblique and np.any(held[:, 1:].any(axis=1) & ~held[:, 1:].all(axis=1)):
         raise InputError(
             "a grid at an angle to tangential directions that are held has no preconditioner."
         )
     on_grid = held[order].reshape(*shape, problem.dim)
-    ends = [[on_grid.take(end, axis).all(axis=0) for end in (0, -1)] for axis in range(2)]
+    ends = np.array([[on_grid.take(end, axis).all(axis=0) for end in (0, -1)] for axis in (0, 1)])
     areas = problem.areas[order]
     cells = np.multiply.outer(*(cells_along(t) for t in ticks)).ravel()
     weights = cells**CELL * (areas * cells.sum() / areas.sum() / cells) ** EDGE
     weights /= np.sqrt(np.mean(weights**2))
-    return (
-        Grid(
-            tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None
-        ),
-        order,
-    )
+    ends = np.moveaxis(ends, 2, 0)
+    return Grid(tuple(ticks), ends, weights, turn=turn if oblique else None), order
 
 
-def on_grid(
-    problem: InterfaceProblem, held: np.ndarray, make: Callable[[Grid], GridMaps]
-) -> GridMaps:
-    """Make products on arrays (k, dim) from those on the grid of the contacts.
-
-    Parameters
-    ----------
-    problem : The interface problem of k contacts on a line, a closed curve or a rectangular grid.
-    held : (k, dim) mask of the components that cannot move.
-    make : A function of the Grid that returns the product on arrays (n0[, n1], dim), and its
-        inverse or None.
-
-    Returns
-    -------
-    The product on arrays (k, dim), and its inverse or None.
-
-    Raises
-    ------
-    InputError : If the contacts lie on no grid.
+@dataclass(frozen=True)
+class OnGrid:
+    """A preconditioner of contacts on a grid, made from a function of the grid that gives products
+    with P on arrays (*shape, dim) and, where it is cheap, with P^-1. It has that function's
+    docstring.
     """
-    grid, order = _grid_of(problem, held)
-    product, inverse = make(grid)
 
-    def placed(act: GridMap) -> GridMap:
-        def apply(x: np.ndarray) -> np.ndarray:
-            x = x[order]
-            if grid.turn is not None:
-                x[:, 1:] = x[:, 1:] @ grid.turn.T
-            made = act(x.reshape(*grid.shape, problem.dim)).reshape(x.shape)
-            if grid.turn is not None:
-                made[:, 1:] = made[:, 1:] @ grid.turn
-            out = np.empty(x.shape)
-            out[order] = made
-            return out
+    make: Callable[[Grid], GridMaps]
 
-        return apply
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "__doc__", self.make.__doc__)
 
-    return placed(product), None if inverse is None else placed(inverse)
+    def __call__(self, problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
+        """The same products on arrays (k, dim).
+
+        Parameters
+        ----------
+        problem : Of k contacts on a line, a closed curve or a rectangular grid of its chart.
+        held : (k, dim) mask of the components that cannot move.
+
+        Returns
+        -------
+        Products with P and with P^-1, or None in its place.
+
+        Raises
+        ------
+        InputError : If the contacts lie on no grid, or on one of fewer than 3 contacts a side.
+        """
+        grid, order = _grid_of(problem, held)
+
+        def placed(act: GridMap) -> GridMap:
+            def apply(x: np.ndarray) -> np.ndarray:
+                x = x[order]
+                if grid.turn is not None:
+                    x[:, 1:] = x[:, 1:] @ grid.turn.T
+                made = act(x.reshape(*grid.shape, problem.dim)).reshape(x.shape)
+                if grid.turn is not None:
+                    made[:, 1:] = made[:, 1:] @ grid.turn
+                out = np.empty(x.shape)
+                out[order] = made
+                return out
+
+            return apply
+
+        product, inverse = self.make(grid)
+        return placed(product), None if inverse is None else placed(inverse)
 
 
 def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
@@ -147,14 +139,9 @@ def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray
     chart, order = problem.chart, problem.chart.order()
     ticks = chart.places[0, order]
     if len(ticks) < 3 or np.any(np.diff(ticks) <= 0):
-        raise InputError(
-            "the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a"
-            " side."
-        )
+        raise InputError(NO_GRID)
     weights = nodal_weights(chart, problem.areas)[order]
-    ends = (
-        held[order][[0, -1]].T[:, None, :] if not chart.closed else np.zeros((2, 1, 2), dtype=bool)
-    )
+    ends = held[order][[0, -1]].T[:, None, :] & (not chart.closed)
     return Grid((ticks,), ends, weights, chart.closed), order
 
 
@@ -171,27 +158,16 @@ def _turn(places: np.ndarray) -> np.ndarray:
         return np.eye(2)
     step = points[KDTree(points).query(points, k=2)[1][:, 1]] - points
     # Directions that differ by a quarter turn have the same fourth power as complex numbers.
-    fourth = (
-        (step[:, 0] + 1j * step[:, 1]) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)
-    ) ** 4
-    angle = np.angle(np.mean(fourth)) / 4
+    way = (step[:, 0] + 1j * step[:, 1]) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)
+    angle = np.angle(np.mean(way**4)) / 4
     if abs(angle) <= EVEN:
         return np.eye(2)
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
-    """Measure how much of a line belongs to every tick: half-way to either neighbour, beyond an end
-    as far as before
-    it.
-
-    Parameters
-    ----------
-    ticks : (k,) places along the line, ascending, at least two [length].
-
-    Returns
-    -------
-    (k,) lengths [length].
+    """How much of a line belongs to each of its ascending ticks: half-way to either neighbour, and
+    beyond an end as far as before it.
     """
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

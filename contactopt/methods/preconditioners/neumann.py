@@ -12,21 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg as la
 from scipy.fft import dct, dst, fft, idct, idst
 
 from contactopt.methods.preconditioners.constants import DISPERSION, SPLIT
-from contactopt.methods.preconditioners.grid import (
-    EVEN,
-    Grid,
-    GridMap,
-    GridMaps,
-    cells_along,
-    on_grid,
-)
-from contactopt.problem import InterfaceProblem
+from contactopt.methods.preconditioners.grid import EVEN, Grid, GridMap, OnGrid, cells_along
 
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j
 # + shift) / k
@@ -74,11 +67,10 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     k, steps = len(ticks), np.diff(ticks)
     waves = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
     if line or np.ptp(steps) <= EVEN * steps.mean():
+        forward, backward = (partial(act, type=kind, norm="ortho") for act in (to, back))
+        squares = waves / steps.mean() ** 2
         return Direction(
-            waves,
-            waves / steps.mean() ** 2,
-            lambda x, axis: to(x, type=kind, axis=axis, norm="ortho"),
-            lambda x, axis: back(x, type=kind, axis=axis, norm="ortho"),
+            waves, squares, lambda x, i: forward(x, axis=i), lambda x, i: backward(x, axis=i)
         )
     cells, stiffness = cells_along(ticks), np.zeros(k)
     stiffness[:-1] += 1 / steps
@@ -94,58 +86,31 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     return Direction(waves, np.maximum(values, 0.0), along(vectors.T), along(vectors))
 
 
-def neumann(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-    """Square root of the Laplacian on the grid of the contacts, and its inverse.
-
-    Parameters
-    ----------
-    problem : whose contacts lie on a line or a rectangular grid of their chart
-    held : (k, dim) mask of the components that cannot move
-
-    Returns
-    -------
-    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
-
-    Raises
-    ------
-    InputError : if the contacts lie on no such grid
-    """
-    return on_grid(problem, held, _root_on_grid)
-
-
 def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
     """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
 
     The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue
     of the root stands in its place.
-
-    Parameters
-    ----------
-    grid : of the contacts
-
-    Returns
-    -------
-    The products of the root and of its inverse with arrays (*shape, dim).
     """
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
 
-    def along(power: int) -> GridMap:
-        def product(X: np.ndarray) -> np.ndarray:
-            out = np.empty(X.shape)
-            for i, (root, directions) in enumerate(parts):
-                x = weight**power * X[..., i]
-                for axis, d in enumerate(directions):
-                    x = d.forward(x, axis)
-                x = root**power * x
-                for axis, d in enumerate(directions):
-                    x = d.backward(x, axis)
-                out[..., i] = weight**power * x
-            return out
+    def product(X: np.ndarray, power: int) -> np.ndarray:
+        out = np.empty(X.shape)
+        for i, (root, directions) in enumerate(parts):
+            x = weight**power * X[..., i]
+            for axis, d in enumerate(directions):
+                x = d.forward(x, axis)
+            x = root**power * x
+            for axis, d in enumerate(directions):
+                x = d.backward(x, axis)
+            out[..., i] = weight**power * x
+        return out
 
-        return product
+    return partial(product, power=1), partial(product, power=-1)
 
-    return along(1), along(-1)
+
+neumann = OnGrid(_root_on_grid)
 
 
 def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:

@@ -118,22 +118,12 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
 def surface_matrices(
     points: np.ndarray, cells: np.ndarray
 ) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the stiffness and the mass of the Laplacian on the mesh of the contacts.
+    """The Laplacian on the mesh of the contacts, for points (d, k) and the corners (v, c) of lines,
+    triangles or quadrilaterals, which stand for the mean of both ways to cut them.
 
-    Parameters
-    ----------
-    points : (d, k) positions [length].
-    cells : (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both
-        ways to cut them.
-
-    Returns
-    -------
-    Stiffness K (k, k), lumped mass (k,), the shift (k,) of the piece that each contact is on, and
-    the share (k,) of a full turn that the cells of a contact span: a half at a straight edge.
-
-    Raises
-    ------
-    InputError : If the cells leave out contacts.
+    Returns the stiffness K (k, k), the lumped mass (k,), the shift (k,) of the piece that each
+    contact is on, and the share (k,) of a full turn that the cells of a contact span: a half at a
+    straight edge. Raises InputError if the cells leave out contacts.
     """
     k = points.shape[1]
     K, mass, share = sp.csr_matrix((k, k)), np.zeros(k), np.zeros(k)
@@ -159,35 +149,24 @@ def surface_matrices(
 
 
 def divergences(points: np.ndarray, places: np.ndarray, cells: np.ndarray) -> sp.csr_matrix:
-    """Compute the matrix of the integral of div u div v for tangential fields u and v.
+    """The integral of div u div v for tangential fields u and v, a matrix (2 k, 2 k) with the
+    components of a contact in a row.
 
-    Parameters
-    ----------
-    points : (3, k) or (2, k) positions in space [length].
-    places : (2, k) positions in the chart, along whose axes the components are [length].
-    cells : (v, c) as for `surface_matrices`. Those whose area differs by a factor of DISTORTED in
-        the chart, as at its seam, are left out.
-
-    Returns
-    -------
-    (2 k, 2 k), the components of a contact in a row.
+    The components are along the axes of the chart, in which the contacts have the places (2, k).
+    Cells whose area differs by a factor of DISTORTED in the chart, as at its seam, are left out.
     """
     k = places.shape[1]
     total = sp.csr_matrix((2 * k, 2 * k))
     for corners, part in _cut(cells):
         gradients, measure = _simplices(places, corners)
         true = _simplices(points, corners)[1]
-        measure = np.where(
-            np.abs(np.log(np.maximum(measure, 1e-300) / true)) < np.log(DISTORTED), measure, 0.0
-        )
-        for i, own in enumerate(corners):
-            for j, other in enumerate(corners):
-                for a in range(2):
-                    for b in range(2):
-                        entries = part * measure * gradients[i][a] * gradients[j][b]
-                        total = total + sp.csr_matrix(
-                            (entries, (2 * own + a, 2 * other + b)), (2 * k, 2 * k)
-                        )
+        apart = np.abs(np.log(np.maximum(measure, 1e-300) / true))
+        measure = part * np.where(apart < np.log(DISTORTED), measure, 0.0)
+        for i, a in np.ndindex(len(corners), 2):
+            for j, b in np.ndindex(len(corners), 2):
+                entries = measure * gradients[i][a] * gradients[j][b]
+                at = 2 * corners[i] + a, 2 * corners[j] + b
+                total = total + sp.csr_matrix((entries, at), (2 * k, 2 * k))
     return total
 
 
@@ -251,11 +230,7 @@ def _by_eigenvectors(L: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
 def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray]:
     """Products with L^-1/2, a sum of sparse solves, for L with eigenvalues of at least `low`."""
     eye = sp.eye(L.shape[0], format="csc")
-    order = {
-        "permc_spec": "MMD_AT_PLUS_A",
-        "diag_pivot_thresh": 0.0,
-        "options": {"SymmetricMode": True},
-    }
+    order = dict(permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     high = float(abs(L).sum(axis=1).max())
     poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
     return lambda x: np.asarray(sum(c * factors.solve(x) for c, factors in poles))
@@ -264,16 +239,8 @@ def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray
 def inverse_root(
     low: float, high: float, accuracy: float = ACCURACY
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Approximate x^-1/2 by a sum of c / (x + s).
-
-    Parameters
-    ----------
-    low, high : The bounds of x.
-    accuracy : The accuracy of the sum.
-
-    Returns
-    -------
-    The coefficients c (j,) and the shifts s (j,) > 0.
+    """Coefficients c (j,) and shifts s (j,) > 0 of a sum of c / (x + s) that is x^-1/2 to this
+    accuracy for x between the bounds.
     """
     m = low / high
     inner, outer = float(ellipk(m)), float(ellipkm1(m))  # K(m) and K(1 - m)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from experiments.questions.simplest import nearly
-from experiments.questions.simplest.chart import bias, chart_rows, draw_chart, size_rows
+from experiments.questions.simplest.chart import bias, chart_rows, draw_chart
 from experiments.report import REPORTS, markdown, write
 
 FOLDER = REPORTS / "simplest"
@@ -20,7 +20,6 @@ PARTS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "chart": chart_rows,
     "nearly": lambda: nearly.table(nearly.rows(COUNT)),
     "prices": nearly.prices,
-    "sizes": size_rows,
     "bias": lambda: [{"the block's peak pressure over that of a half-plane, less one": bias()}],
 }
 TEXT = f"""{(__doc__ or "").strip()}
@@ -61,14 +60,6 @@ solve of the whole costs less than a half and its proof; a half pays where it is
 once, as in a search for an accuracy.
 
 {{prices}}
-
-## Half-planes instead of blocks and cylinders
-
-The estimate is .5 (a / L)^2 + .15 s^2 and the misfit of the gap, with a the contact half-width, L
-the distance to the end of the bodies and s the slope of the gap at the edge of the contact;
-half-spaces are offered up to an estimate of 5 %.
-
-{{sizes}}
 """
 
 

@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from contactopt import HalfSpace, Part, Rigid, Scene, Support, analytic, scenes
+from contactopt import HalfSpace, Part, Rigid, Scene, Support, analytic
 from contactopt.accuracy import refine
 from contactopt.meshes.structured import contact_grid, graded, rename, tensor_mesh
 from contactopt.readings.quantities import peak_pressure
 from contactopt.scenes.common import RUBBER
-from contactopt.simplification.constants import WORST
-from contactopt.simplification.joints import coarse
-from contactopt.simplification.large_bodies import as_half_spaces, spot_of
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
 
@@ -169,38 +166,3 @@ def draw_chart(rows: list[Row], model_error: float) -> Figure:
     ax.set_title("A rigid cylinder on an elastic block, against Hertz", loc="left")
     ax.spines[["top", "right"]].set_visible(False)
     return made
-
-
-def size_rows() -> list[Row]:
-    """Half-planes instead of blocks of all thicknesses and cylinders of all curvatures: the error
-    said and the error made.
-    """
-    rows: list[Row] = []
-    ways = (
-        ("H / a", "cylinder", (1.5, 2.0, 4.0, 8.0, 16.0)),
-        ("a / R", "foundation", (0.05, 0.1, 0.2, 0.3)),
-    )
-    for what, rigid, values in ways:
-        hertz = scenes.cylinder(rigid=rigid).reference
-        assert hertz is not None
-        for value in values:
-            changes: Row = {"foundation_height": value * hertz.half_width}
-            if what == "a / R":
-                changes = {"force": 100.0 * (value * 400.0 / hertz.half_width) ** 2}
-            scene = scenes.cylinder(mu=0.0, elements=64, rigid=rigid, **changes)
-            spot = spot_of(coarse(scene))
-            row: Row = {
-                "size": what,
-                "value": value,
-                "error said": spot if isinstance(spot, str) else spot.error,
-            }
-            if not isinstance(spot, str):
-                peaks = [
-                    max(solved.solution.reactions[:, 0] / solved.reduction.problem.areas)
-                    for solved in (solve_scene(scene), solve_scene(as_half_spaces(scene, spot)))
-                ]
-                row["error of the peak pressure"] = abs(peaks[1] / peaks[0] - 1)
-                row["offered"] = "yes" if spot.error <= WORST else "no"
-            rows.append(row)
-            print(row, flush=True)
-    return rows
