@@ -12,7 +12,8 @@ from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, 
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
 from contactopt.derivatives.outputs import find_quantity
-from contactopt.meshes.local_refinement import boundary_curve, divide, simplices
+from contactopt.meshes.local_refinement import boundary_curves, divide
+from contactopt.meshes.structured import simplices
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
@@ -63,7 +64,7 @@ def test_new_nodes_lie_on_the_curved_boundary(turn):
     angle = np.linspace(0, np.pi, 9) + turn
     disc = skfem.MeshTri.init_circle(3)
     mesh = disc.with_boundaries({"arc": disc.boundary_facets()})
-    curve = boundary_curve(mesh, "arc")
+    curve = boundary_curves(mesh)["arc"]
     between = 0.98 * np.array([np.cos(angle), np.sin(angle)])
     assert np.allclose(np.linalg.norm(curve(between), axis=0), 1, atol=1e-5)
     for _ in range(3):
@@ -74,7 +75,8 @@ def test_new_nodes_lie_on_the_curved_boundary(turn):
 
 def test_corners_stay_corners():
     square = skfem.MeshTri.init_tensor(TICKS, TICKS)
-    assert boundary_curve(square.with_boundaries({"all": square.boundary_facets()}), "all") is None
+    square = square.with_boundaries({"all": square.boundary_facets()})
+    assert boundary_curves(square)["all"] is None
 
 
 def pressed_block(n):

@@ -15,15 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.coupling.faces import Faces, cross
+from contactopt.coupling.faces import Faces
 from contactopt.coupling.rounded_kinks import Rounding
 from contactopt.coupling.segments import Overlap
 
-SLIVER = (
-    # directions in which G extends less than the square root of this, over the cell: fields are
-    # constant there
-    1e-11
-)
+# fields are constant in directions in which G extends less than the square root of this, over the
+# cell
+SLIVER = 1e-11
 WEAK = 0.2  # contacts with less than this share of their area pass it on to a neighbour
 BLOCK = 200_000  # points of integration at a time
 
@@ -58,107 +56,106 @@ class Integrals:
 def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> Integrals:
     """Integrate the dual functions of one surface over its overlap with another.
 
-    Parameters
-    ----------
-    own : The side that carries the contacts, with n points.
-    other : The other side, with n' points.
-    points : The points of integration of the overlap, at least one.
-    full : (n,) integrals of the hat functions over all of the own surface.
-
-    Returns
-    -------
-    The contacts on the own side: nodes (k,), areas (k,), the sparse weights W (k, n) and W' (k, n')
-    whose rows add up to one, and the distances between the surfaces.
+    The own side, with n points, carries the contacts; `full` (n,) are the integrals of the hat
+    functions over all of it. The overlap has at least one point of integration.
     """
-    count = own.cells.shape[1]
-    # The cells that the other side covers at all, and the face and the place in it of each.
-    used, cell = np.unique(points.cell, return_inverse=True)
-    face, local = used // len(own.cells), used % len(own.cells)
+    dual = _Dual(own, points)
+    nodes, rows, areas, partial = _contacts_of(dual, full)
+    k, sides = len(nodes), (own, other)
+    # Sum int psi_i N_j over blocks of points, so that memory stays bounded: W of the own side, W'
+    # of the other, and the mean vector x - x' between the true places on both surfaces.
+    W = [sp.csr_matrix((k, side.points.shape[1])) for side in sides]
+    apart = np.zeros((own.dim, k))
+    rounding = Rounding(other, points) if other.degree == 1 else None
+    least, nearest = np.inf, np.zeros(own.dim)
+    for start in range(0, len(points.cell), BLOCK):
+        block = slice(start, start + BLOCK)
+        new_cell = np.diff(points.cell[block], prepend=-1)
+        pairs = np.flatnonzero(new_cell | np.diff(points.face[block], prepend=-1))
+        row = rows[dual.cell[block]][pairs]
+        places = []
+        faces = points.cell[block] // len(own.cells), points.face[block]
+        for i, at in enumerate((points.at[:, block], points.there[:, block])):
+            column = sides[i].faces[faces[i]][pairs]
+            values = dual.functional(sides[i].shapes(at), block, pairs)
+            W[i] = W[i] + collect(values, row, column, W[i].shape)
+            places.append(sides[i].true(sides[i].locations(faces[i], at)[0]))
+        if rounding is not None:
+            values = dual.functional(rounding.values(block), block, pairs)
+            shape = k, rounding.rises.shape[0]
+            term = collect(values, row, rounding.columns(block, pairs), shape)
+            W[1] = W[1] + term @ rounding.rises
+        vector = places[0] - places[1]
+        # The deepest overlap of the surfaces, for a message.
+        distance = -np.sum(vector * own.normals(faces[0], points.at[:, block]), axis=0)
+        if distance.min() < least:
+            least, nearest = float(distance.min()), places[0][:, np.argmin(distance)]
+        means = dual.functional(vector, block, pairs)
+        for d in range(own.dim):
+            apart[d] += np.bincount(row.ravel(), means[:, :, d].ravel(), k)
+    mine, theirs = (tidy(sp.diags(1 / areas) @ part) for part in W)
+    return Integrals(nodes, areas, partial, mine, theirs, apart / areas, least, nearest)
 
-    first = np.searchsorted(cell, np.arange(len(used)))  # points come in the order of the cells
 
-    def summed(values: np.ndarray) -> np.ndarray:
-        return np.add.reduceat(values, first, axis=1).T
+class _Dual:
+    """The dual functions psi_v on the c cells that the other side covers at all.
 
-    # Per cell: a_v = int phi_v, the mean of every hat function, and the matrix int (phi_v - mean)
-    # (phi_w - mean).
-    begin, width = points.window[:, :, points.cell]
-    phi = own.hats((own.local(local[cell], points.at) - begin) / width)
-    area = summed(phi * points.measure)  # (cell, v)
-    whole = area.sum(axis=1)
-    mean = area / whole[:, None]
-    centred = phi - mean[cell].T
-    mass = summed((centred[:, None] * centred * points.measure).reshape(count * count, -1)).reshape(
-        -1, count, count
-    )
-    # The best linear fit of f at vertex v is the mean of f plus its slopes, fit (v, w) int
-    # centred_w f.
-    fit = _slopes(mass, area, whole)  # value at vertex v less the mean = fit (v, w) int centred_w f
+    corners  (c, v) nodes of the own side at the vertices of the cells
+    cell     (g,) the cell of each point of integration, from 0 to c
+    area     (c, v) integrals of the hat functions over the covered part
+    partial  (c,) whether a cell is covered in part only
+    """
 
-    def functional(values: np.ndarray, block: slice) -> np.ndarray:
-        """(pair, v, j) int psi_v f_j over the points of a block, summed for every pair of a cell
-        and a face.
+    def __init__(self, own: Faces, points: Overlap) -> None:
+        used, self.cell = np.unique(points.cell, return_inverse=True)
+        face, local = used // len(own.cells), used % len(own.cells)
+        self.corners = own.faces[face[:, None], own.cells[local]]
+        self.partial = np.any(points.window[1][:, used] < 1, axis=0)
+        self.measure = points.measure
+        first = np.searchsorted(self.cell, np.arange(len(used)))  # points come in order of cells
+
+        def summed(values: np.ndarray) -> np.ndarray:
+            return np.add.reduceat(values, first, axis=1).T
+
+        # The mean of every hat function, and the matrix int (phi_v - mean) (phi_w - mean).
+        begin, width = points.window[:, :, points.cell]
+        phi = own.hats((own.local(local[self.cell], points.at) - begin) / width)
+        self.area = summed(phi * points.measure)
+        self.whole = self.area.sum(axis=1)
+        self.centred = phi - (self.area / self.whole[:, None])[self.cell].T
+        products = (self.centred[:, None] * self.centred * points.measure).reshape(
+            len(phi) ** 2, -1
+        )
+        mass = summed(products).reshape(-1, len(phi), len(phi))
+        # value of the best linear fit of f at vertex v, less the mean = fit (v, w) int centred_w f
+        self.fit = _slopes(mass, self.area, self.whole)
+
+    def functional(self, values: np.ndarray, block: slice, pairs: np.ndarray) -> np.ndarray:
+        """(pair, v, j) int psi_v f_j from values (j, g) at the points of a block, summed over those
+        of each pair of a cell and a face, which begin at `pairs`.
         """
-        c = cell[block]
-        # psi_v = a_v (1 / whole + fit centred) on the cell, times the measure of every point.
-        dual = area[c].T * (1 / whole[c] + np.einsum("gvw,wg->vg", fit[c], centred[:, block]))
-        weighted = dual * points.measure[block]
+        c = self.cell[block]
+        slopes = np.einsum("gvw,wg->vg", self.fit[c], self.centred[:, block])
+        weighted = self.area[c].T * (1 / self.whole[c] + slopes) * self.measure[block]
         return np.stack([np.add.reduceat(w * values, pairs, axis=1).T for w in weighted], axis=1)
 
-    # Vertices of cells become contacts; those that are hardly covered pass their share on.
-    nodes, rows = np.unique(own.faces[face[:, None], own.cells[local]], return_inverse=True)
-    rows = _pass_on(rows.reshape(area.shape), area, full[nodes])
+
+def _contacts_of(
+    dual: _Dual, full: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices of cells become contacts; those that are hardly covered pass their share on.
+
+    Returns the nodes (k,) of the contacts, the contact (cell, v) of every vertex, and of every
+    contact its area and whether a cell around it is covered in part only.
+    """
+    nodes, rows = np.unique(dual.corners, return_inverse=True)
+    rows = _pass_on(rows.reshape(dual.area.shape), dual.area, full[nodes])
     strong, rows = np.unique(rows, return_inverse=True)
-    nodes, rows = nodes[strong], rows.reshape(area.shape)
-    areas = np.bincount(rows.ravel(), area.ravel(), len(nodes))
+    nodes, rows = nodes[strong], rows.reshape(dual.area.shape)
+    areas = np.bincount(rows.ravel(), dual.area.ravel(), len(nodes))
     partial = np.zeros(len(nodes), dtype=bool)
-    partial[rows[np.any(points.window[1][:, used] < 1, axis=0)]] = True
-    # Sum int psi_i N_j over blocks of points, so that memory stays bounded: W of the own side, W'
-    # of the other, and
-    # the mean vector x - x' between the true places on both surfaces.
-    W = sp.csr_matrix((len(nodes), own.points.shape[1]))
-    W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
-    apart = np.zeros((own.dim, len(nodes)))
-    rounding = Rounding(other, points) if other.degree == 1 else None
-    least, deepest = np.inf, np.zeros(own.dim)
-    for start in range(0, len(cell), BLOCK):
-        block = slice(start, start + BLOCK)
-        pairs = np.flatnonzero(
-            np.diff(points.cell[block], prepend=-1) | np.diff(points.face[block], prepend=-1)
-        )
-        row = rows[cell[block]][pairs]
-        places = []
-        for surface, faces, at in (
-            (own, points.cell // len(own.cells), points.at),
-            (other, points.face, points.there),
-        ):
-            N = surface.shapes(at[:, block])
-            column = surface.faces[faces[block]][pairs]
-            term = collect(functional(N, block), row, column, (len(nodes), surface.points.shape[1]))
-            if surface is own:
-                W = W + term
-            else:
-                W_other = W_other + term
-                if rounding is not None:
-                    term = collect(
-                        functional(rounding.values(block), block),
-                        row,
-                        rounding.columns(block, pairs),
-                        (len(nodes), rounding.rises.shape[0]),
-                    )
-                    W_other = W_other + term @ rounding.rises
-            places.append(surface.true(surface.locations(faces[block], at[:, block])[0]))
-        # The deepest overlap of the surfaces, for a message.
-        distance = -np.sum((places[0] - places[1]) * _unit_normals(own, points, block), axis=0)
-        if distance.min() < least:
-            least, deepest = float(distance.min()), places[0][:, np.argmin(distance)]
-        vector = functional(places[0] - places[1], block)
-        for d in range(own.dim):
-            apart[d] += np.bincount(row.ravel(), vector[:, :, d].ravel(), len(nodes))
-    scale = sp.diags(1 / areas)
-    return Integrals(
-        nodes, areas, partial, tidy(scale @ W), tidy(scale @ W_other), apart / areas, least, deepest
-    )
+    partial[rows[dual.partial]] = True
+    return nodes, rows, areas, partial
 
 
 def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray:
@@ -171,13 +168,6 @@ def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray
     best = np.argmax(share[rows], axis=1)
     weak &= ~np.all(weak, axis=1)[:, None]  # on a cell that is larger than the other surface
     return np.where(weak, rows[np.arange(len(rows)), best][:, None], rows)
-
-
-def _unit_normals(own: Faces, points: Overlap, block: slice) -> np.ndarray:
-    """(dim, g) outward unit normals of the own faces at points of integration."""
-    face = points.cell[block] // len(own.cells)
-    normal = cross(own.locations(face, points.at[:, block])[1]) * own.turn[face]
-    return np.asarray(normal / np.linalg.norm(normal, axis=0))
 
 
 def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
@@ -196,34 +186,16 @@ def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray
 def collect(
     values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]
 ) -> sp.csr_matrix:
-    """Sum values into a sparse matrix.
-
-    Parameters
-    ----------
-    values : (pair, v, j) values.
-    row : (pair, v) rows.
-    column : (pair, j) columns.
-    shape : Of the matrix.
-
-    Returns
-    -------
-    The matrix. Values at the same place are added.
+    """The sparse matrix of values (pair, v, j) at rows (pair, v) and columns (pair, j); values at
+    the same place are added.
     """
     rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
 def tidy(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Make the rounding in weights zero, and let every row add up to one exactly, whatever the
+    """Weights (k, n) without what is only rounding, whose rows add up to one exactly, whatever the
     condition of a sliver.
-
-    Parameters
-    ----------
-    W : (k, n) weights.
-
-    Returns
-    -------
-    The same weights but for rounding.
     """
     W = sp.csr_matrix(W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
