@@ -225,7 +225,7 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
 def _boundaries(
     mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Name -> facets on the surface; `number` is the node of the mesh for each of the file, or -1."""
+    """Name -> facets on the surface; `number` is the mesh's node for each of the file, or -1."""
     outer = mesh.boundary_facets()
     corners = np.sort(mesh.facets[:, outer], axis=0)
     place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}

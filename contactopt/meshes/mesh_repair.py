@@ -124,8 +124,8 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
             "at most %.3g apart",
             cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
         )  # fmt: skip
-    _, first, label = np.unique(_pieces(*pairs.T, len(own)), return_index=True, return_inverse=True)
-    return np.asarray(first[label])
+    label = _pieces(pairs[:, 0], pairs[:, 1], len(own))
+    return np.asarray(np.unique(label, return_index=True)[1][label])
 
 
 def _pieces(i: np.ndarray, j: np.ndarray, count: int) -> np.ndarray:

@@ -141,7 +141,7 @@ class _Numbers:
         return rows[:, 0].astype(np.int64), rows[:, 1:]
 
     def head(self, newer: bool) -> int:
-        """The number of entities of a section; their total, and the range of tags, are passed over."""
+        """The number of entities of a section; their total and range of tags are passed over."""
         return int(self.take(4 if newer else 2, "u8")[0])
 
 

@@ -221,7 +221,7 @@ def simplices(mesh: Mesh, alike: bool = True) -> MeshTri | MeshTet:
     if alike and len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
         raise InputError(
             "the mesh cannot be cut into simplices: its cells number their vertices in different"
-            " orders."
+            " orders; make a mesh of triangles or tetrahedra, or number all cells in one order."
         )
     if not mesh.boundaries:
         return cut
