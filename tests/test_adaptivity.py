@@ -11,6 +11,7 @@ from turned import moved, turn
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
+from contactopt.accuracy.marking import divisible
 from contactopt.derivatives.outputs import find_quantity
 from contactopt.meshes.local_refinement import boundary_curves, divide
 from contactopt.meshes.structured import simplices
@@ -40,6 +41,17 @@ def measure(mesh, name=None):
         skfem.Basis(mesh, element) if name is None else skfem.FacetBasis(mesh, element, facets=name)
     )
     return float(basis.dx.sum())
+
+
+def test_hexahedra_that_cannot_be_cut_alike_are_refused():
+    """Tetrahedra that meet at crossed diagonals do not hang together when they are divided."""
+    mesh = MESHES["hexahedra"]
+    t = mesh.t.copy()
+    t[:, 0] = t[[1, 4, 5, 0, 7, 2, 3, 6], 0]  # the first cell turned by a quarter
+    mesh = skfem.MeshHex(mesh.p, t).with_boundaries(NAMES)
+    part = Part("block", mesh, MATERIAL, (), contact="bottom")
+    with pytest.raises(InputError, match="different orders"):
+        divisible(Scene("block", part, Rigid("ground"), 0.0), True)
 
 
 @pytest.mark.parametrize("kind", list(MESHES))

@@ -22,7 +22,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody
-from contactopt.coupling.planes_of_symmetry import SymmetryPlane
+from contactopt.coupling.planes_of_symmetry import (
+    ContactPoints,
+    SymmetryPlane,
+    symmetry_planes,
+)
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
@@ -116,6 +120,25 @@ def _kind(name: str) -> Callable[..., Coupling]:
         raise InputError(f"unknown coupling {name!r}; choose from auto, {', '.join(COUPLINGS)}.")
     module, function, _ = COUPLINGS[name]
     return getattr(import_module(module), function)  # type: ignore[no-any-return]
+
+
+def of_contacts(
+    kind: str,
+    carrier: str,
+    points: ContactPoints,
+    laid_out: tuple[Chart, np.ndarray, np.ndarray],
+    maps: tuple[sp.csr_matrix, sp.csr_matrix],
+    share: np.ndarray | None = None,
+) -> Coupling:
+    """The coupling at some contacts, from their chart, frames and order, and the maps in this
+    order.
+    """
+    chart, frames, order = laid_out
+    gap, areas, places = points.gap[order], points.areas[order], points.points[:, order]
+    cells = points.cells if chart.cells is None else chart.cells
+    planes = tuple(symmetry_planes(points))
+    share = None if share is None else share[order]
+    return Coupling(*maps, frames, gap, areas, places, chart, cells, planes, kind, carrier, share)
 
 
 def local_map(

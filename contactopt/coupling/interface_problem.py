@@ -26,16 +26,13 @@ def signed_map(
     """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and
     zeros elsewhere.
     """
-    ends = np.cumsum([0, *(made.upper.shape[0] for made in couplings)])
     blocks = [
-        (first, sp.coo_matrix(made.upper if body is upper else -made.lower))
-        for first, (upper, lower), made in zip(ends, sides, couplings)
-        if body is upper or body is lower
+        made.upper if body is upper else -made.lower if body is lower else None
+        for (upper, lower), made in zip(sides, couplings)
     ]
-    rows = np.concatenate([first + block.row for first, block in blocks])
-    columns = np.concatenate([block.col for _, block in blocks])
-    values = np.concatenate([block.data for _, block in blocks])
-    return sp.csr_matrix((values, (rows, columns)), (int(ends[-1]), blocks[0][1].shape[1]))
+    n = next(block.shape[1] for block in blocks if block is not None)
+    none = [sp.csr_matrix((made.upper.shape[0], n)) for made in couplings]
+    return sp.csr_matrix(sp.vstack([b if a is None else a for a, b in zip(blocks, none)]))
 
 
 def problem_of(

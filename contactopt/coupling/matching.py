@@ -12,12 +12,8 @@ from scipy.spatial import KDTree
 
 from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.coupling.charts import lay_out
-from contactopt.coupling.coupling import Coupling, local_map
-from contactopt.coupling.planes_of_symmetry import (
-    ContactPoints,
-    normals_in_planes,
-    symmetry_planes,
-)
+from contactopt.coupling.coupling import Coupling, local_map, of_contacts
+from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
@@ -42,7 +38,16 @@ def couple_nodes(
     that alone has a mesh.
 
     Frames and areas are those of the body that the contacts belong to. The contacts are numbered
-    along the chart. InputError if the contact nodes of two bodies do not match.
+    along the chart.
+
+    Parameters
+    ----------
+    scene, pair : The kind of the scene, and the pair of surfaces.
+    upper, lower : The two bodies, of which at least one has a mesh.
+
+    Returns
+    -------
+    One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
     names = pair.surfaces
     if upper.meshed and lower.meshed:
@@ -61,20 +66,10 @@ def couple_nodes(
         normals = normals_in_planes(points)
         apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
         points = replace(points, normals=normals, gap=np.sum(normals * apart.T, axis=0))
-    chart, frames, order = _laid_out(scene, lead, points)
-    return Coupling(
-        local_map(first.traces, partner[order], frames),
-        local_map(second.traces, order, frames),
-        frames,
-        points.gap[order],
-        lead.areas[order],
-        lead.points[:, order],
-        chart,
-        lead.cells if chart.cells is None else chart.cells,
-        tuple(symmetry_planes(points)),
-        "matching",
-        "lower" if lower.meshed else "upper",
-    )
+    _, frames, order = laid_out = _laid_out(scene, lead, points)
+    theirs = local_map(first.traces, partner[order], frames)
+    maps = theirs, local_map(second.traces, order, frames)
+    return of_contacts("matching", "lower" if lower.meshed else "upper", points, laid_out, maps)
 
 
 def _laid_out(

@@ -16,7 +16,7 @@ psi_i / a_i of a field is the value at contact i of its best linear fit on the c
 
 * Rows of W and of W' add up to one, so that forces are equal and opposite.
 * The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides
-  exactly the integral of its shape function: the patch test. It holds on partly covered faces too.
+  exactly the integral of its shape function: the patch test, on partly covered faces too.
 * A cell that is partly covered is cut down to the smallest similar cell around G, with hat
   functions of its own: a contact outside the other surface moves to its edge, where the force acts.
   Continued to the node, the normals and the gap of a steep side mean nothing. Contacts without any
@@ -25,22 +25,21 @@ psi_i / a_i of a field is the value at contact i of its best linear fit on the c
 
 **Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these
 places is zero where the surfaces lie on each other, but not where both are polygons inscribed in
-one curve; the moment of interface forces is the sum of e_i x r_i. It has a part that belongs to the
-geometry: a gap g_i closes along the normal before forces arise, so that e_i - g_i n_i is the lever
-that remains in contact. This rest is removed by evaluating the displacement of the own side at the
-other end of the lever, as a rotating surface carries it there:
+one curve; the moment of interface forces is the sum of e_i x r_i. A gap g_i closes along the normal
+before forces arise, so that e_i - g_i n_i is the lever that remains in contact. It is removed by
+evaluating the displacement of the own side at its other end, as a rotating surface carries it
+there,
 
     u_i = W u - W' u' - omega_i(u) x l_i,
     omega_i(u) = J^-1 sum_j w_j rho_j x u_j,   J = sum_j w_j (rho_j^2 - rho_j rho_j'),
 
 with omega_i the mean rotation of the nodes of the faces around contact i, rho_j their places from
 their centre, w_j the areas of the faces. It is exact for rigid motions, so that these give u = 0 at
-l_i = e_i, and by transposition forces on both bodies have no resultant moment. Since the lever is
-of second order in the size of the faces, so is what it changes. l_i also contains the gap itself,
-but at most an eighth of the size of a face (levers.SHARE): an arc deviates from a chord as long as
-its radius by about that much, so that polygons are in equilibrium whether their curve is known or
-not, and the rest of a larger gap is left to the geometry. In an axisymmetric scene moments vanish
-by symmetry, and no lever is needed.
+l_i = e_i, and by transposition forces on both bodies have no resultant moment. The lever, and what
+it changes, is of second order in the size of the faces. l_i also contains the gap itself, but at
+most an eighth of the size of a face (levers.SHARE), by about which an arc as long as its radius
+deviates from a chord: polygons are in equilibrium whether their curve is known or not, and the rest
+of a larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry.
 
 **Kinks of linear elements.** With linear elements on the other side, W' has a further term, which
 rounds off the kinks of its displacement (contactopt.coupling.rounded_kinks): otherwise finer

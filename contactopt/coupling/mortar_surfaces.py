@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
 from contactopt.coupling.charts import lay_out
-from contactopt.coupling.coupling import Coupling, local_map
+from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import contact_normals, mortar
 from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
@@ -30,8 +30,17 @@ def couple_surfaces(
     the chart.
 
     The contacts are carried by the side that the pair names, otherwise by that with more contacts
-    where they face each other. InputError if a body has no mesh on its contact surface, or if the
-    surfaces face each other nowhere.
+    where they face each other.
+
+    Parameters
+    ----------
+    scene, pair : The kind of the scene, and the pair of surfaces.
+    upper, lower : The two bodies.
+
+    Returns
+    -------
+    One contact for each node of the carrier that faces the other side. InputError if a body has no
+    mesh on its contact surface, or if the surfaces face each other nowhere.
     """
     bodies = upper, lower
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
@@ -49,7 +58,8 @@ def couple_surfaces(
     cells = number[carrier.cell_nodes()]
     cells = cells[np.all(cells >= 0, axis=1)].T  # those whose corners all carry contacts
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
-    chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
+    laid_out = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
+    _, frames, order = laid_out
     maps = []
     for i, mesh in enumerate(meshes):
         unknowns = [_picked(row, len(mesh.held)) for row in mesh.unknowns]
@@ -58,27 +68,10 @@ def couple_surfaces(
             for row in m.components(i, own_held)
         ]
         maps.append(local_map(traces, order, frames))
-    log.info(
-        "contact '%s': mortar, %d contacts on the %s body '%s'",
-        pair.name,
-        len(order),
-        SIDES[m.own],
-        carrier.name,
-    )
-    return Coupling(
-        maps[0],
-        maps[1],
-        frames,
-        m.gap[order],
-        m.areas[order],
-        m.points[:, order],
-        chart,
-        np.asarray(chart.cells),
-        tuple(symmetry_planes(contacts)),
-        "mortar",
-        SIDES[m.own],
-        m.share[order],
-    )
+    side = SIDES[m.own]
+    said = "contact '%s': mortar, %d contacts on the %s body '%s'"
+    log.info(said, pair.name, len(order), side, carrier.name)
+    return of_contacts("mortar", side, contacts, laid_out, (maps[0], maps[1]), m.share)
 
 
 def _mesh(surface: Surface) -> Mesh:

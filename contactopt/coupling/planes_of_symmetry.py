@@ -52,7 +52,16 @@ class SymmetryPlane:
     offset: float
 
     def contains(self, points: np.ndarray, size: float) -> np.ndarray:
-        """Which points (dim, k) lie in the plane, (k,); `size` is that of the contact surface."""
+        """Tell which points lie in the plane.
+
+        Parameters
+        ----------
+        points, size : Points (dim, k), and the size of the surface that they belong to [length].
+
+        Returns
+        -------
+        (k,) mask.
+        """
         return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 

@@ -30,6 +30,7 @@ from contactopt.coupling.faces import Faces, cross, face_normals, patches
 from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.coupling.polygons import areas, clip
 from contactopt.errors import InputError
+from contactopt.meshes.cells import area_vectors
 
 # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
 SMALLEST = 1e-8
@@ -105,10 +106,7 @@ def _cut(surface: Faces, own: bool) -> _Polygons:
     face = np.repeat(np.arange(count), len(local))
     centre = x.mean(axis=2)
     radius = np.linalg.norm(x - centre[:, :, None], axis=0).max(axis=1)
-    if len(x) == 2:
-        normal = cross((x[:, :, 1] - x[:, :, 0])[:, None])
-    else:  # of a triangle: twice its area
-        normal = np.cross(x[:, :, 2] - x[:, :, 0], x[:, :, -1] - x[:, :, 1], axis=0)
+    normal = area_vectors(x.swapaxes(1, 2))
     normal = normal / np.linalg.norm(normal, axis=0) * surface.turn[face]
     number = face * len(surface.cells) + np.tile(cell, count)
     return _Polygons(x, at, face, number, normal, centre, radius)

@@ -153,7 +153,16 @@ def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 
 def area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Area times normal (dim, f) of facets with corners (dim, c, f); on the right of edges."""
+    """Compute area times normal of facets; normals are on the right of edges.
+
+    Parameters
+    ----------
+    corners : (dim, c, f) corners of the facets in their order [length].
+
+    Returns
+    -------
+    (dim, f) vectors [length^2].
+    """
     if len(corners) == 2:
         x, y = corners[:, 1] - corners[:, 0]
         return np.stack([y, -x])

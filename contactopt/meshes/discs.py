@@ -1,6 +1,4 @@
-"""Meshes of half discs and of bodies that rise from them: rings of any radii around a core of
-squares.
-"""
+"""Half discs and bodies that rise from them: rings of any radii around a core of squares."""
 
 from __future__ import annotations
 
@@ -11,10 +9,8 @@ from skfem import MeshHex
 
 
 def half_disc(radii: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray]:
-    """Make nodes and quadrilaterals of the half disc y >= 0.
-
-    The innermost rings of nodes are squares. Those from number 2 sectors on are circles, with a
-    gradual change between.
+    """Make nodes and quadrilaterals of the half disc y >= 0. The innermost rings of nodes are
+    squares; those from number 2 sectors on are circles, with a gradual change between.
 
     Parameters
     ----------

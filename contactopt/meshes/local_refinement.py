@@ -43,13 +43,11 @@ def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
     Parameters
     ----------
     mesh : A scikit-fem mesh in the plane or in space.
-    arcs : Whether only arcs, spheres and cylinders count as curved, where the mesh has straight
-        edges.
+    arcs : Whether only arcs, spheres and cylinders count as curved, if the mesh has straight edges.
 
     Returns
     -------
-    By the name of the boundary its curve, or None where it is flat. The name '' stands for what has
-    no name.
+    By the name of the boundary, '' for what has no name, its curve, or None where it is flat.
     """
     return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
 
@@ -91,13 +89,12 @@ def split(mesh: Any, curves: Curves) -> Any:
 
     Parameters
     ----------
-    mesh : A scikit-fem mesh of any kind; of second order, its nodes on edges and faces become
-        corners.
-    curves : The curves of its boundaries, as for `divide`.
+    mesh, curves : Any scikit-fem mesh and the curves of its boundaries, as for `divide`.
 
     Returns
     -------
-    A mesh of the same kind and order of half the element size, with the same named boundaries.
+    A mesh of the same kind and order of half the element size, with the same named boundaries. Of
+    second order, its nodes on edges and faces have become corners.
     """
     fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
     return bent(fine, curves) if is_curved(mesh) else fine
@@ -181,9 +178,8 @@ def bent(mesh: Any, curves: Curves) -> Any:
         flat = replace(mesh, _boundaries=None, _subdomains=None)
         made = CURVED[mesh.refdom.__name__].from_mesh(flat)
     shift, plane = np.zeros_like(made.doflocs), len(mesh.p) == 2
-    edges, middle = mesh.facets, made.dofs.facet_dofs[0]
-    if not plane:
-        edges, middle = mesh.edges, made.dofs.edge_dofs[0]
+    edges = mesh.facets if plane else mesh.edges
+    middle = (made.dofs.facet_dofs if plane else made.dofs.edge_dofs)[0]
     for facets, curve in known.values():
         mine = facets if plane else np.unique(mesh.f2e[:, facets])
         ends = mesh.p[:, edges[:, mine]]
@@ -199,17 +195,14 @@ def bent(mesh: Any, curves: Curves) -> Any:
             corners = mesh.p[:, mesh.facets[:, facets]]
             _shift(shift, faces[facets], corners, np.ptp(corners, axis=1).max(axis=0), curve)
         local = shift[:, within]
-        around = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
-        shift[:, within[26]] = around
+        shift[:, within[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
     return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
 
 
 def _shift(
     shift: np.ndarray, nodes: np.ndarray, corners: np.ndarray, size: np.ndarray, curve: Function
 ) -> None:
-    """Write down how nodes between corners (dim, c, n) move to a curve, where it is near beside
-    their size.
-    """
+    """Write down how nodes amid corners (dim, c, n) move to a curve that is near beside `size`."""
     places = corners.mean(axis=1)
     off = curve(places) - places
     near = np.linalg.norm(off, axis=0) <= BENT * size

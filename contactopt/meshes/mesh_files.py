@@ -99,11 +99,7 @@ def name_boundaries(
 
     Returns
     -------
-    The mesh with these boundaries beside its own.
-
-    Raises
-    ------
-    InputError : If no facet lies there.
+    The mesh with these boundaries beside its own. InputError if no facet lies there.
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:, mesh.facets[:, facets]]

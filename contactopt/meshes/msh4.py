@@ -202,7 +202,7 @@ def _names(sections: dict[str, Any]) -> dict[tuple[int, int], str]:
 
 
 def _groups(reader: Any, names: dict, newer: bool) -> dict[tuple[int, int], list[str]]:
-    """(dimension, entity) -> names of its physical groups; a group without a name has its number."""
+    """(dimension, entity) -> names of its physical groups, or numbers of those without a name."""
     found = {}
     if reader is not None:
         for dim, count in enumerate(reader.take(4, "u8").tolist()):

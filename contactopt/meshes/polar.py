@@ -1,8 +1,5 @@
 """Structured meshes of round bodies: rings and sectors of rings, half discs and discs, divided
-evenly around the origin.
-
-Elements are of second order, with the nodes on edges along a circle on that circle. Linear
-displacements use the chords.
+evenly around the origin, with elements of second order that bend along circles.
 """
 
 from __future__ import annotations

@@ -24,8 +24,7 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
     """A grid whose spacing grows from one end to the other.
 
     The number of cells is the smallest that keeps the ratio of neighbours below its bound. The
-    ratio is then lowered so that the first cell is exactly as long as asked. A grid that would need
-    one cell or less is a single cell.
+    ratio is then lowered so that the first cell is exactly as long as asked.
 
     Parameters
     ----------
@@ -42,12 +41,13 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
     cells = int(np.ceil(np.log1p(length * (growth - 1) / first) / np.log(growth) - 1e-9))
     if first * cells >= length:  # so few cells that no growth is needed
         return np.linspace(0.0, length, int(np.ceil(length / first - 1e-9)) + 1)
+    powers = np.arange(cells)
 
     def excess(ratio: float) -> float:
-        return float(first * np.sum(ratio ** np.arange(cells)) - length)
+        return float(first * np.sum(ratio**powers) - length)
 
     ratio = brentq(excess, 1.0, growth * (1 + 1e-12)) if excess(growth) > 0 else growth
-    grid = np.concatenate([[0.0], np.cumsum(first * ratio ** np.arange(cells))])
+    grid = np.append(0.0, np.cumsum(first * ratio**powers))
     return np.asarray(grid * (length / grid[-1]))
 
 
@@ -116,12 +116,11 @@ def _across(axis: int, value: float, near: float, x: np.ndarray) -> np.ndarray:
 
 
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
-    """The mesh with further names for some of its boundaries.
+    """The mesh with further names for some of its boundaries, as in rename(mesh, contact="y-").
 
     Parameters
     ----------
-    mesh : As tensor_mesh() makes it.
-    names : New name = old name, as in rename(mesh, contact="y-").
+    mesh, names : Any mesh with named boundaries, and new name = old name.
 
     Returns
     -------
@@ -131,9 +130,8 @@ def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
 
 
 def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad:
-    """Meridian section of a half sphere that touches z = 0 at the origin.
-
-    The quarter disc has three corners; the middle of the arc serves as the fourth.
+    """Meridian section of a half sphere that touches z = 0 at the origin: a quarter disc, whose
+    fourth corner is the middle of the arc.
 
     Parameters
     ----------
@@ -176,9 +174,7 @@ def patch(
 
     Parameters
     ----------
-    mesh : Any mesh with named boundaries.
-    boundary : Name of the whole.
-    name : Name of the part.
+    mesh, boundary, name : A mesh, and the names of the whole and of the part.
     limits : Facets whose midpoints are below limits[i] along each axis i belong to the part
         [length].
 
@@ -205,12 +201,7 @@ def simplices(mesh: Mesh, alike: bool = True) -> MeshTri | MeshTet:
 
     Returns
     -------
-    Boundaries keep their names.
-
-    Raises
-    ------
-    InputError : If neighbours are not cut alike; number the vertices of all cells in one order
-        then.
+    Boundaries keep their names. InputError if neighbours have to be cut alike and are not.
     """
     mesh = straight(mesh)
     if isinstance(mesh, MeshTri | MeshTet):
