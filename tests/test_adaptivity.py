@@ -13,7 +13,7 @@ from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
 from contactopt.accuracy.marking import divisible
 from contactopt.derivatives.outputs import find_quantity
-from contactopt.meshes.local_refinement import boundary_curves, divide
+from contactopt.meshes.mesh_refinement import boundary_curves, divide
 from contactopt.meshes.structured import simplices
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits

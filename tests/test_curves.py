@@ -9,7 +9,7 @@ from conftest import MATERIAL
 
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce
 from contactopt.meshes.cells import straight, volumes
-from contactopt.meshes.local_refinement import (
+from contactopt.meshes.mesh_refinement import (
     TooSmall,
     bent,
     boundary_curves,

@@ -15,7 +15,7 @@ from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.meshes.cells import straight
 from contactopt.meshes.given_curves import Curve
-from contactopt.meshes.local_refinement import bent, divide, facets_of, split
+from contactopt.meshes.mesh_refinement import bent, divide, facets_of, split
 from contactopt.meshes.structured import simplices
 from contactopt.readings.quantities import Peak
 from contactopt.scenes.refined_scenes import part_curves

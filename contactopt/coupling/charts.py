@@ -1,5 +1,4 @@
-"""The contact surface's own coordinates and the local frames, both laid out from the surface
-itself.
+"""The contact surface's own coordinates and local frames, laid out from the surface itself.
 
 Neither depends on how the bodies lie in space: everything is derived from contact normals, from the
 cells that join the contacts, from planes of symmetry and from the distribution of the areas. A body

@@ -1,5 +1,4 @@
-"""A contact surface as the mortar coupling sees it: faces, the linear cells of its multipliers,
-places on it.
+"""A contact surface as the mortar coupling sees it: faces, linear cells for multipliers, places.
 
 A face is described by the nodes of its displacement; its geometry is interpolated from their
 coordinates with the same shape functions, which is exact for straight and for isoparametric

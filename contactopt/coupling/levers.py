@@ -1,6 +1,4 @@
-"""The rotation of a surface around its contacts, and the levers by which it carries displacements
-(contactopt.coupling.mortar).
-"""
+"""The rotation of a surface about its contacts, which carries displacements along levers."""
 
 from __future__ import annotations
 

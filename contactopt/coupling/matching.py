@@ -1,6 +1,4 @@
-"""The coupling of bodies whose contact nodes match: every contact of one body has its partner on
-the other.
-"""
+"""The coupling of bodies whose contact nodes match: each has its partner on the other body."""
 
 from __future__ import annotations
 

@@ -77,9 +77,9 @@ from scipy.spatial import KDTree
 from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES, weight_at
-from contactopt.coupling.dual import collect, integrate, tidy
 from contactopt.coupling.faces import Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
+from contactopt.coupling.mortar_matrices import collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
 from contactopt.errors import InputError
 

@@ -1,6 +1,4 @@
-"""The coupling of bodies whose contact nodes do not match: contacts on one side, integrals over the
-overlap of both.
-"""
+"""The mortar coupling of bodies whose contact nodes do not match, from faces to the maps T."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Planes of symmetry: those that cut a contact surface, and those beyond which mirror images make
-the bodies of a scene whole.
-"""
+"""Planes of symmetry that cut a contact surface, or mirror the bodies of a scene to whole ones."""
 
 from __future__ import annotations
 

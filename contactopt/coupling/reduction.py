@@ -299,9 +299,9 @@ def reduce_bodies(
     times.append(time.perf_counter())
 
     iterate = any(body.iterates(solver) for body in assembled)
-    implicit = _form(Q, scene.dim, assembled, maps, iterate, solver) == "implicit"
-    form = "implicit" if implicit else "explicit"
-    log.info("scene '%s': %s Q of %d unknowns", scene.name, form, maps[0].shape[0])
+    Q = _form(Q, scene.dim, assembled, maps, iterate, solver)
+    implicit = Q == "implicit"
+    log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, maps[0].shape[0])
     if not implicit:
         check_dense(round(filling(maps) ** 0.5))
     with one_blas_thread() if iterate else nullcontext():

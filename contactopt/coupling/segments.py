@@ -1,5 +1,4 @@
-"""Where two surfaces that face each other overlap: pieces that lie on one face of each, with points
-of integration.
+"""Where two surfaces overlap: pieces on one face of each, with points of integration.
 
 In the plane, the ends of the other side's faces are projected on the own side along its field of
 nodal normals, linear on every cell. The field is continuous, so that the pieces neither overlap nor
@@ -115,9 +114,7 @@ def _cut(surface: Faces, own: bool) -> _Polygons:
 def _facing(
     mine: _Polygons, theirs: _Polygons, spread: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of polygons that may face each other; own ones see within `spread` (p,) of their
-    normals.
-    """
+    """Pairs of polygons that may face each other; own ones see within `spread` (p,)."""
     none = np.zeros(0, dtype=int)
     if not len(mine.face) or not len(theirs.face):
         return none, none

@@ -1,5 +1,4 @@
-"""Meshes from files: everything that meshio reads, with the groups of the file as bodies and as
-named boundaries.
+"""Meshes from files that meshio reads, with their groups as bodies and as named boundaries.
 
 A boundary is found by its corners on the surface of the body. So its normal is the outward one of
 the body, whichever way round the file writes the facets, and a face between two parts of a file is

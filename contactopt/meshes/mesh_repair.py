@@ -1,6 +1,4 @@
-"""Faults of meshes from files: each is repaired, with a line in the log, or refused in a sentence
-that names the element.
-"""
+"""Faults of meshes from files are repaired, with a line in the log, or refused in a sentence."""
 
 from __future__ import annotations
 

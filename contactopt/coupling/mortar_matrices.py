@@ -1,4 +1,4 @@
-"""Integrals of dual functions over the overlap of two surfaces: areas and weights of the contacts.
+"""The mortar matrices W and W': integrals of dual functions over the overlap of two surfaces.
 
 The mathematics is in contactopt.coupling.mortar. On the covered part G of a cell, the functional
 int psi_v f / a_v is the value at vertex v of the best linear fit of f. Where G is a part of the
@@ -123,10 +123,9 @@ class _Dual:
         self.area = summed(phi * points.measure)
         self.whole = self.area.sum(axis=1)
         self.centred = phi - (self.area / self.whole[:, None])[self.cell].T
-        products = (self.centred[:, None] * self.centred * points.measure).reshape(
-            len(phi) ** 2, -1
-        )
-        mass = summed(products).reshape(-1, len(phi), len(phi))
+        count = len(phi)
+        products = self.centred[:, None] * self.centred * points.measure
+        mass = summed(products.reshape(count**2, -1)).reshape(-1, count, count)
         # value of the best linear fit of f at vertex v, less the mean = fit (v, w) int centred_w f
         self.fit = _slopes(mass, self.area, self.whole)
 
