@@ -154,12 +154,19 @@ def local_map(
     shape = k * dim, traces[0].shape[1]
     if all(np.array_equal(trace.indptr, np.arange(trace.shape[0] + 1)) for trace in traces):
         # every component of a contact is one unknown of the body, times a number
-        unknowns = np.stack([trace.indices[contacts] for trace in traces], axis=1)[:, None]
-        values = np.stack([trace.data[contacts] for trace in traces], axis=1)[:, None]
-        used = frames != 0
-        count = np.append(0, np.cumsum(np.count_nonzero(used, axis=2)))
-        columns = np.broadcast_to(unknowns, frames.shape)[used]
-        T = sp.csr_matrix(((frames * values)[used], columns, count), shape)
+        unknowns = np.stack([trace.indices[contacts] for trace in traces], axis=1)
+        values = np.stack([trace.data[contacts] for trace in traces], axis=1)
+        if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
+            row, column = np.nonzero(frames[0])
+            count = np.tile(np.bincount(row, minlength=dim), k)
+            data, columns = values[:, column] * frames[0][row, column], unknowns[:, column]
+        else:
+            used = frames != 0
+            count = np.count_nonzero(used, axis=2)
+            data = (frames * values[:, None])[used]
+            columns = np.broadcast_to(unknowns[:, None], frames.shape)[used]
+        ends = np.append(0, np.cumsum(count))
+        T = sp.csr_matrix((data.ravel(), columns.ravel(), ends), shape)
         T.sort_indices()
         return T
     rows, own = np.arange(k * dim), np.repeat(np.arange(k), dim)
