@@ -119,7 +119,7 @@ def _kind(name: str) -> Callable[..., Coupling]:
     if name not in COUPLINGS:
         raise InputError(f"unknown coupling {name!r}; choose from auto, {', '.join(COUPLINGS)}.")
     module, function, _ = COUPLINGS[name]
-    return getattr(import_module(module), function)  # type: ignore[no-any-return]
+    return getattr(import_module(module), function)
 
 
 def of_contacts(

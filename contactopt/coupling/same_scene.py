@@ -19,6 +19,8 @@ def check_same(one: Scene, other: Scene) -> None:
         raise InputError(
             f"the states '{one.name}' and '{other.name}' of a path are not those of one scene."
         )
+    a: Any
+    b: Any
     for a, b in zip(one.parts, other.parts):
         if type(a) is not type(b) or a.name != b.name:
             raise InputError(
