@@ -12,7 +12,7 @@ from contactopt.accuracy.everywhere import remainder
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.outputs import ROWS, Quantity
 from contactopt.material import Material
-from contactopt.meshes.local_refinement import split
+from contactopt.meshes.mesh_refinement import split
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.readings.quantities import READINGS, Reading, at_rim, peak_pressure, value_of
 from contactopt.scenes.refined_scenes import split_scene

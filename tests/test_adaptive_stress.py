@@ -16,7 +16,7 @@ from contactopt.accuracy.indicators import element_errors, pressure_errors
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.outputs import find_quantity
-from contactopt.meshes.local_refinement import bent, boundary_curve
+from contactopt.meshes.mesh_refinement import bent, boundary_curves
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
@@ -115,8 +115,8 @@ def test_arcs_are_told_from_polygons():
                 )
             }
         )
-        curves.append(boundary_curve(mesh, "inner", arcs=True))
-        assert boundary_curve(mesh, "inner") is not None
+        curves.append(boundary_curves(mesh, arcs=True)["inner"])
+        assert boundary_curves(mesh)["inner"] is not None
     between = 0.97 * np.array([np.cos(angle[:-1] + 0.1), np.sin(angle[:-1] + 0.1)])
     assert curves[1] is None and np.allclose(
         np.linalg.norm(curves[0](between), axis=0), 1.0, atol=1e-12
@@ -127,7 +127,7 @@ def test_bent_edges_follow_the_circle():
     """The area of a disc of triangles, with straight edges and with edges along its circle."""
     disc = skfem.MeshTri.init_circle(2)
     mesh = disc.with_boundaries({"rim": disc.boundary_facets()})
-    curved = bent(mesh, {"rim": boundary_curve(mesh, "rim")})
+    curved = bent(mesh, {"rim": boundary_curves(mesh)["rim"]})
     straight, along = (
         skfem.Basis(made, skfem.ElementTriP1(), intorder=4).dx.sum() for made in (mesh, curved)
     )

@@ -11,8 +11,10 @@ from turned import moved, turn
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
+from contactopt.accuracy.marking import divisible
 from contactopt.derivatives.outputs import find_quantity
-from contactopt.meshes.local_refinement import boundary_curve, divide, simplices
+from contactopt.meshes.mesh_refinement import boundary_curves, divide
+from contactopt.meshes.structured import simplices
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
@@ -41,6 +43,17 @@ def measure(mesh, name=None):
     return float(basis.dx.sum())
 
 
+def test_hexahedra_that_cannot_be_cut_alike_are_refused():
+    """Tetrahedra that meet at crossed diagonals do not hang together when they are divided."""
+    mesh = MESHES["hexahedra"]
+    t = mesh.t.copy()
+    t[:, 0] = t[[1, 4, 5, 0, 7, 2, 3, 6], 0]  # the first cell turned by a quarter
+    mesh = skfem.MeshHex(mesh.p, t).with_boundaries(NAMES)
+    part = Part("block", mesh, MATERIAL, (), contact="bottom")
+    with pytest.raises(InputError, match="different orders"):
+        divisible(Scene("block", part, Rigid("ground"), 0.0), True)
+
+
 @pytest.mark.parametrize("kind", list(MESHES))
 def test_divided_meshes_are_whole_and_keep_their_boundaries(kind):
     random = np.random.default_rng(0)
@@ -63,7 +76,7 @@ def test_new_nodes_lie_on_the_curved_boundary(turn):
     angle = np.linspace(0, np.pi, 9) + turn
     disc = skfem.MeshTri.init_circle(3)
     mesh = disc.with_boundaries({"arc": disc.boundary_facets()})
-    curve = boundary_curve(mesh, "arc")
+    curve = boundary_curves(mesh)["arc"]
     between = 0.98 * np.array([np.cos(angle), np.sin(angle)])
     assert np.allclose(np.linalg.norm(curve(between), axis=0), 1, atol=1e-5)
     for _ in range(3):
@@ -74,7 +87,8 @@ def test_new_nodes_lie_on_the_curved_boundary(turn):
 
 def test_corners_stay_corners():
     square = skfem.MeshTri.init_tensor(TICKS, TICKS)
-    assert boundary_curve(square.with_boundaries({"all": square.boundary_facets()}), "all") is None
+    square = square.with_boundaries({"all": square.boundary_facets()})
+    assert boundary_curves(square)["all"] is None
 
 
 def pressed_block(n):

@@ -8,19 +8,17 @@ import skfem
 from conftest import MATERIAL
 
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce
-from contactopt.meshes.cells import straight
-from contactopt.meshes.local_refinement import (
+from contactopt.meshes.cells import straight, volumes
+from contactopt.meshes.mesh_refinement import (
     TooSmall,
     bent,
-    boundary_curve,
     boundary_curves,
     divide,
     named_like,
-    simplices,
     split,
 )
-from contactopt.meshes.mesh_repair import volumes
 from contactopt.meshes.polar import ring
+from contactopt.meshes.structured import simplices
 from contactopt.scenes.refined_scenes import part_curves, split_scene
 
 ANGLES = np.linspace(0, np.pi / 2, 9)  # eight elements a quarter
@@ -63,7 +61,7 @@ def test_a_flank_stays_flat_beside_a_fillet_that_is_round(chords, graded, digits
         rounded = np.array([[float(f"{x:.{digits - 1}e}") for x in row] for row in places])
         rounding = 1e-15 * np.abs(places).max() + np.abs(rounded - places).max()
         moved = skfem.MeshTri(rounded, mesh.t).with_boundaries(mesh.boundaries)
-        curve = boundary_curve(moved, "flank")
+        curve = boundary_curves(moved)["flank"]
         fine = split(split(moved, {"flank": curve}), {"flank": curve})
         nodes = np.unique(fine.facets[:, fine.boundaries["flank"]])
         x, y = turn.T @ (fine.p[:, nodes] - shift) / scale
@@ -80,7 +78,7 @@ def test_an_ellipse_is_met_to_fourth_order_and_not_overshot():
     for n in (40, 80):
         angle = 2 * np.pi * np.arange(n) / n
         mesh = filleted_ring(np.stack([2 * np.cos(angle), np.sin(angle)]))
-        curve = boundary_curve(mesh, "outer")
+        curve = boundary_curves(mesh)["outer"]
         ends = mesh.p[:, mesh.facets[:, mesh.boundaries["outer"]]]
         middle = ends.mean(axis=1)
         x, y = curve(middle)
@@ -102,7 +100,8 @@ def filleted_ring(outline):
 @pytest.mark.parametrize("sides", [3, 4, 6, 8])
 def test_a_polygon_with_large_turns_is_a_polygon(sides):
     angle = 2 * np.pi * np.arange(sides) / sides
-    assert boundary_curve(filleted_ring(np.stack([np.cos(angle), np.sin(angle)])), "outer") is None
+    circle = filleted_ring(np.stack([np.cos(angle), np.sin(angle)]))
+    assert boundary_curves(circle)["outer"] is None
 
 
 @pytest.mark.parametrize("kind", ["quadrilaterals", "triangles", "second order"])

@@ -9,7 +9,7 @@ from contactopt import reduce_bodies, run, scenes, solve
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline
 from contactopt.meshes.cells import elements_of
-from contactopt.meshes.local_refinement import simplices
+from contactopt.meshes.structured import simplices
 
 
 def solved(scene, **kw):

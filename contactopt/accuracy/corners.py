@@ -24,7 +24,7 @@ from contactopt.accuracy.estimate import Level
 from contactopt.bodies.protocol import Region
 from contactopt.meshes.cells import straight
 from contactopt.meshes.curves import CORNER
-from contactopt.meshes.local_refinement import simplices
+from contactopt.meshes.structured import simplices
 from contactopt.readings.quantities import Peak, Reading, at_rim
 from contactopt.readings.resultants import views
 from contactopt.solving.solve_scene import Solved
@@ -95,7 +95,7 @@ def re_entrant(mesh: Any, vertex: int) -> bool:
     The recovered stress at the corner itself looks from all sides, and may be less than that next
     to it.
     """
-    cells = simplices(straight(mesh))
+    cells = simplices(mesh, alike=False)
     near = np.array([vertex])
     for _ in range(2):
         near = np.unique(cells.t[:, np.any(np.isin(cells.t, near), axis=0)])

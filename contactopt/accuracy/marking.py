@@ -13,8 +13,10 @@ from scipy.spatial import cKDTree
 from contactopt.accuracy.polygon import Chords, chords_of, flatter
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
-from contactopt.meshes.cells import is_curved, straight
-from contactopt.meshes.local_refinement import Curve, bent, divide, facets_of, simplices, split
+from contactopt.meshes.cells import straight
+from contactopt.meshes.given_curves import Curve
+from contactopt.meshes.mesh_refinement import bent, divide, facets_of, split
+from contactopt.meshes.structured import simplices
 from contactopt.readings.quantities import Peak
 from contactopt.scenes.refined_scenes import part_curves
 from contactopt.scenes.scene import Part, Rigid, Scene
@@ -81,8 +83,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
         if not isinstance(part, Part):
             return part
         given = part.build_mesh(FIRST, scene.zone)
-        corners = straight(given) if is_curved(given) else given
-        cut = simplices(corners) if simplicial else corners
+        cut = simplices(given) if simplicial else straight(given)
         found = curves[part.name] = part_curves(part, given)
         unsure = [name for name, curve in found.items() if not getattr(curve, "known", False)]
         guessed[part.name] = {

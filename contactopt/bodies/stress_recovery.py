@@ -40,7 +40,7 @@ from contactopt.bodies.protocol import Region
 from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 from contactopt.meshes.cells import straight
-from contactopt.meshes.local_refinement import simplices
+from contactopt.meshes.structured import simplices
 
 OUTSIDE = (
     # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a
@@ -287,7 +287,7 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
     size it misses the point.
     """
-    cells = simplices(mesh)
+    cells = simplices(mesh, alike=False)
     origin = cells.p[:, cells.t[0]]
     edges = cells.p[:, cells.t[1:]] - origin[:, None]
     shares = np.linalg.solve(np.moveaxis(edges, 2, 0), (point[:, None] - origin).T[..., None])[

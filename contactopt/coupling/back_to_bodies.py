@@ -15,8 +15,7 @@ def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
 
     Parameters
     ----------
-    reduction : The reduction of the scene.
-    solution : A solution of its problem.
+    reduction, solution : The reduction of the scene, and a solution of its problem.
 
     Returns
     -------

@@ -1,5 +1,4 @@
-"""The contact surface's own coordinates and the local frames, both laid out from the surface
-itself.
+"""The contact surface's own coordinates and local frames, laid out from the surface itself.
 
 Neither depends on how the bodies lie in space: everything is derived from contact normals, from the
 cells that join the contacts, from planes of symmetry and from the distribution of the areas. A body
@@ -8,66 +7,21 @@ that is turned takes its chart and its frames along.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from contactopt.coupling.planes_of_symmetry import (
+    NEAR,
+    ContactPoints,
+    SymmetryPlane,
+    symmetry_planes,
+)
 from contactopt.problem.chart import Chart
 
-NEAR = 1e-9  # what counts as zero beside the size of the contact surface, or beside one
 FLAT = 0.1  # a mean normal shorter than this belongs to a surface that closes on itself
 STEEP = 0.9  # cosine beyond which a direction is too near the normal to make a tangent of it
 EQUAL = 1e-3  # relative difference below which principal moments count as equal
 # places that differ by less than this fraction of the size belong to one row of contacts
 RANK = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class ContactPoints:
-    """What a chart is made from: k contacts of the body that carries them.
-
-    points   (dim, k) positions [length];  normals (dim, k) contact normals;  areas (k,)
-    cells    (v, c) contacts at the corners of the cells of the surface
-    held     (dim, k) whether both bodies are held there in that component
-    gap      (k,) initial gap: where a chart could start at several places it starts where the gap
-             is least
-    """
-
-    points: np.ndarray
-    normals: np.ndarray
-    areas: np.ndarray
-    cells: np.ndarray
-    held: np.ndarray
-    gap: np.ndarray
-
-    @property
-    def size(self) -> float:
-        """Largest extent [length]; 1 for a single point."""
-        return float(np.ptp(self.points, axis=1).max(initial=0.0)) or 1.0
-
-
-@dataclass(frozen=True)
-class SymmetryPlane:
-    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the
-    contacts.
-    """
-
-    inward: np.ndarray
-    offset: float
-
-    def contains(self, points: np.ndarray, size: float) -> np.ndarray:
-        """Tell which points lie in the plane.
-
-        Parameters
-        ----------
-        points : (dim, k) points [length].
-        size : The size of the contact surface, beside which rounding is zero [length].
-
-        Returns
-        -------
-        (k,) mask.
-        """
-        return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 
 def lay_out(
@@ -76,103 +30,27 @@ def lay_out(
     """Lay out the chart and the local frames of a contact surface.
 
     Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n
-    turned clockwise. In 3D it is the first direction of the chart, made orthogonal to n.
-
-    Parameters
-    ----------
-    contacts : The k contacts in any order.
-    copies : Number of mirror images that make the whole bodies: a plane of symmetry mirrors the
-        chart if there is more than one.
-    axisymmetric : Whether the first coordinate is the distance from an axis.
-
-    Returns
-    -------
-    The chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
+    turned clockwise. In 3D it is the first direction of the chart, made orthogonal to n. With more
+    than one of `copies`, mirror images that make the bodies whole, a plane of symmetry mirrors the
+    chart. In an axisymmetric scene the first coordinate is the distance from an axis. Returns the
+    chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
     """
-    planes = symmetry_planes(contacts)
-    mirrors = copies > 1
+    planes, mirrors = symmetry_planes(contacts), copies > 1
     if axisymmetric and contacts.points[0].min() <= NEAR * contacts.size:
         planes, mirrors = [SymmetryPlane(np.array([1.0, 0.0]), 0.0)], True
+    period = None
     if len(contacts.points) == 2:
-        frames = np.stack([contacts.normals.T, _clockwise(contacts.normals).T], axis=1)
+        n = contacts.normals
+        frames = np.stack([n.T, np.stack([n[1], -n[0]]).T], axis=1)
         places, mirrored, period = _line(contacts, frames[:, 1].T, planes, mirrors)
         order = np.argsort(places[0], kind="stable")
-        return (
-            Chart(places[:, order], mirrored, period, _renumbered(contacts.cells, order)),
-            frames[order],
-            order,
-        )
-    axes = _axes(contacts, planes)
-    places, mirrored = _plane(contacts, axes, planes, mirrors)
-    order = np.lexsort([_rank(row, contacts.size) for row in places])
-    chart = Chart(places[:, order], mirrored, None, _renumbered(contacts.cells, order))
-    return chart, _frames(contacts.normals, axes)[order], order
-
-
-def _renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """The corners (v, c) of cells by the numbers that the contacts have in their new order (k,)."""
-    number = np.empty(len(order), dtype=int)
-    number[order] = np.arange(len(order))
-    return number[cells]
-
-
-def _clockwise(normals: np.ndarray) -> np.ndarray:
-    return np.stack([normals[1], -normals[0]])
-
-
-def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """Find the planes across one component on which exactly the tangential displacement along it is
-    held.
-
-    Parameters
-    ----------
-    contacts : The contacts with their normals and held components.
-
-    Returns
-    -------
-    The planes, at most one for each component.
-    """
-    planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
-    for c, mask in enumerate(held):
-        if not mask.any():
-            continue
-        there = points[c, mask]
-        offset = float(there.mean())
-        plane = np.abs(points[c] - offset) <= NEAR * contacts.size
-        side = np.sign(points[c, ~plane] - offset)
-        tangential = np.all(np.abs(normals[c, plane]) < 0.5)
-        # along the normal, at least
-        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)
-        if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
-            inward = np.zeros(len(points))
-            inward[c] = side[0]
-            planes.append(SymmetryPlane(inward, offset * side[0]))
-    return planes
-
-
-def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
-    """Put the normals at planes of symmetry into these planes.
-
-    The mean over the facets that are modelled leaves out their mirror images, and so is tilted on a
-    curved surface.
-
-    Parameters
-    ----------
-    contacts : The k contacts.
-
-    Returns
-    -------
-    (dim, k) unit normals.
-    """
-    normals = contacts.normals
-    for plane in symmetry_planes(contacts):
-        straight = normals - plane.inward[:, None] * (plane.inward @ normals)
-        straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
-        tilted = plane.contains(contacts.points, contacts.size) & (
-            np.abs(plane.inward @ normals) > NEAR
-        )
-        normals = np.where(tilted, straight, normals)
-    return normals
+    else:
+        axes = _axes(contacts, planes)
+        frames = _frames(contacts.normals, axes)
+        places, mirrored = _plane(contacts, axes, planes, mirrors)
+        order = np.lexsort([_rank(row, contacts.size) for row in places])
+    cells = np.argsort(order)[contacts.cells]  # the place of each contact in the order
+    return Chart(places[:, order], mirrored, period, cells), frames[order], order
 
 
 def _line(
@@ -196,12 +74,8 @@ def _line(
     if period is not None:
         return place[None], (False,), period
     ends = [chains[0][0][0], chains[-1][0][-1]]
-    cut = [
-        i
-        for i in ends
-        if any(p.contains(contacts.points[:, [i]], contacts.size)[0] for p in planes)
-    ]
-    if cut:
+    in_plane = [plane.contains(contacts.points[:, ends], contacts.size) for plane in planes]
+    if cut := [i for i, *inside in zip(ends, *in_plane) if any(inside)]:
         at = cut[_least(contacts.gap[cut], contacts.size)]
         return (place - place[at])[None], (mirrors,), None
     return (place - end / 2)[None], (False,), None
@@ -230,10 +104,8 @@ def _chains(
             chain = _walk(following, start)
             seen[chain] = True
             chains.append((chain, length[chain[:-1]]))
-    mean = tangents @ contacts.areas
-    return sorted(
-        chains, key=lambda piece: float(mean @ contacts.points[:, piece[0]].mean(axis=1))
-    ), None
+    along = (tangents @ contacts.areas) @ contacts.points
+    return sorted(chains, key=lambda piece: float(along[piece[0]].mean())), None
 
 
 def _walk(following: np.ndarray, start: int) -> np.ndarray:
@@ -283,10 +155,8 @@ def _mean_normal(contacts: ContactPoints) -> np.ndarray:
     if size > FLAT:
         return np.asarray(mean / size)
     centred = contacts.points - contacts.points.mean(axis=1, keepdims=True)
-    vectors = np.linalg.svd(centred, full_matrices=True)[0]
-    return np.asarray(
-        vectors[:, 2] * (1.0 if vectors[:, 2] @ contacts.normals[:, 0] >= 0 else -1.0)
-    )
+    thin = np.linalg.svd(centred, full_matrices=True)[0][:, 2]
+    return np.asarray(thin if thin @ contacts.normals[:, 0] >= 0 else -thin)
 
 
 def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
@@ -306,12 +176,9 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
         first = first - (first @ n) * n
         first = first / np.linalg.norm(first)
     along = first @ centred
-    third = float(areas @ along**3) / max(float(areas @ np.abs(along) ** 3), 1e-300)
-    sense = (
-        third
-        if abs(third) > EQUAL
-        else float(along[np.argmax(np.abs(along) > NEAR * contacts.size)])
-    )
+    sense = float(areas @ along**3) / max(float(areas @ np.abs(along) ** 3), 1e-300)
+    if abs(sense) <= EQUAL:
+        sense = float(along[np.argmax(np.abs(along) > NEAR * contacts.size)])
     return np.asarray(first if sense >= 0 else -first)
 
 
@@ -320,9 +187,7 @@ def _rim_direction(contacts: ContactPoints) -> np.ndarray:
     are equally long.
     """
     corners = contacts.cells
-    edges = np.concatenate(
-        [np.stack([corners[i], corners[i - 1]]) for i in range(len(corners))], axis=1
-    )
+    edges = np.concatenate([corners[[i, i - 1]] for i in range(len(corners))], axis=1)
     known, count = np.unique(np.sort(edges, axis=0), axis=1, return_counts=True)
     rim = known[:, count == 1] if np.any(count == 1) else known
     chords = contacts.points[:, rim[1]] - contacts.points[:, rim[0]]
@@ -342,12 +207,10 @@ def _plane(
     places, mirrored = np.stack(axes) @ contacts.points, []
     for axis, row in zip(axes, places):
         across = [p for p in planes if abs(axis @ p.inward) > 1 - NEAR]
-        origin = (
-            across[0].offset * float(np.sign(axis @ across[0].inward))
-            if across
-            else (row.max() + row.min()) / 2
-        )
-        row -= origin
+        if across:
+            row -= across[0].offset * float(np.sign(axis @ across[0].inward))
+        else:
+            row -= (row.max() + row.min()) / 2
         mirrored.append(mirrors and bool(across))
     return places, tuple(mirrored)
 

@@ -27,21 +27,11 @@ COSTS: dict[tuple[int, str], tuple[float, ...]] = {
 
 
 def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
-    """Compute what the cost of a way grows with.
+    """What the cost of a way grows with, (4,) terms, to which COSTS gives the seconds.
 
-    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5
-    operations in the plane and n^2 in space, a dense Q m^3, and products with Q n log2 n or n^(4/3)
-    (nested dissection).
-
-    Parameters
-    ----------
-    way : A name in WAYS.
-    m, n : Number of unknowns on the contact surface, and of all unknowns of the largest body.
-    dim : Dimension of space, 2 or 3.
-
-    Returns
-    -------
-    (4,) terms, to which COSTS gives the seconds.
+    The largest body has n unknowns, m of them on the contact surface. Assembly grows with n, and so
+    does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and n^2 in
+    space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
     """
     factors = n ** (1.5 if dim == 2 else 2.0)
     substitution = n * np.log2(max(n, 2)) if dim == 2 else n ** (4 / 3)
@@ -54,36 +44,13 @@ def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
 
 
 def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
-    """Estimate the time of set-up and solution on one core.
-
-    Parameters
-    ----------
-    way, m, n, dim : As for `terms`.
-    solver : Name of the solver of the bodies with factors.
-
-    Returns
-    -------
-    The time [s].
-    """
+    """Estimated time [s] of set-up and solution on one core, with a solver of bodies by factors."""
     return float(np.dot(COSTS[dim, solver], terms(way, m, n, dim)))
 
 
 def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") -> str:
-    """Choose the cheaper form of Q.
-
-    Bodies without factors would need m solves for an explicit Q, which never pays.
-
-    Parameters
-    ----------
-    m : Number of unknowns on the contact surface of the body that has most of them.
-    n : Number of unknowns of the largest body.
-    dim : Dimension of space, 2 or 3.
-    iterative : Whether a body has no factors.
-    solver : Name of the solver of the bodies with factors.
-
-    Returns
-    -------
-    'explicit' or 'implicit'.
+    """The cheaper form of Q, 'explicit' or 'implicit', as for `terms`. Where a body is `iterative`,
+    without factors, an explicit Q would need m solves, which never pays.
     """
     if iterative or m > MOST_EXPLICIT:
         return "implicit"

@@ -14,15 +14,19 @@ to the kind of the coupling.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import AssembledBody, Surface
-from contactopt.coupling.charts import SymmetryPlane
+from contactopt.bodies.protocol import AssembledBody
+from contactopt.coupling.planes_of_symmetry import (
+    ContactPoints,
+    SymmetryPlane,
+    symmetry_planes,
+)
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law, Place, make_law
@@ -36,10 +40,7 @@ COUPLINGS = {
     "matching": (
         "contactopt.coupling.matching",
         "couple_nodes",
-        (
-            "contacts are the nodes of a body, whose partners on the other body lie on the same"
-            " normals"
-        ),
+        "contacts are nodes of a body, whose partners on the other body lie on the same normals",
     ),
     "mortar": (
         "contactopt.coupling.mortar_surfaces",
@@ -98,12 +99,8 @@ def couple(
 
     Returns
     -------
-    The contacts with their frames, gaps and areas, and the maps from the bodies' displacements to
-    theirs.
-
-    Raises
-    ------
-    InputError : For an unknown kind, and for surfaces that this kind cannot couple.
+    The contacts, and the maps from the bodies' displacements to theirs. InputError for an unknown
+    kind, and for surfaces that this kind cannot couple.
     """
     kind = kind or pair.coupling
     if kind != "auto":
@@ -119,100 +116,70 @@ def couple(
     return _kind("mortar")(scene, pair, upper, lower)
 
 
-def _kind(name: str) -> Callable[[Scene, Contact, AssembledBody, AssembledBody], Coupling]:
+def _kind(name: str) -> Callable[..., Coupling]:
     if name not in COUPLINGS:
         raise InputError(f"unknown coupling {name!r}; choose from auto, {', '.join(COUPLINGS)}.")
     module, function, _ = COUPLINGS[name]
-    made: Callable[[Scene, Contact, AssembledBody, AssembledBody], Coupling] = getattr(
-        import_module(module), function
-    )
-    return made
+    return getattr(import_module(module), function)
 
 
 def law_of(pair: Contact, made: Coupling) -> Law:
-    """Make the law of the contacts of a pair of surfaces.
-
-    Parameters
-    ----------
-    pair : The pair, which names the law and its friction.
-    made : Its contacts.
-
-    Returns
-    -------
-    The law, with one parameter for each contact.
-    """
+    """The law of the contacts of a pair of surfaces, with one parameter for each contact."""
     place = Place(made.areas, made.frames, pair.direction)
     return make_law(pair.law, pair.mu, place, made.positions)
 
 
-def renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Write cells in terms of contacts that were put in another order.
-
-    Parameters
-    ----------
-    cells : (v, c) contacts at the corners of each cell.
-    order : (k,) the old numbers of the contacts in their new order.
-
-    Returns
-    -------
-    (v, c) the same cells in new numbers.
+def of_contacts(
+    kind: str,
+    carrier: str,
+    points: ContactPoints,
+    laid_out: tuple[Chart, np.ndarray, np.ndarray],
+    maps: tuple[sp.csr_matrix, sp.csr_matrix],
+    share: np.ndarray | None = None,
+) -> Coupling:
+    """The coupling at some contacts, from their chart, frames and order, and the maps in this
+    order.
     """
-    place = np.empty(len(order), dtype=int)
-    place[order] = np.arange(len(order))
-    return place[cells]
+    chart, frames, order = laid_out
+    gap, areas, places = points.gap[order], points.areas[order], points.points[:, order]
+    cells = points.cells if chart.cells is None else chart.cells
+    planes = tuple(symmetry_planes(points))
+    share = None if share is None else share[order]
+    return Coupling(*maps, frames, gap, areas, places, chart, cells, planes, kind, carrier, share)
 
 
-def local_map(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
-    """Make the map from a body's unknowns to the displacement of some of its contacts in their
-    frames.
-
-    Parameters
-    ----------
-    surface : The contact surface of the body, which has n unknowns.
-    contacts : (k,) numbers of contacts on this surface.
-    frames : (k, dim, dim) unit vectors n, t1[, t2] of each contact, as rows.
-
-    Returns
-    -------
-    T (k dim, n), with dim rows for each contact, normal first.
-    """
-    k, dim = frames.shape[:2]
-    if all(
-        trace.nnz == trace.shape[0] and np.all(np.diff(trace.indptr) == 1)
-        for trace in surface.traces
-    ):
-        return _from_single_unknowns(surface, contacts, frames)
-    rows, columns = np.arange(k * dim), np.repeat(np.arange(k), dim)
-    parts = [
-        sp.csr_matrix((frames[:, :, c].ravel(), (rows, columns)), (k * dim, k)) @ trace[contacts]
-        for c, trace in enumerate(surface.traces)
-    ]
-    T = sp.csr_matrix(sum(parts[1:], parts[0]))
-    T.eliminate_zeros()
-    return T
-
-
-def _from_single_unknowns(
-    surface: Surface, contacts: np.ndarray, frames: np.ndarray
+def local_map(
+    traces: Sequence[sp.csr_matrix], contacts: np.ndarray, frames: np.ndarray
 ) -> sp.csr_matrix:
-    """local_map of a surface on which every component of a contact is one unknown of the body,
-    times a number.
+    """T (k dim, n) from a body's unknowns to the displacement of contacts in their frames, with dim
+    rows for each contact.
+
+    `traces` has a matrix (m, n) for each component of the displacement of the surface's contacts,
+    `contacts` (k,) are the numbers of some of them, and `frames` (k, dim, dim) hold n, t1[, t2].
     """
     k, dim = frames.shape[:2]
-    unknowns = np.stack([trace.indices[contacts] for trace in surface.traces], axis=1)  # (k, dim)
-    values = np.stack([trace.data[contacts] for trace in surface.traces], axis=1)
-    if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
-        rows, columns = np.nonzero(frames[0])
-        count = np.append(0, np.cumsum(np.tile(np.bincount(rows, minlength=dim), k)))
-        data, indices = (
-            (values[:, columns] * frames[0][rows, columns]).ravel(),
-            unknowns[:, columns].ravel(),
-        )
-    else:
-        used = frames != 0
-        count = np.append(0, np.cumsum(np.count_nonzero(used, axis=2).ravel()))
-        data = (frames * values[:, None, :])[used]
-        indices = np.broadcast_to(unknowns[:, None, :], frames.shape)[used]
-    T = sp.csr_matrix((data, indices, count), (k * dim, surface.traces[0].shape[1]))
-    T.sort_indices()
-    return T
+    shape = k * dim, traces[0].shape[1]
+    if all(np.array_equal(trace.indptr, np.arange(trace.shape[0] + 1)) for trace in traces):
+        # every component of a contact is one unknown of the body, times a number
+        unknowns = np.stack([trace.indices[contacts] for trace in traces], axis=1)
+        values = np.stack([trace.data[contacts] for trace in traces], axis=1)
+        if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
+            row, column = np.nonzero(frames[0])
+            count = np.tile(np.bincount(row, minlength=dim), k)
+            data, columns = values[:, column] * frames[0][row, column], unknowns[:, column]
+        else:
+            used = frames != 0
+            count = np.count_nonzero(used, axis=2)
+            data = (frames * values[:, None])[used]
+            columns = np.broadcast_to(unknowns[:, None], frames.shape)[used]
+        ends = np.append(0, np.cumsum(count))
+        T = sp.csr_matrix((data.ravel(), columns.ravel(), ends), shape)
+        T.sort_indices()
+        return T
+    rows, own = np.arange(k * dim), np.repeat(np.arange(k), dim)
+    T = sp.csr_matrix(shape)
+    for c, trace in enumerate(traces):
+        along = sp.csr_matrix((frames[:, :, c].ravel(), (rows, own)), (k * dim, k))
+        T = T + along @ trace[contacts]
+    T.eliminate_zeros()
+    return sp.csr_matrix(T)

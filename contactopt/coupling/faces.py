@@ -1,5 +1,4 @@
-"""A contact surface as the mortar coupling sees it: faces, the linear cells of its multipliers,
-places on it.
+"""A contact surface as the mortar coupling sees it: faces, linear cells for multipliers, places.
 
 A face is described by the nodes of its displacement; its geometry is interpolated from their
 coordinates with the same shape functions, which is exact for straight and for isoparametric
@@ -63,12 +62,10 @@ class Faces:
 
     @property
     def dim(self) -> int:
-        """Of space."""
         return len(self.points)
 
     @property
     def corners(self) -> int:
-        """Corners of a face."""
         return _SHAPES[self.kind][0]
 
     @property
@@ -79,9 +76,13 @@ class Faces:
     @property
     def cells(self) -> np.ndarray:
         """(c, v) nodes of a face that are the vertices of its linear cells."""
-        return (
-            np.arange(self.corners)[None] if self.degree == 1 else np.asarray(FACES[self.kind][3])
-        )
+        if self.degree == 1:
+            return np.arange(self.corners)[None]
+        return np.asarray(FACES[self.kind][3])
+
+    def cell_nodes(self) -> np.ndarray:
+        """(f c, v) nodes of the body that are the vertices of all linear cells."""
+        return self.faces[:, self.cells].reshape(-1, self.cells.shape[1])
 
     @cached_property
     def curved(self) -> bool:
@@ -102,12 +103,10 @@ class Faces:
         """
         nodes = self.points[:, self.faces]
         size = np.ptp(nodes, axis=2).max(axis=0)
-        skew = (
-            nodes[:, :, 0] - nodes[:, :, 1] + nodes[:, :, 2] - nodes[:, :, 3]
-            if self.corners == 4
-            else 0 * size
-        )
-        return self.curved or bool(np.any(np.abs(skew) > STRAIGHT * size))
+        if self.curved or self.corners < 4:
+            return self.curved
+        skew = nodes[:, :, 0] - nodes[:, :, 1] + nodes[:, :, 2] - nodes[:, :, 3]
+        return bool(np.any(np.abs(skew) > STRAIGHT * size))
 
     def shapes(self, at: np.ndarray) -> np.ndarray:
         """(j, m) shape functions of the displacement at reference coordinates (dim - 1, m)."""
@@ -115,13 +114,9 @@ class Faces:
 
     def local(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Coordinates (dim - 1, m) on linear cells (m,), 0 to 1, of places `at` on the face."""
-        first, last = (
-            self.places[:, self.cells[:, 0]],
-            self.places[:, self.cells[:, [1, -1]]].max(axis=2),
-        )
-        return np.asarray(
-            (at - first[:, cell]) / np.where(last > first, last - first, 1.0)[:, cell]
-        )
+        first = self.places[:, self.cells[:, 0]]
+        width = self.places[:, self.cells[:, [1, -1]]].max(axis=2) - first
+        return np.asarray((at - first[:, cell]) / np.where(width > 0, width, 1.0)[:, cell])
 
     def hats(self, local: np.ndarray) -> np.ndarray:
         """(v, m) hat functions of a linear cell at coordinates (dim - 1, m) on it."""
@@ -139,6 +134,11 @@ class Faces:
             place += x * value
             tangents += x[:, None] * rate
         return place, tangents
+
+    def normals(self, face: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Outward unit normals (dim, m) on faces (m,) at reference coordinates (dim - 1, m)."""
+        normal = cross(self.locations(face, at)[1]) * self.turn[face]
+        return np.asarray(normal / np.linalg.norm(normal, axis=0))
 
     def mirrored(self, vectors: np.ndarray, nodes: np.ndarray | None = None) -> np.ndarray:
         """Vectors (dim, k) at some nodes (k,), or at all, summed up with their mirror images: none
@@ -161,24 +161,19 @@ class Faces:
         Newton's iteration from `start`; a single step is exact on affine faces.
         """
         at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
-        seen = axes.transpose(1, 0, 2)
         for _ in range(STEPS):
             here, tangents = self.locations(face, at)
-            apart = x - here
-            step = _solve(
-                [
-                    [
-                        sum(a * t for a, t in zip(axis.T, tangent))
-                        for tangent in tangents.transpose(1, 0, 2)
-                    ]
-                    for axis in seen
-                ],
-                [sum(a * d for a, d in zip(axis.T, apart)) for axis in seen],
-            )
+            A = [[_along(axes, i, t) for t in tangents.swapaxes(0, 1)] for i in range(len(at))]
+            step = _solve(A, [_along(axes, i, x - here) for i in range(len(at))])
             at = np.clip(at + step, -2.0, 3.0)
-            if np.abs(step).max(initial=0.0) < NEWTON or not (self.distorted):
+            if np.abs(step).max(initial=0.0) < NEWTON or not self.distorted:
                 break
         return at
+
+
+def _along(axes: np.ndarray, number: int, vectors: np.ndarray) -> np.ndarray:
+    """Products (m,) of vectors (dim, m) with one of the axes (m, dim - 1, dim) of each."""
+    return np.asarray(sum(a * v for a, v in zip(axes[:, number].T, vectors)))
 
 
 def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
@@ -190,22 +185,13 @@ def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
 
 
 def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate the shape functions of an element and their derivatives.
-
-    Parameters
-    ----------
-    element : A scikit-fem element with j shape functions.
-    at : (dim - 1, m) reference coordinates.
-
-    Returns
-    -------
-    Values (j, m) and derivatives (j, dim - 1, m).
+    """Shape functions (j, m) of an element and their derivatives (j, dim - 1, m) at reference
+    coordinates (dim - 1, m).
     """
-    values = [element.lbasis(at, j) for j in range(len(element.doflocs))]
-    value = np.stack([np.broadcast_to(v, at.shape[1:]) for v, _ in values])
-    return value, np.stack(
-        [np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values]
-    )
+    both = [element.lbasis(at, j) for j in range(len(element.doflocs))]
+    value = np.stack([np.broadcast_to(v, at.shape[1:]) for v, _ in both])
+    slopes = [np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in both]
+    return value, np.stack(slopes)
 
 
 def faces_of(
@@ -218,51 +204,23 @@ def faces_of(
     points: np.ndarray,
     curve: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Faces:
-    """Collect the faces that make up the surface of a body.
-
-    Parameters
-    ----------
-    name, kind, degree : As in Faces.
-    nodes : (f, j) nodes of every face, as `faces` in Faces.
-    outward : (dim, f) a vector for every face that points out of the body.
-    weight, points, curve : As in Faces.
-
-    Returns
-    -------
-    The surface, with the sign of each face that makes its normal point outward.
+    """The surface of faces whose nodes are `nodes` (f, j), with the sign of each that makes its
+    normal point out of the body, as the vectors `outward` (dim, f) do. The rest is as in Faces.
     """
     made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
     return replace(made, turn=np.sign(np.sum(face_normals(made) * outward, axis=0)))
 
 
 def face_normals(surface: Faces) -> np.ndarray:
-    """Compute the outward unit normals at the middle of every face.
-
-    Parameters
-    ----------
-    surface : A surface of f faces.
-
-    Returns
-    -------
-    (dim, f) normals.
-    """
+    """(dim, f) outward unit normals at the middle of every face."""
     middle = surface.places[:, : surface.corners].mean(axis=1)
     count = len(surface.faces)
-    tangents = surface.locations(np.arange(count), np.repeat(middle[:, None], count, axis=1))[1]
-    normal = cross(tangents) * surface.turn
-    return np.asarray(normal / np.linalg.norm(normal, axis=0))
+    return surface.normals(np.arange(count), np.repeat(middle[:, None], count, axis=1))
 
 
 def cross(tangents: np.ndarray) -> np.ndarray:
-    """Compute normals from tangents: in 3D their cross product, in 2D the tangent turned clockwise.
-
-    Parameters
-    ----------
-    tangents : (dim, dim - 1, m) derivatives of the places by the reference coordinates.
-
-    Returns
-    -------
-    (dim, m) normals, as long as the surface is stretched.
+    """Normals (dim, m), as long as the surface is stretched, from its tangents (dim, dim - 1, m):
+    in 3D their cross product, in 2D the tangent turned clockwise.
     """
     if len(tangents) == 2:
         return np.stack([tangents[1, 0], -tangents[0, 0]])
@@ -270,19 +228,10 @@ def cross(tangents: np.ndarray) -> np.ndarray:
 
 
 def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Choose the polygons that stand for a face when surfaces are cut.
+    """The polygons that stand for a face when surfaces are cut: their vertices (p, v) among its
+    nodes, and the linear cell (p,) in which each lies.
 
-    Those of the side with the multipliers never reach over two of its cells.
-
-    Parameters
-    ----------
-    surface : The surface.
-    own : Whether this side carries the multipliers.
-
-    Returns
-    -------
-    The vertices (p, v) of each polygon among the nodes of a face, and the cell (p,) in which it
-    lies.
+    Those of the side with the multipliers (`own`) never reach over two of its cells.
     """
     if surface.curved and surface.kind == "RefTet":
         return _QUARTERS, np.zeros(4, dtype=int)

@@ -45,19 +45,20 @@ class Facets:
         """Those with the numbers `some`."""
         return Facets(self.centre[:, some], self.radius[some], self.axis[:, some], self.angle[some])
 
+    def spread(self, places: np.ndarray, count: int) -> Facets:
+        """These at some places among `count`, and no numbers between them."""
+        number = np.full(count, -1)
+        number[places] = np.arange(len(places))
+        made = self.take(number)
+        made.radius[number < 0] = np.nan
+        return made
+
 
 def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find all pairs of facets of which the first may see the second along its normals, on either
-    side.
+    """All pairs of facets of which the first may see the second along its normals, on either side.
 
-    Parameters
-    ----------
-    own, other : The facets of the two surfaces.
-    facing : The cosine, at most zero, that the normals of facets which face each other stay below.
-
-    Returns
-    -------
-    The numbers (j,) of the own and of the other facet of each pair, sorted by the own one.
+    The normals of facets which face each other have a cosine below `facing`, at most zero. Returns
+    the numbers (j,) of the own and of the other facet of each pair, sorted by the own one.
     """
     trees = [_tree(facets) for facets in (own, other)]
     first, second = np.zeros(1, dtype=int), np.zeros(1, dtype=int)
@@ -65,10 +66,8 @@ def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray,
     for level in range(max(depths)):
         # Each pair gives way to those of the halves, as long as there are any.
         k, m = (2 if 0 < level < depth else 1 for depth in depths)
-        first, second = (
-            np.repeat(k * first[:, None] + np.arange(k), m, axis=1).ravel(),
-            np.tile(m * second[:, None] + np.arange(m), k).ravel(),
-        )
+        first = np.repeat(k * first[:, None] + np.arange(k), m, axis=1).ravel()
+        second = np.tile(m * second[:, None] + np.arange(m), k).ravel()
         near, far = (levels[min(level, len(levels) - 1)] for levels, _ in trees)
         seen = _seen(near.take(first), far.take(second), facing)
         first, second = first[seen], second[seen]
@@ -103,9 +102,8 @@ def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
         start, cluster = bounds[used], np.repeat(np.arange(len(used)), np.diff(bounds)[used])
         x = facets.centre[:, order]
         low, high = np.minimum.reduceat(x, start, axis=1), np.maximum.reduceat(x, start, axis=1)
-        levels.append(
-            _clusters(facets.take(order), (low + high) / 2, start, cluster, used, 2**level)
-        )
+        made = _clusters(facets.take(order), (low + high) / 2, start, cluster)
+        levels.append(made.spread(used, 2**level))
         widest = x[np.argmax(high - low, axis=0)[cluster], np.arange(n)]
         if level < np.log2(n):
             order = order[np.lexsort((widest, cluster))]
@@ -114,27 +112,14 @@ def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
     return levels, last
 
 
-def _clusters(
-    facets: Facets,
-    centre: np.ndarray,
-    start: np.ndarray,
-    cluster: np.ndarray,
-    used: np.ndarray,
-    count: int,
-) -> Facets:
-    """Balls and cones of clusters of facets in their order, at the numbers `used` among `count`."""
-
-    def placed(values: np.ndarray) -> np.ndarray:
-        full = np.full((*values.shape[:-1], count), np.nan)
-        full[..., used] = values
-        return full
-
+def _clusters(facets: Facets, centre: np.ndarray, start: np.ndarray, cluster: np.ndarray) -> Facets:
+    """Balls and cones of clusters of facets in their order: each begins at `start` and has its
+    `centre`; every facet belongs to a `cluster`.
+    """
     axis = np.add.reduceat(facets.axis, start, axis=1)
     length = np.linalg.norm(axis, axis=0)
     axis = np.where(length > 0, axis, facets.axis[:, start]) / np.where(length > 0, length, 1.0)
     away = np.linalg.norm(facets.centre - centre[:, cluster], axis=0) + facets.radius
-    turn = (
-        np.arccos(np.clip(np.sum(facets.axis * axis[:, cluster], axis=0), -1.0, 1.0)) + facets.angle
-    )
-    radius, angle = (np.maximum.reduceat(values, start) for values in (away, turn))
-    return Facets(placed(centre), placed(radius), placed(axis), placed(angle))
+    turn = np.sum(facets.axis * axis[:, cluster], axis=0).clip(-1.0, 1.0)
+    angle = np.maximum.reduceat(np.arccos(turn) + facets.angle, start)
+    return Facets(centre, np.maximum.reduceat(away, start), axis, angle)

@@ -1,6 +1,4 @@
-"""The rotation of a surface around its contacts, and the levers by which it carries displacements
-(contactopt.coupling.mortar).
-"""
+"""The rotation of a surface about its contacts, which carries displacements along levers."""
 
 from __future__ import annotations
 
@@ -15,21 +13,12 @@ ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 
 
 def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Compute the levers l_i by which displacements are carried: the part of e_i that is no gap,
-    and a share of the
-    gap.
+    """The levers l_i (dim, k) [length] by which displacements are carried: the part of e_i that is
+    no gap, and a share of the gap. They are zero where they would be rounding alone.
 
-    Parameters
-    ----------
-    e : (dim, k) vectors from where forces act on the other side to where they act on the own side
-        [length].
-    up : (dim, k) unit normals along which e opens the gap.
-    gap : (k,) initial gap [length].
-    sizes : (k,) sizes of the contacts' cells [length].
-
-    Returns
-    -------
-    (dim, k) levers [length]; zero where they would be rounding alone.
+    The vectors e (dim, k) lead from where forces act on the other side to where they act on the own
+    one, the unit normals `up` (dim, k) are those along which e opens the gap (k,), and `sizes` (k,)
+    are those of the contacts' cells.
     """
     limit = SHARE * sizes
     lever = e - up * (gap - np.clip(gap, -limit, limit))
@@ -38,22 +27,12 @@ def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) ->
 
 
 def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
-    """Make the matrices from the displacements of a surface to omega_i x l_i at its contacts.
+    """Matrices [c][d] (k, n) from the component d of the displacement of a surface of n points to
+    the component c of omega_i x l_i at the contacts, which are its points `nodes` (k,).
 
     omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas
     of the faces. In a plane of symmetry, where the mirror images of these faces count as well, it
     turns about the normal of the plane alone.
-
-    Parameters
-    ----------
-    lever : (dim, k) levers l_i [length].
-    own : The surface, with n points.
-    nodes : (k,) its points that are contacts.
-
-    Returns
-    -------
-    Matrices [c][d] (k, n) from the component d of the displacement to the component c of the
-    product.
     """
     # Weight of node j around contact i: the sizes of the faces that hold both, summed.
     f, size = len(own.faces), own.points.shape[1]
@@ -84,33 +63,27 @@ def _rotations(
     i, j, weight = w.row[active], w.col[active], w.data[active]
     # rho_j, the places of the nodes from their weighted mean.
     total = np.bincount(i, weight, k)
-    centre = np.stack([np.bincount(i, weight * x[j], k) for x in points]) / np.where(
-        total > 0, total, 1.0
-    )
-    rho = points[:, j] - centre[:, i]
-    # The matrices rho_j x of the cross products, in space also for plane scenes.
-    cross3 = np.zeros((len(i), 3, 3))  # rho x
-    full = np.zeros((3, len(i)))
-    full[:dim] = rho
-    cross3[:, 0, 1], cross3[:, 0, 2], cross3[:, 1, 2] = -full[2], full[1], -full[0]
-    cross3 -= cross3.transpose(0, 2, 1)
+    centre = np.stack([np.bincount(i, weight * x[j], k) for x in points])
+    rho = points[:, j] - (centre / np.where(total > 0, total, 1.0))[:, i]
+    rho_x = _crossing(rho)
     # J = sum_j w_j (rho_j^2 - rho_j rho_j') is the sum of -w_j (rho_j x)^2; axes that do not turn
     # are left out.
-    moments = -np.einsum("g,gab,gbc->gac", weight, cross3, cross3)
-    J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(
-        k, 3, 3
-    )
+    moments = -np.einsum("g,gab,gbc->gac", weight, rho_x, rho_x).reshape(len(i), 9)
+    J = np.stack([np.bincount(i, m, k) for m in moments.T], axis=1).reshape(k, 3, 3)
     J = np.where(about.T[:, :, None] & about.T[:, None, :], J, 0.0)
     inverse = np.linalg.pinv(J, rcond=1e-10, hermitian=True)
     # omega x l = -l x omega with omega = J^-1 sum_j w_j rho_j x u_j: the product of four factors
     # for every node.
-    arm = np.zeros((k, 3, 3))  # -(lever x) = x lever
-    tall = np.zeros((3, k))
-    tall[:dim] = lever
-    arm[:, 0, 1], arm[:, 0, 2], arm[:, 1, 2] = tall[2], -tall[1], tall[0]
-    arm -= arm.transpose(0, 2, 1)
-    values = np.einsum("gab,gbc,gcd,g->gad", arm[i], inverse[i], cross3, weight)
+    values = -np.einsum("gab,gbc,gcd,g->gad", _crossing(lever)[i], inverse[i], rho_x, weight)
     return [
         [sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)]
         for c in range(dim)
     ]
+
+
+def _crossing(vectors: np.ndarray) -> np.ndarray:
+    """Matrices (m, 3, 3) of the cross product v x with vectors (dim, m)."""
+    x, y, z = np.pad(vectors, ((0, 3 - len(vectors)), (0, 0)))
+    zero = 0 * x
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.array(rows).transpose(2, 0, 1)

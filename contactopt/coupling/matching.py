@@ -1,15 +1,17 @@
-"""The coupling of bodies whose contact nodes match: every contact of one body has its partner on
-the other.
-"""
+"""The coupling of bodies whose contact nodes match: each has its partner on the other body."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.bodies.protocol import AssembledBody, Surface
-from contactopt.coupling.charts import ContactPoints, lay_out, normals_in_planes, symmetry_planes
-from contactopt.coupling.coupling import Coupling, local_map, renumbered
+from contactopt.coupling.charts import lay_out
+from contactopt.coupling.coupling import Coupling, local_map, of_contacts
+from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
@@ -38,60 +40,34 @@ def couple_nodes(
 
     Parameters
     ----------
-    scene : The kind of the scene and its law.
-    pair : The pair of surfaces.
+    scene, pair : The kind of the scene, and the pair of surfaces.
     upper, lower : The two bodies, of which at least one has a mesh.
 
     Returns
     -------
-    One contact for each pair of nodes.
-
-    Raises
-    ------
-    InputError : If the contact nodes of two bodies do not match.
+    One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
     names = pair.surfaces
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
-        partner = _match(first, second)
-        held = first.held[:, partner] & second.held
-        normals = normals_in_planes(
-            ContactPoints(
-                second.points, second.normals, second.areas, second.cells, held, 0 * second.areas
-            )
-        )
-        apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
-        gap = np.sum(normals * apart.T, axis=0)
-        lead = second
+        lead, partner = second, _match(first, second)
+        normals, gap = lead.normals, 0 * lead.areas
     else:
         lead = upper.surface(names[0]) if upper.meshed else lower.surface(names[1])
         follower, outward = (lower, -lead.normals) if upper.meshed else (upper, lead.normals)
         other, gap = follower.facing(lead, outward)
         first, second = (lead, other) if upper.meshed else (other, lead)
         partner, normals = np.arange(len(gap)), other.normals
-    carrier = "lower" if lower.meshed else "upper"
     held = first.held[:, partner] & second.held
     points = ContactPoints(lead.points, normals, lead.areas, lead.cells, held, gap)
-    chart, frames, order = _laid_out(scene, lead, points)
-    upper_map, lower_map = (
-        local_map(first, partner[order], frames),
-        local_map(second, order, frames),
-    )
-    cells = renumbered(lead.cells, order)
-    areas, places, planes = lead.areas[order], lead.points[:, order], tuple(symmetry_planes(points))
-    return Coupling(
-        upper_map,
-        lower_map,
-        frames,
-        gap[order],
-        areas,
-        places,
-        chart,
-        cells,
-        planes,
-        "matching",
-        carrier,
-    )
+    if upper.meshed and lower.meshed:
+        normals = normals_in_planes(points)
+        apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
+        points = replace(points, normals=normals, gap=np.sum(normals * apart.T, axis=0))
+    _, frames, order = laid_out = _laid_out(scene, lead, points)
+    theirs = local_map(first.traces, partner[order], frames)
+    maps = theirs, local_map(second.traces, order, frames)
+    return of_contacts("matching", "lower" if lower.meshed else "upper", points, laid_out, maps)
 
 
 def _laid_out(
@@ -100,21 +76,14 @@ def _laid_out(
     """Chart, frames and order of the contacts: those of a surface that knows its coordinates, or
     else laid out.
     """
-    known, normals = lead.chart, points.normals
-    if (
-        known is not None
-        and np.all(np.abs(normals) == np.abs(lead.normals))
-        and np.all(normals == normals[:, :1])
-    ):
-        # n, t1 and t2 along the last, first and second component
-        frame = np.roll(np.eye(len(normals)), 1, axis=0)
-        frame[0] = normals[:, 0]
-        return (
-            known,
-            np.broadcast_to(frame, (len(points.gap), *frame.shape)),
-            np.arange(len(points.gap)),
-        )
-    return lay_out(points, scene.copies, scene.kind == "axisymmetric")
+    n = points.normals
+    along = np.all(np.abs(n) == np.abs(lead.normals)) and np.all(n == n[:, :1])
+    if lead.chart is None or not along:
+        return lay_out(points, scene.copies, scene.kind == "axisymmetric")
+    frame = np.roll(np.eye(len(n)), 1, axis=0)  # n, t1, t2 along the last, first, second component
+    frame[0] = n[:, 0]
+    k = len(points.gap)
+    return lead.chart, np.broadcast_to(frame, (k, *frame.shape)), np.arange(k)
 
 
 def _match(upper: Surface, lower: Surface) -> np.ndarray:
@@ -122,11 +91,7 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
 
     Partners lie on one normal of the lower surface. If this finds no partners and the lower surface
     nowhere turns away from its mean normal, partners on a common parallel to the mean normal are
-    accepted as well.
-
-    Raises
-    ------
-    InputError : If there are no such partners, or if the numbers of contacts differ.
+    accepted as well. InputError if there are none, or if the numbers of contacts differ.
     """
     k = lower.points.shape[1]
     if upper.points.shape[1] != k:
@@ -136,9 +101,9 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
         )
     if np.array_equal(upper.points, lower.points):
         return np.arange(k)
-    spacing = (
-        float(KDTree(lower.points.T).query(lower.points.T, k=2)[0][:, 1].min()) if k > 1 else 1.0
-    )
+    spacing = 1.0
+    if k > 1:
+        spacing = float(KDTree(lower.points.T).query(lower.points.T, k=2)[0][:, 1].min())
     mean = lower.normals @ lower.areas
     mean = mean / max(float(np.linalg.norm(mean)), 1e-300)
     turn = _turn(lower)
@@ -166,12 +131,10 @@ def _turn(surface: Surface) -> np.ndarray:
     one facet to the next, at its rim, where there is one facet only, by half of the facet's own
     turn.
     """
-    turn, (normals, cells) = np.zeros(surface.points.shape[1]), (surface.normals, surface.cells)
-    for corner in cells:
-        for other in cells:
-            np.maximum.at(
-                turn, corner, np.linalg.norm(normals[:, corner] - normals[:, other], axis=0)
-            )
+    turn, normals = np.zeros(surface.points.shape[1]), surface.normals
+    for corner, other in permutations(surface.cells, 2):
+        apart = np.linalg.norm(normals[:, corner] - normals[:, other], axis=0)
+        np.maximum.at(turn, corner, apart)
     return np.where(turn > 1e-12, 2 * turn, 0.0)
 
 
@@ -189,11 +152,9 @@ def _along(
     """
     count = lower.points.shape[1]
     tree, height = KDTree(upper.points.T), np.zeros(count)
-    found = np.full(count, -1)
+    found, ranks = np.full(count, -1), np.arange(1, min(NEAREST, count) + 1)
     for _ in range(STEPS):
-        near = tree.query(
-            (lower.points + height * direction).T, k=np.arange(1, min(NEAREST, count) + 1)
-        )[1]
+        near = tree.query((lower.points + height * direction).T, k=ranks)[1]
         facing = np.einsum("di,dij->ij", lower.normals, upper.normals[:, near]) < 0
         before, found = found, near[np.arange(count), np.argmax(facing, axis=1)]
         height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)

@@ -16,7 +16,7 @@ psi_i / a_i of a field is the value at contact i of its best linear fit on the c
 
 * Rows of W and of W' add up to one, so that forces are equal and opposite.
 * The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides
-  exactly the integral of its shape function: the patch test. It holds on partly covered faces too.
+  exactly the integral of its shape function: the patch test, on partly covered faces too.
 * A cell that is partly covered is cut down to the smallest similar cell around G, with hat
   functions of its own: a contact outside the other surface moves to its edge, where the force acts.
   Continued to the node, the normals and the gap of a steep side mean nothing. Contacts without any
@@ -25,22 +25,21 @@ psi_i / a_i of a field is the value at contact i of its best linear fit on the c
 
 **Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these
 places is zero where the surfaces lie on each other, but not where both are polygons inscribed in
-one curve; the moment of interface forces is the sum of e_i x r_i. It has a part that belongs to the
-geometry: a gap g_i closes along the normal before forces arise, so that e_i - g_i n_i is the lever
-that remains in contact. This rest is removed by evaluating the displacement of the own side at the
-other end of the lever, as a rotating surface carries it there:
+one curve; the moment of interface forces is the sum of e_i x r_i. A gap g_i closes along the normal
+before forces arise, so that e_i - g_i n_i is the lever that remains in contact. It is removed by
+evaluating the displacement of the own side at its other end, as a rotating surface carries it
+there,
 
-    u_i = W u - W' u' - omega_i(u) x l_i,      omega_i(u) = J^-1 sum_j w_j rho_j x u_j,   J = sum_j
-                                               w_j (rho_j^2 - rho_j rho_j'),
+    u_i = W u - W' u' - omega_i(u) x l_i,
+    omega_i(u) = J^-1 sum_j w_j rho_j x u_j,   J = sum_j w_j (rho_j^2 - rho_j rho_j'),
 
 with omega_i the mean rotation of the nodes of the faces around contact i, rho_j their places from
 their centre, w_j the areas of the faces. It is exact for rigid motions, so that these give u = 0 at
-l_i = e_i, and by transposition forces on both bodies have no resultant moment. Since the lever is
-of second order in the size of the faces, so is what it changes. l_i also contains the gap itself,
-but at most an eighth of the size of a face (levers.SHARE): an arc deviates from a chord as long as
-its radius by about that much, so that polygons are in equilibrium whether their curve is known or
-not, and the rest of a larger gap is left to the geometry. In an axisymmetric scene moments vanish
-by symmetry, and no lever is needed.
+l_i = e_i, and by transposition forces on both bodies have no resultant moment. The lever, and what
+it changes, is of second order in the size of the faces. l_i also contains the gap itself, but at
+most an eighth of the size of a face (levers.SHARE), by about which an arc as long as its radius
+deviates from a chord: polygons are in equilibrium whether their curve is known or not, and the rest
+of a larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry.
 
 **Kinks of linear elements.** With linear elements on the other side, W' has a further term, which
 rounds off the kinks of its displacement (contactopt.coupling.rounded_kinks): otherwise finer
@@ -78,9 +77,9 @@ from scipy.spatial import KDTree
 from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES, weight_at
-from contactopt.coupling.dual import collect, integrate, tidy
 from contactopt.coupling.faces import Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
+from contactopt.coupling.mortar_matrices import collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
 from contactopt.errors import InputError
 
@@ -124,13 +123,9 @@ class Mortar:
 
     def components(self, body: int, held: np.ndarray) -> list[list[sp.csr_matrix]]:
         """Matrices [c][d] (k, nodes): what displacements d of the nodes of a body contribute to
-        component c of the contacts.
+        component c of the contacts, of the upper body, 0, or the lower one, 1.
 
-        The relative displacement is that of the upper body, 0, less that of the lower one, 1.
-
-        Parameters
-        ----------
-        held  (dim, k) the components that supports hold at the contacts' nodes on the own body
+        At the contacts' nodes on the own body supports hold the components `held` (dim, k).
         """
         dim = len(self.lever)
         W, alone = self.weights[body], self.alone[body]
@@ -144,21 +139,11 @@ class Mortar:
 
 
 def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
-    """Find the contacts between two surfaces.
+    """Find the contacts between two surfaces, with areas, normals and gaps, and the weights of the
+    displacements of both sides.
 
-    Parameters
-    ----------
-    upper, lower : The two surfaces.
-    own : 'upper' or 'lower': the body that carries the contacts; by default the one with more
-        contacts where they face each other.
-
-    Returns
-    -------
-    The contacts with areas, normals and gaps, and the weights of the displacements of both sides.
-
-    Raises
-    ------
-    InputError : If the surfaces face each other nowhere, or `own` has another value.
+    `own`, 'upper' or 'lower', is the body that carries the contacts; by default the one with more
+    contacts where they face each other. InputError if the surfaces face each other nowhere.
     """
     if own not in (None, "upper", "lower"):
         raise InputError(
@@ -170,51 +155,43 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     # Where the surfaces face each other, along the normals of the side that carries the contacts.
     normals, sizes, full = contact_normals(mine)
     points = overlap(mine, theirs, normals)
-    if own is None and _contacts(theirs, points.face) > _contacts(
-        mine, points.cell // len(mine.cells)
-    ):
+    here = _contacts(mine, points.cell // len(mine.cells))
+    if own is None and _contacts(theirs, points.face) > here:
         return mortar(upper, lower, "upper")
-    sign = 1.0 if first == 1 else -1.0  # normals leave the lower body
     if not len(points.cell):
         raise InputError(
             f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other"
             " nowhere; check the boundaries' names, the bodies' positions, and which of them is"
             " the upper one."
         )
-    # Integrals of the dual functions: areas a_i, weights W and W', and the mean vector x - x'
-    # between the sides.
     sums = integrate(mine, theirs, points, full)
+    nodes = sums.nodes
     # Normals are always those of the lower body: its own at its nodes, or as they are seen from the
     # contacts.
-    n = normals[:, sums.nodes] if first == 1 else _seen(theirs, sums.other)
-    n = mine.mirrored(n, sums.nodes)
+    n = mine.mirrored(normals[:, nodes] if first == 1 else _seen(theirs, sums.other), nodes)
     n = n / np.linalg.norm(n, axis=0)
+    up = -n if first == 1 else n  # along which x - x' opens the gap
     # The gap is the part of the mean vector along the normal, positive where the bodies are apart.
-    gap = -sign * np.sum(n * mine.mirrored(sums.apart, sums.nodes), axis=0)
+    gap = np.sum(up * mine.mirrored(sums.apart, nodes), axis=0)
     lever = np.zeros_like(n)
     if not mine.weight[1]:
         # e_i = W x - W' x', the vector between the places where the two forces of a contact act,
         # and its lever.
         e = sums.own @ mine.points.T - sums.other @ theirs.points.T
-        lever = levers(mine.mirrored(e.T, sums.nodes), -sign * n, gap, sizes[sums.nodes])
-    carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
-    x = mine.points[:, sums.nodes]
-    fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, sums.nodes]
+        lever = levers(mine.mirrored(e.T, nodes), up, gap, sizes[nodes])
+    carried = rotations_times(lever, mine, nodes) if np.any(lever) else []
+    x = mine.points[:, nodes]
+    fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, nodes]
     x = np.where(fixed, x, (sums.own @ mine.points.T).T)
     if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
         where = ", ".join(f"{c:.4g}" for c in sums.nearest)
-        _log.warning(
-            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)",
-            upper.name,
-            lower.name,
-            -sums.least,
-            where,
-        )
-    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes, normals)
+        said = "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)"
+        _log.warning(said, upper.name, lower.name, -sums.least, where)
+    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, nodes, normals)
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
-    share = sums.areas / full[sums.nodes]
-    return Mortar(first, sums.nodes, sums.areas, n, gap, x, share, weights, alone, lever, carried)
+    share = sums.areas / full[nodes]
+    return Mortar(first, nodes, sums.areas, n, gap, x, share, weights, alone, lever, carried)
 
 
 def _seen(other: Faces, weights: sp.csr_matrix) -> np.ndarray:
@@ -236,17 +213,9 @@ def _contacts(surface: Faces, faces: np.ndarray) -> int:
 
 
 def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the outward normals at contact nodes from the linear fits on all cells around them,
-    the sizes of these cells, and the integrals of the hat functions over them.
-
-    Parameters
-    ----------
-    surface : A surface of n points.
-
-    Returns
-    -------
-    Unit normals (dim, n), sizes (n,) [length] and integrals (n,), with the surface's weight. All
-    are zero at points that are no contact nodes.
+    """Outward unit normals (dim, n) at contact nodes from the linear fits on all cells around them,
+    the sizes (n,) of these cells [length], and the integrals (n,) of the hat functions over them,
+    with the surface's weight. All are zero at points that are no contact nodes.
     """
     n, count = surface.points.shape[1], len(surface.faces)
     total, area, full = np.zeros(surface.points.shape), np.zeros(n), np.zeros(n)
@@ -262,9 +231,8 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         normal = cross(tangents) * surface.turn[face]
         split = normal.reshape(len(normal), count, -1)
         length = np.linalg.norm(split, axis=0)
-        weighted = length * np.broadcast_to(weight_at(surface.weight, x), len(face)).reshape(
-            length.shape
-        )
+        weight = np.broadcast_to(weight_at(surface.weight, x), len(face))
+        weighted = length * weight.reshape(length.shape)
         for v, corner in enumerate(cell):
             node = surface.faces[:, corner]
             area += np.bincount(node, length @ (phi[v] * share), n)
@@ -272,9 +240,8 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
             for d in range(len(total)):
                 total[d] += np.bincount(node, split[d] @ (dual[v] * share), n)
     total = surface.mirrored(total)
-    normals = np.divide(
-        total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total)
-    )
+    long = np.linalg.norm(total, axis=0)
+    normals = np.divide(total, long, where=area > 0, out=np.zeros_like(total))
     return normals, area ** (1 / (surface.dim - 1)), full
 
 
@@ -294,11 +261,6 @@ def _alone(
     there = np.clip(there, 0.0, 1.0)
     if other.corners == 3:
         there /= np.maximum(there.sum(axis=0), 1.0)
-    N = other.shapes(there)
-    theirs = collect(
-        N.T[:, None, :],
-        np.arange(k)[:, None],
-        other.faces[points.face[near]],
-        (k, other.points.shape[1]),
-    )
+    N, row = other.shapes(there).T[:, None], np.arange(k)[:, None]
+    theirs = collect(N, row, other.faces[points.face[near]], (k, other.points.shape[1]))
     return mine, tidy(theirs)

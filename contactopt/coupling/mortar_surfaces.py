@@ -1,6 +1,4 @@
-"""The coupling of bodies whose contact nodes do not match: contacts on one side, integrals over the
-overlap of both.
-"""
+"""The mortar coupling of bodies whose contact nodes do not match, from faces to the maps T."""
 
 from __future__ import annotations
 
@@ -11,10 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
-from contactopt.coupling.charts import NEAR, ContactPoints, lay_out, symmetry_planes
-from contactopt.coupling.coupling import Coupling, renumbered
+from contactopt.coupling.charts import lay_out
+from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
-from contactopt.coupling.mortar import Mortar, contact_normals, mortar
+from contactopt.coupling.mortar import contact_normals, mortar
+from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
 from contactopt.errors import InputError
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.scene import Scene
@@ -33,50 +32,44 @@ def couple_surfaces(
 
     Parameters
     ----------
-    scene : The kind of the scene and its law.
-    pair : The pair of surfaces.
-    upper, lower : The two bodies, both with a mesh.
+    scene, pair : The kind of the scene, and the pair of surfaces.
+    upper, lower : The two bodies.
 
     Returns
     -------
-    One contact for each node of that body that faces the other one.
-
-    Raises
-    ------
-    InputError : If a body has no mesh on its contact surface, or if the surfaces face each other
-        nowhere.
+    One contact for each node of the carrier that faces the other side. InputError if a body has no
+    mesh on its contact surface, or if the surfaces face each other nowhere.
     """
-    meshes = [_mesh(body.surface(name)) for body, name in zip((upper, lower), pair.surfaces)]
-    # The contacts, with their weights on both sides.
-    sides = _halved([_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)], meshes)
+    bodies = upper, lower
+    meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
+    sides = _halved([_faces(body.name, mesh) for body, mesh in zip(bodies, meshes)], meshes)
     m = mortar(sides[0], sides[1], pair.carrier)
-    mine, theirs = meshes[m.own], meshes[1 - m.own]
-    # A component is held at a contact where supports hold it on both sides.
+    carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
+    # A component is held at a contact where supports hold it on both sides; the other side is held
+    # as well where a plane of symmetry of both cuts it.
     own_held = mine.held[mine.unknowns[:, m.nodes]]
     other_held = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
-    mirror = sides[m.own].mirror
-    # the other side is held as well where a plane of symmetry of both cuts it
-    if mirror is not None:
-        other_held |= mirror[:, m.nodes]
-    cells = _cells(sides[m.own], m.nodes)
-    # Chart and frames, and the maps T from the displacements of both bodies in the order of the
-    # chart.
+    if carrier.mirror is not None:
+        other_held |= carrier.mirror[:, m.nodes]
+    number = np.full(carrier.points.shape[1], -1)
+    number[m.nodes] = np.arange(len(m.nodes))
+    cells = number[carrier.cell_nodes()]
+    cells = cells[np.all(cells >= 0, axis=1)].T  # those whose corners all carry contacts
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
-    chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
-    maps = [_map(m, i, mesh, own_held, frames, order) for i, mesh in enumerate(meshes)]
-    areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
-    cells, carrier = renumbered(cells, order), SIDES[m.own]
-    log.info(
-        "contact '%s': mortar, %d contacts on the %s body '%s'",
-        pair.name,
-        len(order),
-        carrier,
-        sides[m.own].name,
-    )
-    gap, share = m.gap[order], m.share[order]
-    return Coupling(
-        maps[0], maps[1], frames, gap, areas, places, chart, cells, planes, "mortar", carrier, share
-    )
+    laid_out = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
+    _, frames, order = laid_out
+    maps = []
+    for i, mesh in enumerate(meshes):
+        unknowns = [_picked(row, len(mesh.held)) for row in mesh.unknowns]
+        traces = [
+            sp.csr_matrix(sum(part @ picked for part, picked in zip(row, unknowns)))
+            for row in m.components(i, own_held)
+        ]
+        maps.append(local_map(traces, order, frames))
+    side = SIDES[m.own]
+    said = "contact '%s': mortar, %d contacts on the %s body '%s'"
+    log.info(said, pair.name, len(order), side, carrier.name)
+    return of_contacts("mortar", side, contacts, laid_out, (maps[0], maps[1]), m.share)
 
 
 def _mesh(surface: Surface) -> Mesh:
@@ -88,17 +81,14 @@ def _mesh(surface: Surface) -> Mesh:
     return surface.mesh
 
 
-def _faces(name: str, mesh: Mesh) -> Faces:
-    return faces_of(
-        name,
-        mesh.kind,
-        mesh.degree,
-        mesh.faces,
-        mesh.outward,
-        mesh.measure,
-        mesh.locations,
-        mesh.curve,
-    )
+def _faces(name: str, m: Mesh) -> Faces:
+    return faces_of(name, m.kind, m.degree, m.faces, m.outward, m.measure, m.locations, m.curve)
+
+
+def _picked(unknowns: np.ndarray, n: int) -> sp.csr_matrix:
+    """The matrix (nodes, n) that picks one component of the displacement of the nodes."""
+    k = len(unknowns)
+    return sp.csr_matrix((np.ones(k), unknowns, np.arange(k + 1)), (k, n))
 
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
@@ -108,10 +98,8 @@ def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
     common = [
         plane
         for plane in planes[0]
-        if any(
-            np.all(plane.inward == p.inward) and abs(plane.offset - p.offset) <= NEAR * size
-            for p in planes[1]
-        )
+        for other in planes[1]
+        if np.all(plane.inward == other.inward) and abs(plane.offset - other.offset) <= NEAR * size
     ]
     if not common:
         return sides
@@ -126,44 +114,9 @@ def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
 
 def _vertices(side: Faces, mesh: Mesh) -> ContactPoints:
     """All vertices of the linear cells of a surface, as candidates for contacts."""
-    nodes, cells = np.unique(
-        side.faces[:, side.cells].reshape(-1, side.cells.shape[1]), return_inverse=True
-    )
+    corners = side.cell_nodes()
+    nodes, cells = np.unique(corners, return_inverse=True)
     held, none = mesh.held[mesh.unknowns[:, nodes]], np.zeros(len(nodes))
     normals = contact_normals(side)[0][:, nodes]
-    return ContactPoints(
-        side.points[:, nodes], normals, none, cells.reshape(-1, side.cells.shape[1]).T, held, none
-    )
-
-
-def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
-    """(v, c) contacts at the corners of the cells whose corners all carry contacts."""
-    number = np.full(side.points.shape[1], -1)
-    number[nodes] = np.arange(len(nodes))
-    cells = number[side.faces[:, side.cells].reshape(-1, side.cells.shape[1])]
-    return np.asarray(cells[np.all(cells >= 0, axis=1)].T)
-
-
-def _map(
-    m: Mortar, body: int, mesh: Mesh, held: np.ndarray, frames: np.ndarray, order: np.ndarray
-) -> sp.csr_matrix:
-    """T (k dim, n): the body's unknowns -> its part of the displacement of the contacts, in the
-    frames and their order.
-    """
-    k, dim = frames.shape[:2]
-    place = np.empty(k, dtype=int)
-    place[order] = np.arange(k)
-    rows, columns, values = [], [], []
-    for c, row in enumerate(m.components(body, held)):
-        for unknowns, part in zip(mesh.unknowns, row):
-            if not part.nnz:
-                continue
-            entries = sp.coo_matrix(part)
-            contact = place[entries.row]
-            rows.append((contact[:, None] * dim + np.arange(dim)).ravel())
-            columns.append(np.repeat(unknowns[entries.col], dim))
-            values.append((frames[contact, :, c] * entries.data[:, None]).ravel())
-    index = np.concatenate(rows), np.concatenate(columns)
-    T = sp.csr_matrix((np.concatenate(values), index), (k * dim, len(mesh.held)))
-    T.eliminate_zeros()
-    return T
+    cells = cells.reshape(corners.shape).T
+    return ContactPoints(side.points[:, nodes], normals, none, cells, held, none)

@@ -1,67 +1,133 @@
-"""The planes of symmetry beyond which mirror images make the bodies of a scene whole."""
+"""Planes of symmetry that cut a contact surface, or mirror the bodies of a scene to whole ones."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from contactopt.bodies.protocol import Guides
-from contactopt.coupling.charts import SymmetryPlane
-from contactopt.coupling.coupling import Coupling
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
-NEAR = 1e-9  # what counts as zero beside the extent of all bodies
+NEAR = 1e-9  # what counts as zero beside the size of a surface or of all bodies, or beside one
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """What charts and planes of symmetry are found from: k contacts of the body that carries them.
+
+    points   (dim, k) positions [length]
+    normals  (dim, k) contact normals
+    areas    (k,) nodal areas
+    cells    (v, c) contacts at the corners of the cells of the surface
+    held     (dim, k) whether both bodies are held there in that component
+    gap      (k,) initial gap: where a chart could start at several places it starts where the gap
+             is least
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+    cells: np.ndarray
+    held: np.ndarray
+    gap: np.ndarray
+
+    @property
+    def size(self) -> float:
+        """Largest extent [length]; 1 for a single point."""
+        return float(np.ptp(self.points, axis=1).max(initial=0.0)) or 1.0
+
+
+@dataclass(frozen=True)
+class SymmetryPlane:
+    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the
+    contacts.
+    """
+
+    inward: np.ndarray
+    offset: float
+
+    def contains(self, points: np.ndarray, size: float) -> np.ndarray:
+        """Tell which points lie in the plane.
+
+        Parameters
+        ----------
+        points, size : Points (dim, k), and the size of the surface that they belong to [length].
+
+        Returns
+        -------
+        (k,) mask.
+        """
+        return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
+
+
+def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
+    """The planes across one component, at most one for each, on which exactly the tangential
+    displacement along it is held.
+    """
+    planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
+    for c, mask in enumerate(held):
+        if not mask.any():
+            continue
+        offset = float(points[c, mask].mean())
+        plane = np.abs(points[c] - offset) <= NEAR * contacts.size
+        side = np.sign(points[c, ~plane] - offset)
+        tangential = np.all(np.abs(normals[c, plane]) < 0.5)
+        # along the normal, at least
+        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)
+        if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
+            planes.append(SymmetryPlane(side[0] * np.eye(len(points))[c], offset * side[0]))
+    return planes
+
+
+def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
+    """Unit normals (dim, k) that lie in the planes of symmetry at their contacts: the mean over the
+    facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
+    """
+    normals = contacts.normals
+    for plane in symmetry_planes(contacts):
+        out = plane.inward @ normals
+        straight = normals - plane.inward[:, None] * out
+        straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
+        tilted = plane.contains(contacts.points, contacts.size) & (np.abs(out) > NEAR)
+        normals = np.where(tilted, straight, normals)
+    return normals
 
 
 def mirror_planes(
-    scene: Scene, guides: Sequence[Guides], couplings: Sequence[Coupling]
+    scene: Scene, guides: Sequence[Guides], cutting: Sequence[SymmetryPlane]
 ) -> tuple[SymmetryPlane, ...]:
-    """Find the planes of symmetry of a scene whose bodies are parts of the whole ones.
+    """Find the planes of symmetry, one for each direction, of a scene with two copies or more,
+    whose bodies are parts of the whole ones.
 
-    These are the planes that cut a contact surface, those of the axes that the scene names, and
+    These are the planes `cutting` a contact surface, those of the axes that the scene names, and
     those on which supports guide a body and which have all bodies on one side, unless there are
-    more of these than the copies ask for.
-
-    Parameters
-    ----------
-    scene : The scene, with two copies or more.
-    guides : Of each of its bodies.
-    couplings : Of each of its pairs.
-
-    Returns
-    -------
-    The planes, one for each direction.
-
-    Raises
-    ------
-    InputError : If the scene names an axis across which no such plane lies.
+    more of these than the copies ask for. InputError if the scene names an axis across which no
+    such plane lies.
     """
     found: list[SymmetryPlane] = []
-    for plane in (plane for made in couplings for plane in made.planes):
+    for plane in cutting:
         if not any(abs(plane.inward @ other.inward) > 0.5 for other in found):
             found.append(plane)
-    spare = {
-        axis: plane
-        for axis, plane in _guiding(guides, scene.dim).items()
-        if not any(abs(other.inward[axis]) > 0.5 for other in found)
-    }
+
+    def across(axis: int) -> bool:
+        return any(abs(plane.inward[axis]) > 0.5 for plane in found)
+
+    spare = {a: p for a, p in _guiding(guides, scene.dim).items() if not across(a)}
     for name in scene.mirror or "":
         axis = scene.components.index(name)
         if axis in spare:
             found.append(spare.pop(axis))
-        elif not any(abs(plane.inward[axis]) > 0.5 for plane in found):
+        elif not across(axis):
             raise InputError(
                 f"scene '{scene.name}': mirror = {scene.mirror!r}, but no support holds {name}"
                 " alone at zero in a plane that has all bodies on one side; add a Support on the"
                 " plane of symmetry."
             )
-    return (
-        (*found, *spare.values())
-        if 2 ** (len(found) + len(spare)) <= scene.copies
-        else tuple(found)
-    )
+    every = (*found, *spare.values())
+    return every if 2 ** len(every) <= scene.copies else tuple(found)
 
 
 def _guiding(guides: Sequence[Guides], dim: int) -> dict[int, SymmetryPlane]:
@@ -69,9 +135,8 @@ def _guiding(guides: Sequence[Guides], dim: int) -> dict[int, SymmetryPlane]:
     extent = np.concatenate([own.extent for own in guides], axis=1)
     near = NEAR * float(np.ptp(extent, axis=1).max(initial=0.0))
     planes = {}
-    for axis, place, side in sorted(
-        {plane for own in guides for plane in own.planes}, reverse=True
-    ):
+    known = {plane for own in guides for plane in own.planes}
+    for axis, place, side in sorted(known, reverse=True):
         if np.all(side * (extent[axis] - place) >= -near):
             planes[axis] = SymmetryPlane(side * np.eye(dim)[axis], side * place)
     return planes

@@ -7,12 +7,12 @@ from their displacements to local contact frames (n, t1[, t2]). The contacts of 
 each other. The signed map B_b of a body holds, in the rows of each pair that it takes part in, T if
 it is the upper body there and -T if it is the lower one,
 
-    u = sum B_b U_b + gap n,   F_b = B_b' r   ==>   Q = sum B_b C_b B_b',   V = [B_b motions_b],   q
-                               = sum B_b at_rest_b + gap n.
+    u = sum B_b U_b + gap n,   F_b = B_b' r
+    ==>   Q = sum B_b C_b B_b',   V = [B_b motions_b],   q = sum B_b at_rest_b + gap n.
 
 The free motions of all bodies are the multipliers of the problem, and their resultants make s. Q is
-an array (explicit) or an operator (implicit) whose product is one product with each body. Both cost
-no more than the pairs that each body takes part in.
+an array (explicit) or an operator (implicit) whose product is one product with each body; both cost
+no more than the pairs that each body takes part in (contactopt.coupling.compliance).
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ import time
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from types import FunctionType
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -34,35 +33,27 @@ from contactopt.bodies.protocol import AssembledBody, Body
 from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
-from contactopt.coupling.charts import SymmetryPlane
+from contactopt.coupling.compliance import compliance, filling, operator
 from contactopt.coupling.costs import MOST_EXPLICIT, form_of
-from contactopt.coupling.coupling import Coupling, couple, law_of
-from contactopt.coupling.equilibrium import coupled_form
-from contactopt.coupling.planes_of_symmetry import mirror_planes
+from contactopt.coupling.coupling import Coupling, couple
+from contactopt.coupling.interface_problem import problem_of, signed_map
+from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
+from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import each
-from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import (
     FORMS,
     NOISE,
     Interface,
     InterfaceOperator,
-    Product,
     check_dense,
-    dense,
     diagonal,
-    estimate_diagonal,
 )
 from contactopt.linear.threads import one_blas_thread
-from contactopt.problem import InterfaceProblem, Law, Pair, Solution
-from contactopt.problem.chart import nodal_weights
-from contactopt.problem.laws import join
-from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import MOST_ACROSS, Part, Scene
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.scenes.scene import MOST_ACROSS, Scene
 
 log = logging.getLogger(__name__)
-# share of the entries of Q that may be other than zero for it to be kept by sparse rows
-SPARSE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,22 +81,17 @@ class Reduction:
     )
 
     def __repr__(self) -> str:
-        unknowns, pairs = (
-            count(self.dofs, "unknown"),
-            count(len(self.couplings), "pair of surfaces", "pairs of surfaces"),
-        )
-        return line(
-            "Reduction", self.scene.name, unknowns, count(self.problem.contacts, "contact"), pairs
-        )
+        unknowns, contacts = count(self.dofs, "unknown"), count(self.problem.contacts, "contact")
+        pairs = count(len(self.couplings), "pair of surfaces", "pairs of surfaces")
+        return line("Reduction", self.scene.name, unknowns, contacts, pairs)
 
     def _repr_html_(self) -> str:
         rows: dict[str, object] = {"scene": self.scene.name, "kind": self.scene.kind}
         for body in self.bodies:
             rows[f"body {body.name}"] = count(body.unknowns, "unknown")
-        for pair, coupling in zip(self.problem.pairs, self.couplings):
-            rows[f"surfaces {pair.name}"] = (
-                f"{count(len(coupling.gap), 'contact')}, coupled by {coupling.kind}"
-            )
+        for pair, made in zip(self.problem.pairs, self.couplings):
+            contacts = count(len(made.gap), "contact")
+            rows[f"surfaces {pair.name}"] = f"{contacts}, coupled by {made.kind}"
         return card("Reduction", rows)
 
     @property
@@ -133,7 +119,7 @@ class Reduction:
         """Q by its products, whatever the form of problem.Q."""
         if isinstance(self.problem.Q, InterfaceOperator):
             return self.problem.Q
-        return _operator(self.bodies, self.maps, self.couplings)
+        return operator(self.bodies, self.maps, self.couplings)
 
     @property
     def iterative(self) -> bool:
@@ -160,10 +146,8 @@ class Reduction:
         return tuple(np.split(multipliers, ends[:-1]))
 
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
-        """Compute the displacements of every body of a solution.
-
-        They are computed once. Bodies whose displacements came with the contact forces are not
-        solved at all.
+        """Compute the displacements of every body, once for each solution. Bodies whose
+        displacements came with the contact forces are not solved at all.
 
         Parameters
         ----------
@@ -175,9 +159,9 @@ class Reduction:
         """
         if solution in self._known:
             return self._known[solution]
-        known = [] if solution.displacements is None else list(solution.displacements.parts)
+        given = [] if solution.displacements is None else list(solution.displacements.parts)
         free = [
-            known.pop(0) if known and body.equilibrium is not None else None for body in self.bodies
+            given.pop(0) if given and body.equilibrium is not None else None for body in self.bodies
         ]
         parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
 
@@ -185,16 +169,21 @@ class Reduction:
             body, B, own, X = part
             return body.displacement(B.T @ solution.reactions.ravel(), own, X)
 
-        self._known[solution] = each(displaced, parts, [body.parallel for body in self.bodies])
+        self._known[solution] = each(displaced, parts, _parallel(self.bodies))
         return self._known[solution]
 
-    def grounded(self) -> Reduction | None:
-        """Put thin bodies on a soft ground (contactopt.bodies.thin).
+    def seen(self, displaced: Sequence[Any]) -> np.ndarray:
+        """The displacements u (k, dim) of the contacts [length], with the initial gap, from those
+        (n_b,) of each body.
+        """
+        q = self.problem.q
+        parts = (body.seen(B, U) for body, B, U in zip(self.bodies, self.maps, displaced))
+        u = np.asarray(sum(parts, 0 * q.ravel())).reshape(q.shape)
+        return u + self.gap[:, None] * np.eye(self.problem.dim)[0]
 
-        Returns
-        -------
-        The reduction with these bodies, whose answer is right where it no longer pulls them; None
-        without thin bodies.
+    def grounded(self) -> Reduction | None:
+        """With thin bodies on a soft ground (contactopt.bodies.thin), whose answer is right where
+        it no longer pulls them; None without thin bodies.
         """
         if self.on_ground:
             return self
@@ -202,149 +191,43 @@ class Reduction:
         if all(new is old for new, old in zip(bodies, self.bodies)):
             return None
         implicit = isinstance(self.problem.Q, InterfaceOperator)
-        Q = (
-            _operator(bodies, self.maps, self.couplings)
-            if implicit
-            else _entries(bodies, self.maps)
-        )
+        Q = compliance(bodies, self.maps, self.couplings, implicit)
         return replace(self._with(bodies, Q), on_ground=True)
 
     def pulled(self, solution: Solution) -> Reduction:
-        """Let the ground of each body pull it towards its displacement, from which those of the
-        contacts are taken anew.
-
-        Parameters
-        ----------
-        solution : A solution of the problem.
-
-        Returns
-        -------
-        With other displacements at rest.
+        """With other displacements at rest: the ground of each body pulls it towards its
+        displacement, from which those of the contacts are taken anew.
         """
         displaced = self.displaced(solution)
-        made = self._with(
-            tuple(body.pulled(U) for body, U in zip(self.bodies, displaced)), self.problem.Q
-        )
-        # What rounding in Q and q makes of the displacements of the contacts, beside those of the
-        # bodies.
+        bodies = tuple(body.pulled(U) for body, U in zip(self.bodies, displaced))
+        made = self._with(bodies, self.problem.Q)
+        # what rounding in Q and q makes of the displacements of the contacts, beside the bodies'
         missing = self.seen(displaced) - self.problem.displacements(
             solution.reactions, solution.multipliers
         )
         return replace(made, problem=replace(made.problem, q=made.problem.q + missing))
 
-    def seen(self, displaced: Sequence[Any]) -> np.ndarray:
-        """Compute the displacements u of the contacts from those of the bodies.
-
-        Parameters
-        ----------
-        displaced : (n_b,) displacement of each body [length].
-
-        Returns
-        -------
-        (k, dim), with the initial gap [length].
-        """
-        u = sum(
-            (body.seen(B, U) for body, B, U in zip(self.bodies, self.maps, displaced)),
-            0 * self.problem.q.ravel(),
-        )
-        return (
-            np.asarray(u).reshape(self.problem.q.shape)
-            + self.gap[:, None] * np.eye(self.problem.dim)[0]
-        )
-
     def _with(self, bodies: tuple[Body, ...], Q: Interface) -> Reduction:
-        """With bodies that rest elsewhere.
-
-        What was added to q, the slip of earlier states, stays.
-        """
-        problem = _problem(self.scene, Q, bodies, self.maps, self.couplings)
-        old = _problem(self.scene, Q, self.bodies, self.maps, self.couplings)
-        return replace(
-            self, bodies=bodies, problem=replace(problem, q=self.problem.q + problem.q - old.q)
-        )
+        """With bodies that rest elsewhere. The slip of earlier states, added to q, stays."""
+        problem = problem_of(self.scene, Q, bodies, self.maps, self.couplings)
+        old = problem_of(self.scene, Q, self.bodies, self.maps, self.couplings)
+        problem = replace(problem, q=self.problem.q + problem.q - old.q)
+        return replace(self, bodies=bodies, problem=problem)
 
     def loaded(self, scene: Scene) -> Reduction:
         """Put the loads of another scene of the same structure on the same bodies, coupling and Q.
 
-        Values of tractions, body forces, plate forces and support displacements may differ, and mu;
-        nothing else may differ.
-
-        Parameters
-        ----------
-        scene : The other scene.
-
-        Returns
-        -------
-        The reduction of that scene.
-
-        Raises
-        ------
-        InputError : If meshes, materials or other parts differ, or if supports or plates hold other
-            unknowns.
+        Values of tractions, body forces, plate forces and support displacements may differ, and mu.
+        InputError if meshes, materials or other parts differ, or if supports or plates hold other
+        unknowns.
         """
-        _check_same(self.scene, scene)
+        check_same(self.scene, scene)
         start = time.perf_counter()
         pairs = zip(self.bodies, scene.parts)
-        bodies = each(
-            lambda pair: pair[0].loaded(scene, pair[1]),
-            pairs,
-            [body.parallel for body in self.bodies],
-        )
-        problem = _problem(scene, self.problem.Q, bodies, self.maps, self.couplings)
+        bodies = each(lambda pair: pair[0].loaded(scene, pair[1]), pairs, _parallel(self.bodies))
+        problem = problem_of(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
-
-
-def _check_same(one: Scene, other: Scene) -> None:
-    """Raise InputError unless both scenes have the same bodies, but for their loads."""
-    if not isinstance(other, Scene):
-        raise InputError(f"a state of a path must be a Scene; got {type(other).__name__}.")
-    if (one.kind, one.degree, len(one.parts)) != (other.kind, other.degree, len(other.parts)):
-        raise InputError(
-            f"the states '{one.name}' and '{other.name}' of a path are not those of one scene."
-        )
-    for a, b in zip(one.parts, other.parts):
-        if type(a) is not type(b) or a.name != b.name:
-            raise InputError(
-                f"the states of a path must have the same bodies; '{a.name}' became '{b.name}'."
-            )
-        if isinstance(a, Part) and isinstance(b, Part) and a.material != b.material:
-            raise InputError(
-                f"body '{a.name}' changes its material along the path; only loads may change."
-            )
-        if isinstance(a, Part) and isinstance(b, Part) and not _same_mesh(a.mesh, b.mesh):
-            raise InputError(
-                f"body '{a.name}' changes its mesh along the path; only loads may change."
-            )
-
-
-def _same_mesh(one: Any, other: Any) -> bool:
-    """Whether two meshes have the same nodes and elements; functions that make them are compared by
-    what they enclose.
-    """
-    if callable(one) or callable(other):
-        return callable(one) and callable(other) and not _differ(one, other)
-    return one is other or (np.array_equal(one.p, other.p) and np.array_equal(one.t, other.t))
-
-
-def _differ(one: Any, other: Any) -> bool:
-    """Whether two values are known to be different: numbers, texts, arrays, and functions of one
-    code that enclose such.
-    """
-    if isinstance(one, (int, float, str, np.ndarray)) and isinstance(
-        other, (int, float, str, np.ndarray)
-    ):
-        return not np.array_equal(one, other)
-    if isinstance(one, (tuple, list)) and isinstance(other, (tuple, list)):
-        return len(one) != len(other) or any(map(_differ, one, other))
-    if (
-        isinstance(one, FunctionType)
-        and isinstance(other, FunctionType)
-        and one.__code__ is other.__code__
-    ):
-        enclosed = [[cell.cell_contents for cell in f.__closure__ or ()] for f in (one, other)]
-        return _differ(enclosed[0], enclosed[1])
-    return False
 
 
 def reduce(
@@ -395,16 +278,52 @@ def reduce_bodies(
 
     Parameters
     ----------
-    scene, elements, zone, Q, solver, coupling : As for reduce().
+    scene, elements, zone, Q, solver, coupling : As for reduce(), and so are the errors.
 
     Returns
     -------
     The interface problem with the bodies, the coupling and the seconds that each phase took.
-
-    Raises
-    ------
-    InputError : As reduce().
     """
+    elements, zone = _checked(scene, elements, zone, Q)
+    times = [time.perf_counter()]
+    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts)
+    named = {body.name: body for body in assembled}
+    sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
+    pairs = zip(scene.pairs, sides)
+    couplings = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in pairs)
+    maps = tuple(signed_map(body, sides, couplings) for body in assembled)
+    planes: tuple[SymmetryPlane, ...] = ()
+    if scene.copies > 1:
+        cutting = [plane for made in couplings for plane in made.planes]
+        planes = mirror_planes(scene, [body.guides() for body in assembled], cutting)
+    times.append(time.perf_counter())
+
+    iterate = any(body.iterates(solver) for body in assembled)
+    Q = _form(Q, scene.dim, assembled, maps, iterate, solver)
+    implicit = Q == "implicit"
+    log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, maps[0].shape[0])
+    if not implicit:
+        check_dense(round(filling(maps) ** 0.5))
+    with one_blas_thread() if iterate else nullcontext():
+        bodies = each(lambda body: body.prepare(solver, not implicit), assembled)
+    times.append(time.perf_counter())
+
+    made = compliance(bodies, maps, couplings, implicit)
+    size = diagonal(made)
+    on_ground = not np.min(size, initial=0.0) >= -NOISE * np.max(size, initial=0.0)
+    if on_ground:  # nothing is left of the compliance of a thin body but rounding, or no number
+        bodies = _on_ground(scene, bodies)
+        made = compliance(bodies, maps, couplings, implicit)
+    problem = problem_of(scene, made, bodies, maps, couplings)
+    times.append(time.perf_counter())
+    seconds = dict(zip(("assemble", "factorise", "compliance"), np.diff(times).tolist()))
+    return Reduction(scene, problem, bodies, maps, couplings, seconds, planes, on_ground)
+
+
+def _checked(
+    scene: Scene, elements: int | None, zone: float | None, Q: str
+) -> tuple[int, float | None]:
+    """The number of elements and the half-width of the zone, by default those of the scene."""
     if not isinstance(scene, Scene):
         raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
     if not isinstance(Q, str) or Q not in FORMS:
@@ -416,218 +335,36 @@ def reduce_bodies(
         raise InputError(f"elements must be at most {MOST_ACROSS}; got {elements}.")
     if zone is not None:
         check_number("the contact zone's half-width", zone, low=0.0)
-    seconds: dict[str, float] = {}
-    start = time.perf_counter()
-    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts)
-    named = {body.name: body for body in assembled}
-    sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
-    coupled = tuple(
-        couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides)
-    )
-    maps = tuple(_map_of(body, sides, coupled) for body in assembled)
-    planes = (
-        mirror_planes(scene, [body.guides() for body in assembled], coupled)
-        if scene.copies > 1
-        else ()
-    )
-    seconds["assemble"] = time.perf_counter() - start
+    return elements, zone
 
-    start = time.perf_counter()
-    n = maps[0].shape[0]
-    if Q == "auto":
-        contact, largest = (
-            max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns")
-        )
-        if _filling(maps) ** 0.5 > MOST_EXPLICIT:
-            contact = MOST_EXPLICIT + 1
-        Q = form_of(
-            contact,
-            largest,
-            scene.dim,
-            any(b.iterates(solver) for b in assembled),
-            factors_of(solver, scene.dim),
-        )
-    log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
-    if Q == "explicit":
-        check_dense(round(_filling(maps) ** 0.5))
-    iterate = any(body.iterates(solver) for body in assembled)
-    with one_blas_thread() if iterate else nullcontext():
-        bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
-    seconds["factorise"] = time.perf_counter() - start
 
-    start = time.perf_counter()
-    made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
-    on_ground = not np.min(diagonal(made), initial=0.0) >= -NOISE * np.max(
-        diagonal(made), initial=0.0
-    )
-    if on_ground:  # nothing is left of the compliance of a thin body but rounding, or no number
-        bodies = _on_ground(scene, bodies)
-        made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
-    problem = _problem(scene, made, bodies, maps, coupled)
-    seconds["compliance"] = time.perf_counter() - start
-    return Reduction(scene, problem, bodies, maps, coupled, seconds, planes, on_ground)
+def _form(
+    Q: str,
+    dim: int,
+    assembled: Sequence[AssembledBody],
+    maps: Sequence[sp.csr_matrix],
+    iterate: bool,
+    solver: str,
+) -> str:
+    """The form of Q that was asked for, or the cheaper one."""
+    if Q != "auto":
+        return Q
+    contact = max(body.interface_unknowns for body in assembled)
+    largest = max(body.unknowns for body in assembled)
+    if filling(maps) ** 0.5 > MOST_EXPLICIT:
+        contact = MOST_EXPLICIT + 1
+    return form_of(contact, largest, dim, iterate, factors_of(solver, dim))
 
 
 def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
     """The bodies of a scene, thin ones among them on a soft ground."""
     modulus = min(part.material.E for part in scene.parts if hasattr(part, "material"))
-    made = each(lambda body: body.grounded(modulus), bodies, [body.parallel for body in bodies])
+    made = each(lambda body: body.grounded(modulus), bodies, _parallel(bodies))
     for new, old in zip(made, bodies):
         if new is not old:
             log.info("body '%s' is thin: a soft ground holds it until the contact does", new.name)
     return made
 
 
-def _map_of(
-    body: AssembledBody,
-    sides: Sequence[tuple[AssembledBody, AssembledBody]],
-    couplings: Sequence[Coupling],
-) -> sp.csr_matrix:
-    """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and
-    zeros elsewhere.
-    """
-    ends = np.cumsum([0, *(made.frames.shape[0] * made.frames.shape[1] for made in couplings)])
-    blocks = [
-        (first, made.upper if body is upper else -made.lower)
-        for first, (upper, lower), made in zip(ends, sides, couplings)
-        if body is upper or body is lower
-    ]
-    width = blocks[0][1].shape[1]
-    entries = [(first, sp.coo_matrix(block)) for first, block in blocks]
-    rows = np.concatenate([first + block.row for first, block in entries])
-    columns = np.concatenate([block.col for _, block in entries])
-    values = np.concatenate([block.data for _, block in entries])
-    return sp.csr_matrix((values, (rows, columns)), (int(ends[-1]), width))
-
-
-def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
-    ends = np.cumsum([0, *(len(made.gap) for made in couplings)])
-    named = zip(scene.pairs, couplings, ends[:-1], ends[1:])
-    return tuple(
-        Pair(pair.name, int(first), int(last), made.chart) for pair, made, first, last in named
-    )
-
-
-def _law(pairs: Sequence[Contact], couplings: Sequence[Coupling]) -> Law:
-    """One law for all contacts, from those of the pairs."""
-    laws = [law_of(pair, made) for pair, made in zip(pairs, couplings)]
-    if len(laws) == 1:
-        return laws[0]
-    ends = np.cumsum([0, *(law.contacts for law in laws)])
-    return join(
-        [(law, np.arange(first, last)) for law, first, last in zip(laws, ends[:-1], ends[1:])]
-    )
-
-
-def _names(bodies: Sequence[Body]) -> tuple[str, ...]:
-    """What each multiplier is, for messages."""
-    return tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motion_names)
-
-
-def _rows(B: sp.csr_matrix) -> np.ndarray:
-    """The rows of a map that are not empty; all of them where most are not, so that nothing needs
-    to be picked out.
-    """
-    filled = np.flatnonzero(np.diff(B.indptr))
-    return filled if 4 * len(filled) < 3 * B.shape[0] else np.arange(B.shape[0])
-
-
-def _operator(
-    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
-) -> InterfaceOperator:
-    """Q by its products: a convolution where every body has one.
-
-    Else its diagonal is an estimate, which takes one product.
-    """
-    kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
-    if kernels and all(kernel is not None for kernel in kernels):
-        known = [kernel for kernel in kernels if kernel is not None]
-        if len({kernel.padded for kernel in known}) > 1:
-            raise InputError(
-                "one half-space repeats itself periodically and the other does not; make both"
-                " periodic or none."
-            )
-        return Convolution(sum(known[1:], known[0]))
-    moved = [body.moved(B) for body, B in zip(bodies, maps)]
-    moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
-    parallel = [body.parallel for body, *_ in moving]
-    acts = each(lambda term: term[0].product(term[1][term[2]]), moving, parallel)
-    terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
-
-    def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-        def moves(term: tuple[Product, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-            """The columns that load a body at all, and what they make of it."""
-            act, rows = term
-            load = X[rows]
-            columns = (
-                np.flatnonzero(load.any(axis=0)) if len(couplings) > 1 else np.arange(X.shape[1])
-            )
-            return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
-
-        out = np.zeros(X.shape)
-        for (_, rows), (columns, own) in zip(terms, each(moves, terms, parallel)):
-            out[np.ix_(rows, columns)] += own
-        return out
-
-    weights = [nodal_weights(made.chart, made.areas) for made in couplings]
-    diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
-    complete, iterative = (
-        all(body.complete for body in bodies),
-        any(body.iterative for body in bodies),
-    )
-    entries = (lambda: dense(_entries(bodies, maps))) if complete else None
-    coupled = coupled_form(bodies, maps) if iterative else None
-    return InterfaceOperator(product, diagonal, entries, None, iterative, coupled)
-
-
-def _filling(maps: Sequence[sp.csr_matrix]) -> int:
-    """Number of the entries of Q between contacts that share a body."""
-    return min(sum(len(_rows(B)) ** 2 for B in maps), maps[0].shape[0] ** 2)
-
-
-def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
-    """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs
-    share no body.
-    """
-    n = maps[0].shape[0]
-    moving = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
-    parallel = [body.parallel for body, *_ in moving]
-    made = each(lambda term: term[0].compliance(term[1][term[2]]), moving, parallel)
-    parts = [(rows, own) for (*_, rows), own in zip(moving, made)]
-    if _filling(maps) < SPARSE * n**2:
-        rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
-        columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])
-        return sp.csr_array(
-            (np.concatenate([own.ravel() for _, own in parts]), (rows, columns)), (n, n)
-        )
-    Q = np.zeros((n, n))
-    for rows, own in parts:
-        if len(rows) == n:
-            Q += own
-        else:
-            Q[np.ix_(rows, rows)] += own
-    return Q
-
-
-def _problem(
-    scene: Scene,
-    Q: Interface,
-    bodies: Sequence[Body],
-    maps: Sequence[sp.csr_matrix],
-    couplings: Sequence[Coupling],
-) -> InterfaceProblem:
-    """The interface problem of a scene whose bodies and couplings are made and whose Q is known."""
-    gap = np.concatenate([made.gap for made in couplings])
-    q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
-    q[:, 0] = gap
-    for body, B in zip(bodies, maps):
-        q += (B @ body.at_rest).reshape(q.shape)
-    V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    s = np.concatenate([body.resultants for body in bodies])
-    areas = np.concatenate([made.areas for made in couplings])
-    points = np.concatenate([made.positions for made in couplings], axis=1)
-    pairs = _pairs(scene, couplings)
-    chart = pairs[0].chart if len(pairs) == 1 else None
-    return InterfaceProblem(
-        Q, q, _law(scene.pairs, couplings), V, s, areas, points, chart, pairs, _names(bodies)
-    )
+def _parallel(bodies: Sequence[Body]) -> list[bool]:
+    return [body.parallel for body in bodies]

@@ -39,18 +39,13 @@ class Rounding:
 
     def __init__(self, surface: Faces, points: Overlap) -> None:
         c = surface.corners
-        self.edges = (
-            np.array([[0, 1]])
-            if c == 2
-            else np.stack([np.arange(c), (np.arange(c) + 1) % c], axis=1)
-        )
+        self.edges = np.array([(i, (i + 1) % c) for i in range(c if c > 2 else 1)])
         self.surface, self.points = surface, points
         self.rises = _rises(surface, self.edges)
         count = len(surface.faces)
         content = np.bincount(points.face, points.measure, count)
-        moments = [
-            np.bincount(points.face, points.measure * B, count) for B in self._bubbles(points.there)
-        ]
+        bubbles = self._bubbles(points.there) * points.measure
+        moments = [np.bincount(points.face, B, count) for B in bubbles]
         self.means = np.stack(moments) / np.where(content > 0, content, 1.0)  # (e, f)
 
     def values(self, block: slice) -> np.ndarray:
@@ -63,9 +58,7 @@ class Rounding:
         return np.asarray(self.points.face[block][first][:, None] * e + np.arange(e))
 
     def _bubbles(self, at: np.ndarray) -> np.ndarray:
-        """(e, m) B_e at reference coordinates (dim - 1, m): one in the middle of its edge, zero on
-        the others.
-        """
+        """(e, m) B_e at places (dim - 1, m): one in the middle of its edge, zero on the others."""
         hats = self.surface.shapes(at)
         first, second = hats[self.edges[:, 0]], hats[self.edges[:, 1]]
         both = first + second if self.surface.corners == 4 else np.ones(1)
@@ -77,15 +70,12 @@ def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
     unknown.
     """
     gradients = _gradients(surface)
-    # m_e = (grad_a - grad_b) . (x_b - x_a) / 8 as a matrix on the nodes' values; unknown gradients
-    # give no rise.
     a, b = (surface.faces[:, edges[:, i]].ravel() for i in (0, 1))
     along = (surface.points[:, b] - surface.points[:, a]) / 8
     determined = np.asarray(sum(np.diff(G.indptr) for G in gradients) > 0)
     known = sp.diags((determined[a] & determined[b]).astype(float))
-    return sp.csr_matrix(
-        known @ sum(sp.diags(step) @ (G[a] - G[b]) for step, G in zip(along, gradients))
-    )
+    rises = sum(sp.diags(step) @ (G[a] - G[b]) for step, G in zip(along, gradients))
+    return sp.csr_matrix(known @ rises)
 
 
 def _gradients(surface: Faces) -> list[sp.csr_matrix]:
@@ -95,9 +85,8 @@ def _gradients(surface: Faces) -> list[sp.csr_matrix]:
     Rows of nodes that too few others surround are empty.
     """
     n, (f, j) = surface.points.shape[1], surface.faces.shape
-    incident = sp.csr_matrix(
-        (np.ones(f * j), (surface.faces.ravel(), np.repeat(np.arange(f), j))), (n, f)
-    )
+    at = surface.faces.ravel(), np.repeat(np.arange(f), j)
+    incident = sp.csr_matrix((np.ones(f * j), at), (n, f))
     near = sp.csr_matrix(incident @ incident.T)
     terms = 3 if surface.dim == 2 else 6
     wider = sp.csr_matrix(near @ near)
@@ -124,9 +113,8 @@ def _fit(apart: np.ndarray, directions: int, terms: int) -> np.ndarray | None:
     if apart.shape[1] < terms:
         return None
     # Coordinates y in the tangent plane through the nodes, scaled to one.
-    axes = np.linalg.svd(apart - apart.mean(axis=1, keepdims=True), full_matrices=False)[0][
-        :, :directions
-    ]
+    centred = apart - apart.mean(axis=1, keepdims=True)
+    axes = np.linalg.svd(centred, full_matrices=False)[0][:, :directions]
     y = axes.T @ apart
     size = np.abs(y).max()
     if size == 0:

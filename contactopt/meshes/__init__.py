@@ -1,1 +1,1 @@
-"""Meshes: read from files, repaired, made by structure, refined everywhere or where it is needed."""
+"""Meshes are read from files, repaired, made by structure, refined everywhere or in places."""

@@ -1,4 +1,4 @@
-"""Elements of a mesh and their corners, straight and curved."""
+"""Elements of a mesh: their corners and orientation, straight and curved, and their volumes."""
 
 from __future__ import annotations
 
@@ -11,30 +11,24 @@ SHAPES = {
     "RefTet": (skfem.MeshTet, {1: skfem.ElementTetP1, 2: skfem.ElementTetP2}),
     "RefHex": (skfem.MeshHex, {1: skfem.ElementHex1, 2: skfem.ElementHex2}),
 }
-
-
 CURVED = {
-    "RefTri": skfem.MeshTri2,
-    "RefQuad": skfem.MeshQuad2,
-    "RefTet": skfem.MeshTet2,
-    "RefHex": skfem.MeshHex2,
-}
-
-
+    "RefTri": skfem.MeshTri2, "RefQuad": skfem.MeshQuad2,
+    "RefTet": skfem.MeshTet2, "RefHex": skfem.MeshHex2,
+}  # fmt: skip
 CELLS = {  # what meshio and VTK call the elements, by whether they are of second order
     "RefTri": ("triangle", "triangle6"), "RefQuad": ("quad", "quad9"),
     "RefTet": ("tetra", "tetra10"), "RefHex": ("hexahedron", "hexahedron27"),
 }  # fmt: skip
-
-
-# nodes of a hexahedron of scikit-fem in the order of VTK: corners, edges, faces, centre
-HEXAHEDRON = (
-    0, 3, 6, 2, 1, 5, 7, 4, 10, 16, 14, 9, 12, 18, 17, 11, 8, 15, 19, 13, 20, 25, 22, 23, 21, 24, 26,
-)  # fmt: skip
-
-
-# nodes of a simplex numbered the other way round
-TURNED = {"RefTri": (0, 2, 1, 5, 4, 3), "RefTet": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)}
+# nodes of an element of first or second order numbered the other way round, in the order of meshio
+MIRRORED = {
+    "triangle": (0, 2, 1, 5, 4, 3),
+    "quad": (0, 3, 2, 1, 7, 6, 5, 4, 8),
+    "tetra": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+    "hexahedron": (
+        *(4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11),
+        *(16, 17, 18, 19, 20, 21, 22, 23, 25, 24, 26),
+    ),
+}
 
 
 def is_curved(mesh: skfem.Mesh) -> bool:
@@ -64,24 +58,22 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
     """
     if not is_curved(mesh):
         return mesh
-    plain = SHAPES[mesh.refdom.__name__][0](
-        np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t
-    )
+    corners = np.ascontiguousarray(mesh.p[:, : mesh.nvertices])
+    plain = SHAPES[mesh.refdom.__name__][0](corners, mesh.t)
     return plain.with_boundaries(mesh.boundaries) if mesh.boundaries else plain
 
 
 def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
-    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices
-    first; boundaries keep their names.
+    """Make the mesh of second order; boundaries keep their names.
 
     Parameters
     ----------
-    mesh : a scikit-fem mesh
-    places : (dim, n) positions of all nodes, vertices first [length]
+    mesh : A scikit-fem mesh.
+    places : (dim, n) positions of all nodes of a quadratic displacement, vertices first [length].
 
     Returns
     -------
-    The mesh of second order.
+    The mesh itself if it is curved.
     """
     if is_curved(mesh):
         return mesh
@@ -102,29 +94,79 @@ def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
     -------
     The name of the elements, a value of CELLS, and their nodes (e, v).
     """
+    from skfem.io.meshio import HEX_MAPPING
+
     nodes = np.array(mesh.dofs.element_dofs)
-    if mesh.refdom.__name__ == "RefHex":
-        nodes = nodes[list(HEXAHEDRON[: len(nodes)])]
-    elif mesh.refdom.__name__ in TURNED:
+    names = CELLS[mesh.refdom.__name__]
+    if names[0] == "hexahedron":
+        nodes = nodes[HEX_MAPPING[: len(nodes)]]
+    elif names[0] != "quad":
         sides = mesh.p[:, nodes[1 : len(mesh.p) + 1]] - mesh.p[:, nodes[:1]]
-        negative = np.linalg.det(sides.transpose(2, 1, 0)) < 0
-        nodes[:, negative] = nodes[list(TURNED[mesh.refdom.__name__][: len(nodes)])][:, negative]
-    return CELLS[mesh.refdom.__name__][is_curved(mesh)], nodes.T
+        turned = np.linalg.det(sides.transpose(2, 1, 0)) < 0
+        nodes[:, turned] = mirrored(names[0], nodes[:, turned])
+    return names[is_curved(mesh)], nodes.T
+
+
+def mirrored(kind: str, nodes: np.ndarray) -> np.ndarray:
+    """The nodes (v, e) of elements of a kind of meshio, numbered the other way round."""
+    return nodes[list(MIRRORED[kind.rstrip("0123456789")][: len(nodes)])]
 
 
 def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
-    """Find all nodes of a mesh on some of its facets, those in the middle of edges and faces
-    included.
+    """Find all nodes of a mesh on some of its facets, those within edges and faces included.
 
     Parameters
     ----------
     mesh : A mesh of first or second order.
-    facets : (f,) Indices of facets.
+    facets : (f,) numbers of facets.
 
     Returns
     -------
-    (n,) array : Indices of nodes, without repetition.
+    (n,) numbers of nodes, without repetition.
     """
     if not is_curved(mesh):
         return np.unique(mesh.facets[:, facets])
     return np.unique(mesh.dofs.get_facet_dofs(facets).flatten())
+
+
+def volumes(mesh: skfem.Mesh) -> np.ndarray:
+    """Ratios (e, n + 1) of volumes between elements and their reference, with their signs, at the n
+    nodes of each element and at its centre.
+    """
+    places = np.asarray(mesh.elem().doflocs).T
+    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
+    return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
+
+
+def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
+    """Numbers (c, f) of the corners of facets (f,) of the surface, in the order around each that
+    makes normals point outwards; in the plane the body is on their left.
+    """
+    cell = mesh.f2t[0, facets]
+    local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
+    nodes = mesh.t[np.array(mesh.refdom.facets)[local].T, cell]
+    corners = mesh.p[:, nodes]
+    outwards = corners.mean(axis=1) - mesh.p[:, mesh.t[:, cell]].mean(axis=1)
+    wrong = np.sum(area_vectors(corners) * outwards, axis=0) < 0
+    nodes[:, wrong] = nodes[::-1, wrong]
+    return np.asarray(nodes)
+
+
+def area_vectors(corners: np.ndarray) -> np.ndarray:
+    """Compute area times normal of facets; normals are on the right of edges.
+
+    Parameters
+    ----------
+    corners : (dim, c, f) corners of the facets in their order [length].
+
+    Returns
+    -------
+    (dim, f) vectors [length^2].
+    """
+    if len(corners) == 2:
+        x, y = corners[:, 1] - corners[:, 0]
+        return np.stack([y, -x])
+    first, second = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
+    if corners.shape[1] == 3:
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(np.cross(first, second, axis=0) / 2)

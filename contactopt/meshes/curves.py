@@ -35,30 +35,18 @@ CORNER = np.deg2rad(35)
 # unless it is an arc that is tangent to the edges beside it, and turns by less
 LARGEST = np.deg2rad(75)
 ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
-KINK = (
-    np.deg2rad(5),
-    5.0,
-)  # a smaller turn is a corner if it is more than this, and times what its neighbours let expect
+# a smaller turn is a corner if it is more than this, and times what its neighbours let expect
+KINK = np.deg2rad(5), 5.0
 # the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
 STRAIGHT = 1e-9
 EXACT = 1e-9  # of the size of the body: coordinates are not compared more exactly
 DIGITS = range(6, 13)  # decimal digits that files write
 STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and its curve
-NEAREST = 8  # edges among which the nearest to a point is looked for first
-ARRAY = 1_000_000  # numbers in one array of distances
 
 
 def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
-    """Find the curves of all boundaries of a plane mesh; those without a name have the name ''.
-
-    Parameters
-    ----------
-    mesh : A plane scikit-fem mesh.
-    arcs : Whether only arcs count as curved, where the mesh is a polygon.
-
-    Returns
-    -------
-    By name the curve, or None where the boundary is straight.
+    """By the name of each boundary of a plane mesh, '' for what has none, its curve, or None where
+    it is straight. With `arcs`, only arcs count as curved where the mesh is a polygon.
     """
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
@@ -69,27 +57,15 @@ def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
         ends[:, numbers] = np.where(forward, bends, -bends[::-1])
     found: dict[str, Curve | None] = {}
     for name, label, mine in shares(mesh, owner):
-        curved = np.any(ends[:, mine] != 0)
-        found[name] = (
-            Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, label)
-            if curved
-            else None
-        )
+        found[name] = None
+        if np.any(ends[:, mine] != 0):
+            found[name] = Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, label)
     return found
 
 
 def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Divide pieces of the surface among the boundaries.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-    owner : (t,) the facet of each piece.
-
-    Yields
-    ------
-    The name of a boundary, or '' for what has no name; what messages call its curve; and whether
-    each piece is its own.
+    """The name of each boundary of a mesh, or '' for what has none; what messages call its curve;
+    and whether each piece of the surface, on the facets `owner` (t,), is its own.
     """
     left = np.ones(len(owner), dtype=bool)
     for name, facets in (mesh.boundaries or {}).items():
@@ -100,7 +76,9 @@ def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]
 
 
 def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Edges (2, e) of the outline, places of nodes, the facet of each edge, and whether it curves."""
+    """Edges (2, e) of the outline, places of nodes, the facet of each edge, and whether any is
+    curved.
+    """
     ends = mesh.facets[:, facets]
     if not is_curved(mesh):
         return ends, mesh.p, facets, False
@@ -155,7 +133,9 @@ def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
-    """Curvatures (2, n) of a chain of nodes (2, n + 1) at both ends of edges, positive to the left."""
+    """Curvatures (2, n) at both ends of the edges of a chain of nodes (2, n + 1), positive to the
+    left.
+    """
     closed = x.shape[1] > 3 and np.array_equal(x[:, 0], x[:, -1])
     turn, length = _turns(x, closed)
     corner = _corners(turn, length)
@@ -165,9 +145,8 @@ def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
         first = int(np.argmax(jump))
         if first:
             order = np.roll(np.arange(len(length)), -first)
-            return np.asarray(
-                np.roll(_bends(x[:, np.append(order, first)], near, arcs), first, axis=1)
-            )
+            bends = _bends(x[:, np.append(order, first)], near, arcs)
+            return np.asarray(np.roll(bends, first, axis=1))
     runs = np.full(len(length), np.nan)  # the curvature of the run that an edge belongs to
     cuts = np.unique([0, *np.flatnonzero(corner), len(length)])
     for first, last in pairwise(cuts.tolist()):
@@ -188,7 +167,7 @@ def _turns(x: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _corners(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Whether nodes are corners: where the turn is large, or far larger than next to it, or ends."""
+    """Whether nodes are corners: the turn is large, or far larger than next to it, or an end."""
     spacing = np.concatenate([length[-1:], length, length[:1]])
     span = (spacing[:-1] + spacing[1:]) / 2
     rate = np.where(np.isnan(turn), 0.0, np.abs(turn)) / np.minimum(spacing[:-1], spacing[1:])
@@ -230,13 +209,11 @@ def _runs(x: np.ndarray, near: float) -> list[tuple[int, int, float]]:
     steps = np.diff(x, axis=1)
     area = np.hypot(*steps[:, :-1]) * np.hypot(*steps[:, 1:])
     across = steps[:, :-1] + steps[:, 1:]
-    off = (steps[0, :-1] * steps[1, 1:] - steps[1, :-1] * steps[0, 1:]) / np.hypot(
-        *across
-    )  # from the neighbours' chord
+    # from the neighbours' chord
+    off = (steps[0, :-1] * steps[1, 1:] - steps[1, :-1] * steps[0, 1:]) / np.hypot(*across)
     straight = np.abs(off) <= 2 * near
-    even = np.abs(np.diff(off / area)) <= 2 * near * (
-        1 / area[:-1] + 1 / area[1:]
-    )  # the same curvature at the next node
+    # the same curvature at the next node
+    even = np.abs(np.diff(off / area)) <= 2 * near * (1 / area[:-1] + 1 / area[1:])
     while start < last:
         line = arc = start
         if start < len(straight) and straight[start]:
@@ -273,24 +250,30 @@ def _reach(x: np.ndarray, start: int, fits: Callable[[np.ndarray], bool]) -> int
 def _on_line(nodes: np.ndarray, near: float) -> bool:
     """Whether nodes lie on the line through the first and the last one."""
     along, offset = nodes[:, -1] - nodes[:, 0], nodes - nodes[:, :1]
-    return bool(
-        np.all(np.abs(along[0] * offset[1] - along[1] * offset[0]) <= near * np.hypot(*along))
-    )
+    across = np.abs(along[0] * offset[1] - along[1] * offset[0])
+    return bool(np.all(across <= near * np.hypot(*along)))
 
 
 def _circle(nodes: np.ndarray, near: float) -> float | None:
     """The curvature of the circle on which nodes (2, m) lie, positive to the left; None off it."""
-    middle = nodes.mean(axis=1, keepdims=True)
-    size = np.abs(nodes - middle).max()
-    offset = (nodes - middle) / size
-    terms = np.column_stack([2 * offset.T, np.ones(nodes.shape[1])])
-    x, y, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
-    radius = np.sqrt(max(rest + x**2 + y**2, 0.0))
-    away = offset - np.array([[x], [y]])
-    if radius == 0.0 or np.any(np.abs(np.hypot(*away) - radius) * size > near):
+    centre, radius = fitted_sphere(nodes)
+    away = nodes - centre
+    if radius == 0.0 or np.any(np.abs(np.hypot(*away) - radius) > near):
         return None
     sweep = np.sum(away[0, :-1] * away[1, 1:] - away[1, :-1] * away[0, 1:])
-    return float(np.sign(sweep) / (radius * size))
+    return float(np.sign(sweep) / radius)
+
+
+def fitted_sphere(places: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre (dim, 1) and radius of the circle or sphere that fits places (dim, m) best."""
+    middle = places.mean(axis=1, keepdims=True)
+    offset = places - middle
+    size = max(np.abs(offset).max(), 1e-300)
+    offset = offset / size
+    terms = np.column_stack([2 * offset.T, np.ones(offset.shape[1])])
+    *centre, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
+    radius = np.sqrt(max(rest + np.sum(np.square(centre)), 0.0))
+    return middle + size * np.array(centre)[:, None], float(size * radius)
 
 
 def _ends(
@@ -310,11 +293,10 @@ def _ends(
     found = np.empty((2, n))
     for side, node, beside in ((0, edge, edge - 1), (1, edge + 1, (edge + 1) % n)):
         # the chord between the two neighbours of the node
-        across = np.sqrt(
-            length**2 + length[beside] ** 2 + 2 * length * length[beside] * np.cos(turn[node])
-        )
+        other = length[beside]
+        across = np.sqrt(length**2 + other**2 + 2 * length * other * np.cos(turn[node]))
         three = 2 * np.sin(turn[node]) / across
-        away = turn[node] - np.arcsin(np.clip(runs[beside] * length[beside] / 2, -STEEP, STEEP))
+        away = turn[node] - np.arcsin(np.clip(runs[beside] * other / 2, -STEEP, STEEP))
         found[side] = np.where(free[beside], three, 2 * np.sin(away) / length)
         found[side, corner[node]] = np.nan
     found = np.where(np.isnan(found), found[::-1], found)  # at a corner as at the other end
@@ -337,35 +319,28 @@ class _Blends:
         edge = self._nearest(points)
         s, c = self._foot(points, edge)[0], self.length[edge]
         rest = s * (c - s)
-        arcs = [
-            k * rest / (np.sqrt(root**2 + k**2 * rest) + root)
-            for k in self.bends[:, edge]
-            for root in [np.sqrt(1 - (k * c / 2) ** 2)]
-        ]
-        height = (1 - s / c) * arcs[0] + s / c * arcs[1]
+        root = np.sqrt(1 - (self.bends[:, edge] * c / 2) ** 2)
+        bend = self.bends[:, edge]
+        first, last = bend * rest / (np.sqrt(root**2 + bend**2 * rest) + root)
+        height = (1 - s / c) * first + s / c * last
         x, y = self.along[:, edge]
         return np.asarray(self.start[:, edge] + s * np.stack([x, y]) + height * np.stack([y, -x]))
 
     def _foot(self, points: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far along edges the points nearest to points (2, ...) are, and how far from these."""
+        """How far along edges the points nearest to points (2, m) are, and how far from these."""
         offset, along = points - self.start[:, edge], self.along[:, edge]
         s = np.clip(np.sum(offset * along, axis=0), 0, self.length[edge])
         return s, np.linalg.norm(offset - s * along, axis=0)
 
     def _nearest(self, points: np.ndarray) -> np.ndarray:
-        """The number (m,) of the nearest edge."""
-        count = min(NEAREST, len(self.length))
-        far, near = (
-            each.reshape(points.shape[1], count) for each in self.tree.query(points.T, k=count)
-        )
-        distance = self._foot(points[:, :, None], near)[1]
-        best = np.argmin(distance, axis=1)
-        rows = np.arange(len(best))
-        found = near[rows, best]
-        if count == len(self.length):
-            return found
-        unsure = np.flatnonzero(distance[rows, best] > far[:, -1] - self.length.max() / 2)
-        for some in np.array_split(unsure, 1 + len(unsure) * len(self.length) // ARRAY):
-            everywhere = np.broadcast_to(np.arange(len(self.length)), (len(some), len(self.length)))
-            found[some] = np.argmin(self._foot(points[:, some][:, :, None], everywhere)[1], axis=1)
-        return found
+        """The number (m,) of the nearest edge: its middle is no further away than some edge is, and
+        half the longest one.
+        """
+        some = self.tree.query(points.T)[1]
+        reach = self._foot(points, some)[1] + self.length.max() * (1 + EXACT) / 2
+        found = self.tree.query_ball_point(points.T, reach)
+        edge = np.concatenate(found).astype(int)
+        of = np.repeat(np.arange(len(found)), [len(each) for each in found])
+        middle = np.linalg.norm(self.tree.data[edge] - points.T[of], axis=1)
+        order = np.lexsort((middle, self._foot(points[:, of], edge)[1], of))
+        return np.asarray(edge[order][np.searchsorted(of, np.arange(len(found)))])

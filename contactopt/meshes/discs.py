@@ -1,6 +1,4 @@
-"""Meshes of half discs and of bodies that rise from them: rings of any radii around a core of
-squares.
-"""
+"""Half discs and bodies that rise from them: rings of any radii around a core of squares."""
 
 from __future__ import annotations
 
@@ -11,10 +9,8 @@ from skfem import MeshHex
 
 
 def half_disc(radii: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray]:
-    """Make nodes and quadrilaterals of the half disc y >= 0.
-
-    The innermost rings of nodes are squares. Those from number 2 sectors on are circles, with a
-    gradual change between.
+    """Make nodes and quadrilaterals of the half disc y >= 0. The innermost rings of nodes are
+    squares; those from number 2 sectors on are circles, with a gradual change between.
 
     Parameters
     ----------
@@ -26,25 +22,17 @@ def half_disc(radii: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray]:
     -------
     The nodes (2, n) [length], and the numbers (4, m) of the nodes of each quadrilateral.
     """
-    i, j = (
-        x.ravel()
-        for x in np.meshgrid(
-            np.arange(-sectors, sectors + 1), np.arange(sectors + 1), indexing="ij"
-        )
-    )
+    i, j = (np.indices((2 * sectors + 1, sectors + 1)) - [[[sectors]], [[0]]]).reshape(2, -1)
     ring = np.maximum(np.abs(i), j)
     # along the ring, from y = 0
     place = np.where(i == ring, j, np.where(j == ring, 2 * ring - i, 4 * ring - j))
-    core = _on_ring(
-        ring, place, np.stack([i, j]) / np.maximum(ring, 1), np.maximum(ring, 1), radii, sectors
-    )
+    parts = np.maximum(ring, 1)
+    core = _on_ring(ring, place, np.stack([i, j]) / parts, parts, radii, sectors)
     rim = np.flatnonzero(ring == sectors)
     rim = rim[np.argsort(place[rim])]
-    square = np.stack([i, j])[:, rim] / sectors
+    square, parts = np.stack([i, j])[:, rim] / sectors, parts[rim]
     outer = [
-        _on_ring(
-            np.full(len(rim), k), place[rim], square, np.full(len(rim), sectors), radii, sectors
-        )
+        _on_ring(0 * rim + k, place[rim], square, parts, radii, sectors)
         for k in range(sectors + 1, len(radii))
     ]
     p = np.concatenate([core, *outer], axis=1)

@@ -26,10 +26,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from contactopt.meshes.cells import is_curved
-from contactopt.meshes.curves import CORNER, STRAIGHT, rounding, shares
+from contactopt.meshes.cells import area_vectors, is_curved, outer_corners
+from contactopt.meshes.curves import CORNER, STRAIGHT, fitted_sphere, rounding, shares
 from contactopt.meshes.given_curves import Curve
-from contactopt.meshes.mesh_repair import outer_corners
 
 EDGE = np.deg2rad(60)  # turn of facets of second order from which on there is an edge of the body
 FIT = 1e-7  # of its size: how near the nodes of a region lie to a sphere or cylinder, at least
@@ -42,27 +41,16 @@ Shape = Callable[[np.ndarray], np.ndarray]
 
 
 def space_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
-    """Find the surfaces of all boundaries of a solid's mesh; those without a name have the name ''.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh in space.
-    arcs : Whether only spheres and cylinders count as curved, where the edges of the mesh are
-        straight.
-
-    Returns
-    -------
-    By name the surface, or None where the boundary is flat.
+    """By the name of each boundary of a solid's mesh, '' for what has none, its surface, or None
+    where it is flat. With `arcs`, only spheres and cylinders count as curved where the edges of the
+    mesh are straight.
     """
-    skin = _Skin(mesh, arcs)
-    return {
-        name: (
-            Curve(_Patches(skin, mine), skin.known, label)
-            if np.any(skin.region[mine] >= 0)
-            else None
-        )
-        for name, label, mine in shares(mesh, skin.owner)
-    }
+    skin, found = _Skin(mesh, arcs), dict[str, Curve | None]()
+    for name, label, mine in shares(mesh, skin.owner):
+        found[name] = None
+        if np.any(skin.region[mine] >= 0):
+            found[name] = Curve(_Patches(skin, mine), skin.known, label)
+    return found
 
 
 class _Skin:
@@ -75,25 +63,22 @@ class _Skin:
     region   (t,) the number of the region, -1 of flat triangles
     shapes   of each region its sphere or cylinder, or None
     known    whether the mesh has curved edges
+    near     how far nodes may be off by rounding [length]
     """
 
     def __init__(self, mesh: Any, arcs: bool) -> None:
         self.nodes, self.owner, middles = _triangles(mesh)
         self.corners = mesh.p[:, self.nodes]
-        chords = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
-        self.off = middles - chords
-        length = np.linalg.norm(np.roll(self.corners, -1, axis=1) - self.corners, axis=0)
+        self.middles = middles
+        self.off = middles - _between(self.corners)
+        length = np.linalg.norm(_along(self.corners), axis=0)
         self.known = bool(np.any(np.linalg.norm(self.off, axis=0) > STRAIGHT * length))
         self.near = rounding(self.corners.reshape(3, -1))
-        cross = np.cross(
-            self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0], axis=0
-        )
-        self.normals = cross / np.linalg.norm(cross, axis=0)
+        area = area_vectors(self.corners)
+        self.normals = area / np.linalg.norm(area, axis=0)
         pairs, sides = _neighbours(self.nodes)
-        turn = np.arccos(
-            np.clip(np.sum(self.normals[:, pairs[0]] * self.normals[:, pairs[1]], axis=0), -1, 1)
-        )
-        smooth = turn < (EDGE if self.known else CORNER)
+        cosine = np.sum(self.normals[:, pairs[0]] * self.normals[:, pairs[1]], axis=0)
+        smooth = np.arccos(cosine.clip(-1, 1)) < (EDGE if self.known else CORNER)
         flat = self._flat(pairs, sides, smooth)
         self.planes = np.full_like(self.off, np.nan)
         for here, there in ((0, 1), (1, 0)):
@@ -110,18 +95,16 @@ class _Skin:
             self._guess(free, flat)
 
     def _flat(self, pairs: np.ndarray, sides: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-        """(t,) whether a triangle is flat, with its piece of the surface or all others at a corner."""
+        """Whether each triangle (t,) is flat, with its piece or with all others at a corner."""
         level = smooth.copy()
         for here, there in ((0, 1), (1, 0)):
             opposite = self.corners[:, (sides[there] + 2) % 3, pairs[there]]
-            height = np.sum(
-                (opposite - self.corners[:, 0, pairs[here]]) * self.normals[:, pairs[here]], axis=0
-            )
+            offset = opposite - self.corners[:, 0, pairs[here]]
+            height = np.sum(offset * self.normals[:, pairs[here]], axis=0)
             level &= np.abs(height) < 2 * self.near
         count = len(self.owner)
-        straight = np.all(
-            np.abs(np.sum(self.off * self.normals[:, None], axis=0)) < 2 * self.near, axis=0
-        )
+        height = np.sum(self.off * self.normals[:, None], axis=0)
+        straight = np.all(np.abs(height) < 2 * self.near, axis=0)
         piece = _components(pairs[:, smooth], count)
         bent = np.zeros(count, dtype=bool)
         bent[piece[pairs[0, smooth & ~level]]] = True
@@ -133,11 +116,10 @@ class _Skin:
 
     def _shape(self, region: int) -> Shape | None:
         mine = self.region == region
-        points = [self.corners[:, :, mine].reshape(3, -1)]
+        points = self.corners
         if self.known:
-            chords = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
-            points.append((chords + self.off)[:, :, mine].reshape(3, -1))
-        places = np.unique(np.concatenate(points, axis=1), axis=1)
+            points = np.concatenate([points, self.middles], axis=1)
+        places = np.unique(points[:, :, mine].reshape(3, -1), axis=1)
         near = max(self.near, FIT * np.ptp(places, axis=1).max())
         return _sphere(places, near) or _cylinder(places, self.normals[:, mine], near)
 
@@ -151,14 +133,23 @@ class _Skin:
             mine = np.flatnonzero(self.region == region)
             normals = _vertex_normals(places, self.nodes[:, mine], self.normals[:, mine], given)
             at = normals[:, self.nodes[:, mine]]
-            mean, change = (at + np.roll(at, -1, axis=1)) / 2, np.roll(at, -1, axis=1) - at
-            along = np.roll(self.corners[:, :, mine], -1, axis=1) - self.corners[:, :, mine]
-            mean = mean / np.linalg.norm(mean, axis=0)
-            self.off[:, :, mine] = mean * np.sum(change * along, axis=0) / 8
+            mean = _between(at) / np.linalg.norm(_between(at), axis=0)
+            bend = np.sum(_along(at) * _along(self.corners[:, :, mine]), axis=0)
+            self.off[:, :, mine] = mean * bend / 8
+
+
+def _between(corners: np.ndarray) -> np.ndarray:
+    """Means of values (dim, 3, t) at the ends of the edges 01, 12, 20."""
+    return np.asarray((corners + np.roll(corners, -1, axis=1)) / 2)
+
+
+def _along(corners: np.ndarray) -> np.ndarray:
+    """Changes of values (dim, 3, t) along the edges 01, 12, 20."""
+    return np.asarray(np.roll(corners, -1, axis=1) - corners)
 
 
 def _triangles(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners (3, t) of the triangles, their facets (t,), and the middles (3, 3, t) of their edges."""
+    """Corners (3, t) of the triangles, their facets (t,), and middles (3, 3, t) of their edges."""
     facets = mesh.boundary_facets()
     nodes = outer_corners(mesh, facets)
     quads = len(nodes) == 4
@@ -167,10 +158,8 @@ def _triangles(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     middles = mesh.p[:, ends].mean(axis=1)
     if is_curved(mesh):
         size = mesh.nvertices
-        keys, wanted = (
-            np.minimum(*each) * size + np.maximum(*each)
-            for each in (mesh.edges.astype(np.int64), ends)
-        )
+        both = mesh.edges.astype(np.int64), ends
+        keys, wanted = (np.minimum(*each) * size + np.maximum(*each) for each in both)
         order = np.argsort(keys)
         place = order[np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)]
         there = keys[place] == wanted  # diagonals of quadrilaterals are no edges
@@ -200,20 +189,16 @@ def _components(pairs: np.ndarray, count: int) -> np.ndarray:
 def _vertex_normals(
     places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, given: np.ndarray
 ) -> np.ndarray:
-    """Normals (3, n) at the nodes of a region: those given, or of quadratics through the nodes
-    around.
-    """
+    """Normals (3, n) at nodes of a region: those given, or of quadratics through nodes around."""
     size = places.shape[1]
     found = np.zeros((3, size))
     for row in nodes:
         np.add.at(found.T, row, normals.T)
     mine = np.unique(nodes)
     found[:, mine] /= np.linalg.norm(found[:, mine], axis=0)
-    ends = (
-        np.concatenate([nodes, np.roll(nodes, -1, axis=0)], axis=1),
-        np.concatenate([np.roll(nodes, -1, axis=0), nodes], axis=1),
-    )
-    near = csr_matrix((np.ones(ends[0].size), (ends[0].ravel(), ends[1].ravel())), (size, size))
+    ends = nodes.ravel(), np.roll(nodes, -1, axis=0).ravel()
+    near = csr_matrix((np.ones(nodes.size), ends), (size, size))
+    near = near + near.T
     around = near + near @ near
     for node in mine.tolist():
         others = around.indices[around.indptr[node] : around.indptr[node + 1]]
@@ -234,10 +219,9 @@ def _vertex_normals(
 
 def _sphere(places: np.ndarray, near: float) -> Shape | None:
     """The projection on the sphere on which places (3, m) lie."""
-    centre, radius = _round(places)
-    if places.shape[1] <= FEWEST or np.any(
-        np.abs(np.linalg.norm(places - centre, axis=0) - radius) > near
-    ):
+    centre, radius = fitted_sphere(places)
+    off = np.linalg.norm(places - centre, axis=0) - radius
+    if places.shape[1] <= FEWEST or np.any(np.abs(off) > near):
         return None
 
     def project(points: np.ndarray) -> np.ndarray:
@@ -259,7 +243,7 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
 
     def off(tilt: np.ndarray, x: np.ndarray = few) -> np.ndarray:
         flat = section(tilt) @ x
-        centre, radius = _round(section(tilt) @ few)
+        centre, radius = fitted_sphere(section(tilt) @ few)
         return np.asarray(np.linalg.norm(flat - centre, axis=0) - radius)
 
     size = np.ptp(places, axis=1).max()
@@ -269,7 +253,7 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
     if places.shape[1] <= FEWEST or np.any(np.abs(off(best, places)) > near):
         return None
     across = section(best)
-    centre, radius = _round(across @ few)
+    centre, radius = fitted_sphere(across @ few)
 
     def project(points: np.ndarray) -> np.ndarray:
         away = across @ points - centre
@@ -278,27 +262,12 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
     return project
 
 
-def _round(places: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre (dim, 1) and radius of the circle or sphere that fits places (dim, m) best."""
-    middle = places.mean(axis=1, keepdims=True)
-    offset = places - middle
-    size = max(np.abs(offset).max(), 1e-300)
-    offset = offset / size
-    terms = np.column_stack([2 * offset.T, np.ones(offset.shape[1])])
-    *centre, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
-    radius = np.sqrt(max(rest + np.sum(np.square(centre)), 0.0))
-    return middle + size * np.array(centre)[:, None], float(size * radius)
-
-
 class _Patches:
     """The surface of some of the triangles."""
 
     def __init__(self, skin: _Skin, mine: np.ndarray) -> None:
-        self.corners, self.off, self.planes = (
-            skin.corners[:, :, mine],
-            skin.off[:, :, mine],
-            skin.planes[:, :, mine],
-        )
+        self.corners, self.off = skin.corners[:, :, mine], skin.off[:, :, mine]
+        self.planes = skin.planes[:, :, mine]
         self.region, self.shapes, self.near = skin.region[mine], skin.shapes, skin.near
         self.tree = cKDTree(self.corners.mean(axis=1).T)
 
@@ -321,13 +290,12 @@ class _Patches:
     def _on(
         self, region: int, points: np.ndarray, chosen: np.ndarray, share: np.ndarray
     ) -> np.ndarray:
-        """Points on triangles of a region; those in a plane beyond an edge of the body stay in it."""
+        """Points on triangles of a region; those in a plane beyond an edge of the body stay in."""
         shape = self.shapes[region]
         if shape is None:
+            both = share * np.roll(share, -1, axis=0)
             found = np.einsum("ict,ct->it", self.corners[:, :, chosen], share)
-            found = found + 4 * np.einsum(
-                "iet,et->it", self.off[:, :, chosen], share * np.roll(share, -1, axis=0)
-            )
+            found = found + 4 * np.einsum("iet,et->it", self.off[:, :, chosen], both)
         else:
             found = shape(points)
         for edge in range(3):
@@ -347,28 +315,18 @@ def _in_plane(
         off = found - points
         inside = off - normal * np.sum(off * normal, axis=0)
         size = np.sum(inside**2, axis=0)
-        return np.asarray(
-            points
-            + inside * np.where(size > 0, np.sum(off**2, axis=0) / np.where(size > 0, size, 1), 0)
-        )
+        stretch = np.sum(off**2, axis=0) / np.where(size > 0, size, np.inf)
+        return np.asarray(points + inside * stretch)
     for _ in range(ALTERNATE):
-        found = found - normal * np.sum((found - points) * normal, axis=0)
-        found = shape(found)
+        found = shape(found - normal * np.sum((found - points) * normal, axis=0))
     return np.asarray(found - normal * np.sum((found - points) * normal, axis=0))
 
 
 def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Barycentric coordinates of points in facets, and how far they are from these.
+    """Where points (dim, m) are beside c edges or triangles each, with corners (dim, dim, m, c).
 
-    Parameters
-    ----------
-    corners : (dim, dim, m, c) corners of c edges or triangles for each point [length].
-    points : (dim, m) points [length].
-
-    Returns
-    -------
-    Coordinates (m, c, dim) of the nearest points of the lines or planes, and distances (m, c) over
-    the sizes of the facets.
+    Returns barycentric coordinates (m, c, dim) of the nearest points of the lines or planes, and
+    distances (m, c) over the sizes of the facets.
     """
     origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
     offset = points[:, :, None] - origin
@@ -376,6 +334,5 @@ def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np
     weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
     every = np.concatenate([1 - weights.sum(axis=-1, keepdims=True), weights], axis=-1)
     height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
-    return every, np.maximum(-every, 0).max(axis=-1) + height / np.sqrt(
-        np.trace(gram, axis1=2, axis2=3)
-    )
+    size = np.sqrt(np.trace(gram, axis1=2, axis2=3))
+    return every, np.maximum(-every, 0).max(axis=-1) + height / size

@@ -54,14 +54,9 @@ def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
 
     Parameters
     ----------
-    curve : The curve of the boundary.
-    mesh : A scikit-fem mesh.
-    boundary : The name of the boundary.
-
-    Raises
-    ------
-    InputError : Where the nodes of many facets are further from the curve than OFF of the facet, or
-        those of one than FAR.
+    curve, mesh, boundary : The curve of a boundary, a scikit-fem mesh, and the boundary's name.
+        InputError where the nodes of many facets are further from the curve than OFF of the facet,
+        or those of one than FAR.
     """
     corners = mesh.facets[:, mesh.boundaries[boundary]]
     places = mesh.p[:, corners]

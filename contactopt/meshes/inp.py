@@ -19,21 +19,13 @@ from typing import Any
 import numpy as np
 
 PLANE = {
-    "3": ("triangle", 3),
-    "6": ("triangle6", 6),
-    "4": ("quad", 4),
-    "8": ("quad8", 8),
-    "9": ("quad9", 9),
-}
+    "3": ("triangle", 3), "6": ("triangle6", 6),
+    "4": ("quad", 4), "8": ("quad8", 8), "9": ("quad9", 9),
+}  # fmt: skip
 SOLID = {
-    **{
-        "4": ("tetra", 4),
-        "10": ("tetra10", 10),
-        "8": ("hexahedron", 8),
-        "20": ("hexahedron20", 20),
-    },
-    **{"27": ("hexahedron27", 27), "6": ("wedge", 6), "15": ("wedge15", 15), "5": ("pyramid", 5)},
-}
+    "4": ("tetra", 4), "10": ("tetra10", 10), "8": ("hexahedron", 8), "20": ("hexahedron20", 20),
+    "27": ("hexahedron27", 27), "6": ("wedge", 6), "15": ("wedge15", 15), "5": ("pyramid", 5),
+}  # fmt: skip
 LINE = {"2": ("line", 2), "1": ("line", 2), "3": ("line3", 3)}
 FAMILIES = (
     (re.compile(r"D?C3D(\d+)"), SOLID),
@@ -47,12 +39,8 @@ FACES = {
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     "hexahedron": (
-        (0, 1, 2, 3),
-        (4, 7, 6, 5),
-        (0, 4, 5, 1),
-        (1, 5, 6, 2),
-        (2, 6, 7, 3),
-        (3, 7, 4, 0),
+        *((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1)),
+        *((1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
     ),
 }
 FACET = {2: "line", 3: "triangle", 4: "quad"}
@@ -60,19 +48,9 @@ DEEPEST = 10  # files that include each other
 
 
 def read_inp(path: Path) -> Any:
-    """Read an input file of CalculiX or Abaqus.
+    """The mesh of a file, with sets of elements and of nodes by name. A surface is a set of facets.
 
-    Parameters
-    ----------
-    path : The file.
-
-    Returns
-    -------
-    The mesh, with sets of elements and of nodes by name. A surface is a set of facets.
-
-    Raises
-    ------
-    ValueError, KeyError, IndexError, OSError : Where the file does not keep to the format.
+    ValueError, KeyError, IndexError or OSError where the file does not keep to the format.
     """
     import meshio
 
@@ -82,18 +60,17 @@ def read_inp(path: Path) -> Any:
             getattr(read, keyword)(options, rows)
     blocks = read.blocks + read.facets()
     tags = sorted(read.nodes)
-    return meshio.Mesh(
-        np.array([read.nodes[tag] for tag in tags]).reshape(-1, 3),
-        [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in blocks],
-        cell_sets={
-            name: [_places(ids, found) for _, _, ids in blocks]
-            for name, found in read.element_sets.items()
-        },
-        point_sets={
-            name: np.searchsorted(tags, sorted(found & read.nodes.keys()))
-            for name, found in read.node_sets.items()
-        },
-    )
+    points = np.array([read.nodes[tag] for tag in tags]).reshape(-1, 3)
+    cells = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in blocks]
+    of_cells = {
+        name: [_places(ids, found) for _, _, ids in blocks]
+        for name, found in read.element_sets.items()
+    }
+    of_points = {
+        name: np.searchsorted(tags, sorted(found & read.nodes.keys()))
+        for name, found in read.node_sets.items()
+    }
+    return meshio.Mesh(points, cells, cell_sets=of_cells, point_sets=of_points)
 
 
 def _places(ids: np.ndarray, found: set[int]) -> np.ndarray:
@@ -101,11 +78,8 @@ def _places(ids: np.ndarray, found: set[int]) -> np.ndarray:
 
 
 def _blocks(path: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Keyword in lower case, options, and the rows of data of each block; included files in their
-    place.
-    """
-    keyword, rows = "", list[list[str]]()
-    options: dict[str, str] = {}
+    """Keyword in lower case, options, rows of data of each block; included files in their place."""
+    keyword, rows, options = "", list[list[str]](), dict[str, str]()
     if depth > DEEPEST:
         raise ValueError("files include each other without end")
     with path.open(errors="replace") as file:
@@ -118,10 +92,8 @@ def _blocks(path: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[
             yield keyword, options, rows
             first, *words = line[1:].split(",")
             keyword, rows = first.strip().lower(), []
-            options = {
-                k.strip().lower(): v.strip().strip('"')
-                for k, _, v in (word.partition("=") for word in words)
-            }
+            pairs = (word.partition("=") for word in words)
+            options = {key.strip().lower(): value.strip().strip('"') for key, _, value in pairs}
             if keyword == "include":
                 yield from _blocks(path.parent / options["input"], depth + 1)
     yield keyword, options, rows
@@ -157,9 +129,8 @@ class _Reader:
         for pattern, kinds in FAMILIES:
             if found := pattern.match(options["type"].upper()):
                 kind, count = kinds[found[1]]
-                words = np.array([word for row in rows for word in row], dtype=np.int64).reshape(
-                    -1, 1 + count
-                )
+                words = np.array([word for row in rows for word in row], dtype=np.int64)
+                words = words.reshape(-1, 1 + count)
                 self.blocks.append((kind, words[:, 1:], words[:, 0]))
                 if not set(words[:, 1:].ravel().tolist()) <= self.nodes.keys():
                     raise ValueError(f"an element {options['type']} names a node that is not there")
@@ -181,10 +152,8 @@ class _Reader:
 
     def facets(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
         """Blocks of facets that stand for the surfaces, whose numbers are new."""
-        new, made = (
-            1 + max((int(ids.max()) for _, _, ids in self.blocks if len(ids)), default=0),
-            [],
-        )
+        made = []
+        new = 1 + max((int(ids.max()) for _, _, ids in self.blocks if len(ids)), default=0)
         for name, rows in self.surfaces.items():
             for what, face in rows:
                 members = {int(what)} if what.isdigit() else _set(self.element_sets, what)

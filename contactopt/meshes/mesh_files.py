@@ -1,5 +1,4 @@
-"""Meshes from files: everything that meshio reads, with the groups of the file as bodies and as
-named boundaries.
+"""Meshes from files that meshio reads, with their groups as bodies and as named boundaries.
 
 A boundary is found by its corners on the surface of the body. So its normal is the outward one of
 the body, whichever way round the file writes the facets, and a face between two parts of a file is
@@ -22,10 +21,9 @@ from contactopt.meshes.mesh_repair import (
     CORNERS,
     SAME,
     Cells,
+    check_connected,
     check_elements,
-    check_surface,
     complete,
-    pieces,
     repaired,
     representatives,
     text,
@@ -33,16 +31,6 @@ from contactopt.meshes.mesh_repair import (
 
 PLANE = 1e-9  # a mesh is plane if it is thinner than this fraction of its size
 FAR = 1e100  # larger coordinates have no volume in floating-point numbers
-FACET_CORNERS = {
-    "line": 2,
-    "line3": 2,
-    "triangle": 3,
-    "triangle6": 3,
-    "quad": 4,
-    "quad8": 4,
-    "quad9": 4,
-}
-
 log = logging.getLogger(__name__)
 
 
@@ -75,47 +63,23 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     dim, points = _place(path, groups)
     cells = _elements(path, groups, dim, points * scale, group)
     bodies = groups.names(dim)
-    hint = (
-        f"choose the body by its group, one of {', '.join(bodies)}"
-        if len(bodies) > 1
-        else "mesh it in one piece"
-    )
+    hint = "mesh it in one piece"
+    if len(bodies) > 1:
+        hint = f"choose the body by its group, one of {', '.join(bodies)}"
     merged = np.arange(cells.points.shape[1])
     if group is not None or len(bodies) < 2:  # nodes of different bodies stay apart
         merged = representatives(cells)
     cells = repaired(cells, merged)
-    count = pieces(cells)
-    if count > 1:
-        raise InputError(
-            f"mesh file '{path}': the body falls into {count} pieces that share no node; {hint}."
-        )
-    corners = np.unique(cells.corners)
-    inner = np.unique(cells.nodes[len(cells.corners) :])
-    both = np.intersect1d(corners, inner)
-    if len(both):
-        element = int(np.argmax(np.any(cells.nodes == both[0], axis=0)))
-        raise InputError(
-            f"mesh file '{path}': a node of {cells.name(element)} is a corner of one element and"
-            " within an edge of another; mesh this place anew."
-        )
-    kept = np.concatenate([corners, inner])
-    number = np.full(cells.points.shape[1], -1)
-    number[kept] = np.arange(len(kept))
-    try:
-        mesh = _mesh(cells.kind, cells.points[:, kept], number[cells.nodes])
-    except (IndexError, ValueError) as error:  # there are not as many nodes as edges
-        raise InputError(
-            f"mesh file '{path}': neighbouring elements do not share the nodes within their edges;"
-            " mesh it anew."
-        ) from error
+    check_connected(cells, hint)
+    mesh, number = _mesh(cells)
     check_elements(cells, mesh)
-    check_surface(path, mesh)
     mesh = mesh.with_boundaries(_boundaries(mesh, groups, dim, number[merged]))
     left_out = len(groups.points) - len(np.unique(cells.nodes[cells.nodes < len(groups.points)]))
     log.info(
-        "%s: %d elements (%s) of the body, %d nodes, from (%s) to (%s) in the unit of the scene; boundaries: %s; "
-        "%d nodes of the file belong to none of its elements",
-        path, mesh.nelements, cells.kind, len(kept), text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1)),
+        "%s: %d elements (%s) of the body, %d nodes, from (%s) to (%s) in the unit of the scene;"
+        " boundaries: %s; %d nodes of the file belong to none of its elements",
+        path, mesh.nelements, cells.kind, np.count_nonzero(number >= 0),
+        text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1)),
         ", ".join(mesh.boundaries or {}) or "none", left_out,
     )  # fmt: skip
     return mesh
@@ -134,11 +98,7 @@ def name_boundaries(
 
     Returns
     -------
-    The mesh with these boundaries beside its own.
-
-    Raises
-    ------
-    InputError : If no facet lies there.
+    The mesh with these boundaries beside its own. InputError if no facet lies there.
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:, mesh.facets[:, facets]]
@@ -166,9 +126,8 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
             f"mesh file '{path}': it holds no elements of a body, neither in a plane nor in space."
         )
     points = np.asarray(groups.points, dtype=float)
-    cells = np.unique(
-        np.concatenate([nodes.ravel() for _, nodes, dims in groups.blocks if dims == dim])
-    )
+    own = [nodes.ravel() for _, nodes, dims in groups.blocks if dims == dim]
+    cells = np.unique(np.concatenate(own))
     lost = cells[~np.all(np.abs(points[cells]) < FAR, axis=1)]
     if len(lost):
         raise InputError(
@@ -184,11 +143,8 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
         )
     across = 2 if spread[2] <= PLANE * spread.max() else int(np.argmin(spread))
     if across != 2:
-        log.info(
-            "%s: the mesh lies across the %s axis; the other coordinates keep their order",
-            path,
-            "xyz"[across],
-        )
+        said = "%s: the mesh lies across the %s axis; the other coordinates keep their order"
+        log.info(said, path, "xyz"[across])
     return 2, np.delete(points, across, axis=1).T
 
 
@@ -198,22 +154,17 @@ def _elements(
     """The elements of a group, all of one type, serendipity elements completed."""
     bodies = ", ".join(groups.names(dim)) or "none"
     if group is not None and group not in groups.names(dim):
-        facets = group in groups.names(dim - 1)
-        note = (
-            f"{group!r} is a group of facets, a boundary"
-            if facets
-            else f"there is no group {group!r}"
-        )
+        note = f"there is no group {group!r}"
+        if group in groups.names(dim - 1):
+            note = f"{group!r} is a group of facets, a boundary"
         raise InputError(f"mesh file '{path}': {note}; its groups of elements are {bodies}.")
     found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     before: dict[str, int] = {}
     for i, (kind, nodes, dims) in enumerate(groups.blocks):
         if dims == dim:
-            chosen = (
-                np.arange(len(nodes))
-                if group is None
-                else groups.members[group, dim].get(i, np.zeros(0, int))
-            )
+            chosen = np.arange(len(nodes))
+            if group is not None:
+                chosen = groups.members[group, dim].get(i, chosen[:0])
             if len(chosen):
                 found.setdefault(kind, []).append((nodes[chosen], chosen + before.get(kind, 0)))
             before[kind] = before.get(kind, 0) + len(nodes)
@@ -224,34 +175,52 @@ def _elements(
                 " quadrilaterals, tetrahedra or hexahedra of first or second order."
             )
     if len(found) != 1:
+        choice = "" if group is not None or bodies == "none" else ", or choose one of its groups: "
         raise InputError(
             f"mesh file '{path}': the body mixes elements of type {' and '.join(found)}; make all"
-            " of one type"
-            + (
-                "."
-                if group is not None or bodies == "none"
-                else f", or choose one of its groups: {bodies}."
-            )
+            f" of one type{choice}{bodies if choice else ''}."
         )
     ((kind, parts),) = found.items()
     nodes, numbers = (np.concatenate(each) for each in zip(*parts))
     return complete(Cells(path, kind, points, nodes.T.astype(np.int64), numbers))
 
 
-def _mesh(kind: str, points: np.ndarray, nodes: np.ndarray) -> skfem.Mesh:
-    """The mesh of scikit-fem, which has an order of its own for the nodes of an element."""
+def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
+    """The mesh of scikit-fem, which has an order of its own for the nodes of an element, and the
+    node of it for every node of the file, or -1.
+    """
     import meshio
     from skfem.io.meshio import from_meshio
 
-    return from_meshio(meshio.Mesh(points.T, [(kind, nodes.T)]), force_meshio_type=kind)
+    corners = np.unique(cells.corners)
+    inner = np.unique(cells.nodes[len(cells.corners) :])
+    both = np.intersect1d(corners, inner)
+    if len(both):
+        raise cells.refused(
+            int(np.argmax(np.any(cells.nodes == both[0], axis=0))),
+            "a node of {} is a corner of one element and within an edge of another; mesh this place"
+            " anew.",
+        )
+    kept = np.concatenate([corners, inner])
+    number = np.full(cells.points.shape[1], -1)
+    number[kept] = np.arange(len(kept))
+    block = cells.kind, number[cells.nodes].T
+    try:
+        mesh = from_meshio(
+            meshio.Mesh(cells.points[:, kept].T, [block]), force_meshio_type=cells.kind
+        )
+    except (IndexError, ValueError) as error:  # there are not as many nodes as edges
+        raise InputError(
+            f"mesh file '{cells.path}': neighbouring elements do not share the nodes within their"
+            " edges; mesh it anew."
+        ) from error
+    return mesh, number
 
 
 def _boundaries(
     mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Name -> facets on the surface of the mesh; `number` is the node of the mesh for every node of
-    the file, or -1.
-    """
+    """Name -> facets on the surface; `number` is the mesh's node for each of the file, or -1."""
     outer = mesh.boundary_facets()
     corners = np.sort(mesh.facets[:, outer], axis=0)
     place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}
@@ -260,9 +229,8 @@ def _boundaries(
         hits = []
         for i, elements in groups.members[name, dim - 1].items():
             kind, nodes, _ = groups.blocks[i]
-            facets = np.sort(
-                number[nodes[elements][:, : FACET_CORNERS.get(kind, nodes.shape[1])]], axis=1
-            )
+            count = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
+            facets = np.sort(number[nodes[elements][:, :count]], axis=1)
             hits += [place[key] for key in map(tuple, facets.tolist()) if key in place]
         if hits:
             found[name] = outer[np.unique(hits)]

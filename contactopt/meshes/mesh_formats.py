@@ -12,8 +12,9 @@ import io
 import pickle
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +27,8 @@ from contactopt.meshes.msh4 import read_msh2, read_msh4, version
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
 TAGS = (
-    "gmsh:physical",
-    "medit:ref",
-    "cell_tags",
-    "su2:tag",
-    "nastran:ref",
-    "avsucd:material",
-    "flac3d:group",
-    "netgen:index",
+    *("gmsh:physical", "medit:ref", "cell_tags", "su2:tag", "nastran:ref"),
+    *("avsucd:material", "flac3d:group", "netgen:index"),
 )
 # formats whose readers end on damaged text; others may not
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
@@ -70,19 +65,8 @@ class FileGroups:
 
 
 def read_groups(path: Path) -> FileGroups:
-    """Read a mesh file with its groups.
-
-    Parameters
-    ----------
-    path : A file in any format that meshio reads.
-
-    Returns
-    -------
-    Nodes, elements by their kind, and the groups of elements and of nodes by their names.
-
-    Raises
-    ------
-    InputError : In one sentence, whatever is wrong with the file.
+    """Nodes, elements by their kind, and the groups of elements and of nodes by their names, of a
+    file in any format that meshio reads. InputError in one sentence, whatever is wrong with it.
     """
     mesh = _read(path)
     blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
@@ -98,50 +82,34 @@ def read_groups(path: Path) -> FileGroups:
         group[i] = np.union1d(group.get(i, elements), elements)
 
     for name, sets in mesh.cell_sets.items():
-        if not name.startswith("gmsh:"):
-            for i, found in enumerate(sets):
-                if found is not None and len(found):
-                    found = np.asarray(found)
-                    add(
-                        name, i, np.flatnonzero(found) if found.dtype == bool else found.astype(int)
-                    )
-    named = {(int(tag), int(dim)): name for name, (tag, dim) in _numbered(mesh.field_data)}
+        for i, found in enumerate(() if name.startswith("gmsh:") else sets):
+            if found is not None and len(found):
+                found = np.asarray(found)
+                add(name, i, np.flatnonzero(found) if found.dtype == bool else found.astype(int))
+    # names of physical groups with their numbers and dimensions; other data are passed over
+    numbered = {k: value for k, value in mesh.field_data.items() if np.shape(value) == (2,)}
+    named = {(int(tag), int(dim)): name for name, (tag, dim) in numbered.items()}
     for key, arrays in mesh.cell_data.items():
         for i, values in enumerate(np.asarray(array) for array in arrays):
             if key == "gmsh:geometrical" or values.dtype.kind not in "iu" or values.ndim != 1:
                 continue
             for tag in np.unique(values):
-                number = f"{tag}" if key in TAGS else f"{key}={tag}"
-                name = (
-                    named.get((int(tag), blocks[i][2]), number)
-                    if key == "gmsh:physical"
-                    else number
-                )
+                name = f"{tag}" if key in TAGS else f"{key}={tag}"
+                if key == "gmsh:physical":
+                    name = named.get((int(tag), blocks[i][2]), name)
                 if tag != 0 or key not in TAGS:
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
     return FileGroups(np.asarray(mesh.points), blocks, members, sets)
 
 
-def _numbered(field_data: Mapping) -> list[tuple[str, tuple[int, int]]]:
-    """Names of physical groups with their numbers and dimensions; other data of the file are passed
-    over.
-    """
-    return [(name, tuple(value)) for name, value in field_data.items() if np.shape(value) == (2,)]
-
-
 def _read(path: Path) -> Any:
+    """The mesh of meshio."""
     import meshio
 
     if not path.is_file():
-        what = (
-            "is a folder"
-            if path.is_dir()
-            else "is no file that can be read"
-            if path.exists()
-            else "does not exist"
-        )
-        raise InputError(f"mesh file '{path}' {what}.")
+        what = "is no file that can be read" if path.exists() else "does not exist"
+        raise InputError(f"mesh file '{path}' {'is a folder' if path.is_dir() else what}.")
     size = path.stat().st_size
     if not 0 < size < MOST_BYTES:
         raise InputError(
@@ -156,6 +124,28 @@ def _read(path: Path) -> Any:
             " (Abaqus, CalculiX), ..."
         )
     said = ""
+    for name, reader in _readers(path, formats, size):
+        printed = io.StringIO()
+        try:  # on a damaged file readers raise anything, print what is wrong, and end the process
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
+                return reader()
+        except (Exception, SystemExit) as error:
+            text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
+            if name:
+                said = said or " ".join(text.split())[:200] or type(error).__name__
+    advice = "; save Gmsh files as text in version 4.1 or 2.2" if "gmsh" in formats else ""
+    raise InputError(
+        f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of"
+        f" another format{advice}."
+    )
+
+
+def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """The format and the reader of each attempt; what an attempt without a format says of a damaged
+    file does not count.
+    """
+    import meshio
+
     stated, binary = version(path) if "gmsh" in formats else (None, False)
     if stated is not None and stated.partition(".")[0] not in ("2", "4"):
         raise InputError(
@@ -163,36 +153,20 @@ def _read(path: Path) -> Any:
             " 2.2."
         )
     if binary:  # meshio trusts the counts of damaged files
-        formats = ["gmsh"]
+        newer = stated != "4.0"
+        older = str(stated)[0] == "2"
+        yield "gmsh", partial(read_msh2, path) if older else partial(read_msh4, path, newer)
+        return
     for newer in (False, True):  # "4" stands for either
-        if not binary and stated in (("4", "4.1") if newer else ("4", "4.0")):
-            with contextlib.suppress(Exception):  # what is wrong with a damaged file is said below
-                return read_msh4(path, newer)
+        if stated in (("4", "4.1") if newer else ("4", "4.0")):
+            yield "", partial(read_msh4, path, newer)
     for name in sorted(formats, key=lambda name: name not in SAFE):
-        printed = io.StringIO()
-        try:  # on a damaged file readers raise anything, print what is wrong, and end the process
-            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
-                if name == "abaqus":
-                    return read_inp(path)
-                if binary:
-                    return (
-                        read_msh2(path)
-                        if str(stated)[0] == "2"
-                        else read_msh4(path, stated != "4.0")
-                    )
-                return (
-                    meshio.read(path, file_format=name)
-                    if name in SAFE
-                    else _read_apart(path, name, size)
-                )
-        except (Exception, SystemExit) as error:
-            text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
-            said = said or " ".join(text.split())[:200] or type(error).__name__
-    raise InputError(
-        f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of"
-        " another format"
-        + ("; save Gmsh files as text in version 4.1 or 2.2." if "gmsh" in formats else ".")
-    )
+        if name == "abaqus":
+            yield name, partial(read_inp, path)
+        elif name in SAFE:
+            yield name, partial(meshio.read, path, file_format=name)
+        else:
+            yield name, partial(_read_apart, path, name, size)
 
 
 def _read_apart(path: Path, name: str, size: int) -> Any:

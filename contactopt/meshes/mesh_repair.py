@@ -1,6 +1,4 @@
-"""Faults of meshes from files: each is repaired, with a line in the log, or refused in a sentence
-that names the element.
-"""
+"""Faults of meshes from files are repaired, with a line in the log, or refused in a sentence."""
 
 from __future__ import annotations
 
@@ -16,65 +14,27 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
+from contactopt.meshes.cells import area_vectors, mirrored, outer_corners, volumes
 
 SAME = 1e-6  # places this fraction of a size apart are one place
-ONE, APART = (
-    1e-4,
-    1e-3,
-)  # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
+# nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
+ONE, APART = 1e-4, 1e-3
 FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
 CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
-CORNERS = {
+CORNERS = {  # of the elements that can be used
     **{"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "tetra": 4, "tetra10": 4},
     **{"hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8},
-}
-# places in an element of the same element numbered the other way round; the order of nodes is that
-# of meshio
-_HEXAHEDRON = (4, 5, 6, 7, 0, 1, 2, 3)
-MIRRORED = {
-    "triangle": (0, 2, 1),
-    "triangle6": (0, 2, 1, 5, 4, 3),
-    "quad": (0, 3, 2, 1),
-    "quad9": (0, 3, 2, 1, 7, 6, 5, 4, 8),
-    "tetra": (0, 2, 1, 3),
-    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
-    "hexahedron": _HEXAHEDRON,
-    "hexahedron27": (
-        *_HEXAHEDRON,
-        12,
-        13,
-        14,
-        15,
-        8,
-        9,
-        10,
-        11,
-        16,
-        17,
-        18,
-        19,
-        20,
-        21,
-        22,
-        23,
-        25,
-        24,
-        26,
-    ),
 }
 # the sides of serendipity elements that have no node in the middle: their corners and the nodes of
 # their edges
 _SIDES = {
     "quad8": (((0, 1, 2, 3), (4, 5, 6, 7)),),
     "hexahedron20": (
-        ((0, 3, 4, 7), (11, 15, 16, 19)),
-        ((1, 2, 5, 6), (9, 13, 17, 18)),
-        ((0, 1, 4, 5), (8, 12, 16, 17)),
-        ((2, 3, 6, 7), (10, 14, 18, 19)),
-        ((0, 1, 2, 3), (8, 9, 10, 11)),
-        ((4, 5, 6, 7), (12, 13, 14, 15)),
+        ((0, 3, 4, 7), (11, 15, 16, 19)), ((1, 2, 5, 6), (9, 13, 17, 18)),
+        ((0, 1, 4, 5), (8, 12, 16, 17)), ((2, 3, 6, 7), (10, 14, 18, 19)),
+        ((0, 1, 2, 3), (8, 9, 10, 11)), ((4, 5, 6, 7), (12, 13, 14, 15)),
     ),
-}
+}  # fmt: skip
 COMPLETE = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
 
 log = logging.getLogger(__name__)
@@ -106,24 +66,19 @@ class Cells:
         middle = self.points[:, self.corners[:, element]].mean(axis=1)
         return f"{self.kind} number {self.numbers[element] + 1} of the file, at ({text(middle)})"
 
+    def refused(self, element: int, fault: str) -> InputError:
+        """The error that names an element where `fault` has {}."""
+        return InputError(f"mesh file '{self.path}': {fault.format(self.name(element))}")
+
 
 def text(x: np.ndarray) -> str:
-    """Write coordinates for a message, with six digits each."""
+    """Coordinates for a message, with six digits each."""
     return ", ".join(f"{value:.6g}" for value in x)
 
 
 def complete(cells: Cells) -> Cells:
-    """Give serendipity elements the nodes that they lack, at the places that their own shape
-    functions give.
-
-    Parameters
-    ----------
-    cells : The elements of a file.
-
-    Returns
-    -------
-    Quadrilaterals of nine and hexahedra of 27 nodes in place of those of eight and twenty; others
-    as they are.
+    """Quadrilaterals of nine and hexahedra of 27 nodes in place of those of eight and twenty, whose
+    own shape functions place the new nodes; other elements as they are.
     """
     if cells.kind not in COMPLETE:
         return cells
@@ -134,34 +89,21 @@ def complete(cells: Cells) -> Cells:
     if cells.kind == "hexahedron20":
         new.append(c[:, 8:].sum(axis=1) / 4 - c[:, :8].sum(axis=1) / 4)
     extra = cells.points.shape[1] + np.arange(len(new) * c.shape[2]).reshape(len(new), -1)
-    points, nodes = (
-        np.concatenate([cells.points, *new], axis=1),
-        np.concatenate([cells.nodes, extra]),
-    )
+    points = np.concatenate([cells.points, *new], axis=1)
+    nodes = np.concatenate([cells.nodes, extra])
     made = replace(cells, kind=COMPLETE[cells.kind], points=points, nodes=nodes)
     # neighbours share the middle of their side
     return replace(made, nodes=representatives(made, repair=False)[nodes])
 
 
 def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
-    """Find for every node the one that stands for it and for all others at its place.
+    """For every node (n,) the one that stands for it and for all others at its place, the first.
 
-    Parameters
-    ----------
-    cells : The elements of a file, with n nodes.
-    repair : Whether nodes at one place are a fault of the file, which is told in a line of the log.
-
-    Returns
-    -------
-    (n,) numbers of nodes: of each group at one place the first.
-
-    Raises
-    ------
-    InputError : If two nodes are so near each other that they may be one or two.
+    With `repair` nodes at one place are a fault of the file, which is told in a line of the log.
+    InputError if two nodes are so near each other that they may be one or two.
     """
     own = np.arange(cells.points.shape[1])
-    used = np.unique(cells.nodes)
-    pairs, distance, edge = _near_pairs(cells, used)
+    pairs, distance, edge = _near_pairs(cells, np.unique(cells.nodes))
     same = distance <= ONE * edge
     unclear = np.flatnonzero(~same & (distance <= APART * edge))
     if len(unclear):
@@ -178,38 +120,30 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
         log.warning(
             "%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, "
             "at most %.3g apart",
-            cells.path,
-            text(cells.points[:, pairs[0, 0]]),
-            len(pairs),
-            distance[same].max(),
-        )
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), (len(own), len(own)))
-    label = connected_components(graph, directed=False)[1]
-    first = np.full(label.max() + 1, len(own))
-    np.minimum.at(first, label, own)
-    return np.asarray(first[label])
+            cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
+        )  # fmt: skip
+    label = _pieces(pairs[:, 0], pairs[:, 1], len(own))
+    return np.asarray(np.unique(label, return_index=True)[1][label])
+
+
+def _pieces(i: np.ndarray, j: np.ndarray, count: int) -> np.ndarray:
+    """(count,) the piece that each node belongs to when nodes i (m,) and j (m,) are joined."""
+    graph = coo_matrix((np.ones(len(i)), (i, j)), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs (m, 2) of nodes nearer than APART of the shortest edge there, how far apart, and that
-    edge.
-    """
+    """Pairs (m, 2) of nodes nearer than APART of the shortest edge, their distance, that edge."""
     corners = cells.points[:, cells.corners].transpose(1, 0, 2)
     edge = np.min([np.linalg.norm(a - b, axis=0) for a, b in combinations(corners, 2)], axis=0)
     shortest = np.full(cells.points.shape[1], np.inf)
     for row in cells.nodes:
         np.minimum.at(shortest, row, edge)
-    tree = KDTree(cells.points[:, used].T)
-    crowded = np.flatnonzero(
-        tree.query_ball_point(tree.data, APART * shortest[used], return_length=True) > 1
-    )
-    near = tree.query_ball_point(tree.data[crowded], APART * shortest[used[crowded]])
-    found = {
-        (min(i, j), max(i, j))
-        for i, others in zip(crowded.tolist(), near)
-        for j in others
-        if i != j
-    }
+    tree, reach = KDTree(cells.points[:, used].T), APART * shortest[used]
+    crowded = np.flatnonzero(tree.query_ball_point(tree.data, reach, return_length=True) > 1)
+    near = tree.query_ball_point(tree.data[crowded], reach[crowded])
+    both = ((i, j) for i, others in zip(crowded.tolist(), near) for j in others if i != j)
+    found = {(min(pair), max(pair)) for pair in both}
     pairs = used[np.array(sorted(found), dtype=int).reshape(-1, 2)]
     distance = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
     return pairs, distance, shortest[pairs].min(axis=1)
@@ -217,194 +151,89 @@ def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 def repaired(cells: Cells, merged: np.ndarray) -> Cells:
     """Put the elements on the merged nodes, each once, with their corners numbered the right way
-    round.
-
-    Parameters
-    ----------
-    cells : The elements of a file, with n nodes.
-    merged : (n,) for every node the one that stands for it, from `representatives`.
-
-    Returns
-    -------
-    The repaired elements. What was repaired is told in the log.
-
-    Raises
-    ------
-    InputError : If two corners of an element coincide.
+    round. What was repaired is told in the log. `merged` (n,) is from `representatives`.
     """
     sets = np.sort(merged[cells.corners], axis=0)
     flat = np.flatnonzero(np.any(np.diff(sets, axis=0) == 0, axis=0))
     if len(flat):
-        raise InputError(
-            f"mesh file '{cells.path}': two corners coincide in {cells.name(flat[0])}; mesh this"
-            " place anew."
-        )
+        raise cells.refused(flat[0], "two corners coincide in {}; mesh this place anew.")
     once = np.sort(np.unique(sets, axis=1, return_index=True)[1])
     if len(once) < sets.shape[1]:
-        log.warning(
-            "%s: %d elements are there twice and are dropped", cells.path, sets.shape[1] - len(once)
-        )
+        dropped = sets.shape[1] - len(once)
+        log.warning("%s: %d elements are there twice and are dropped", cells.path, dropped)
     cells = replace(cells, nodes=merged[cells.nodes[:, once]], numbers=cells.numbers[once])
     wrong = _volumes(cells.points, cells.corners) < 0
     if wrong.any():
         log.warning(
-            "%s: %d elements number their corners the wrong way round and are turned, the first is %s",
+            "%s: %d elements number their corners the wrong way round and are turned, "
+            "the first is %s",
             cells.path, wrong.sum(), cells.name(int(np.argmax(wrong))),
         )  # fmt: skip
         nodes = cells.nodes.copy()
-        nodes[:, wrong] = nodes[list(MIRRORED[cells.kind])][:, wrong]
+        nodes[:, wrong] = mirrored(cells.kind, nodes[:, wrong])
         cells = replace(cells, nodes=nodes)
     return cells
 
 
-def pieces(cells: Cells) -> int:
-    """Count the pieces into which the elements fall that share no node.
-
-    Parameters
-    ----------
-    cells : The elements of a file.
-
-    Returns
-    -------
-    The number of pieces.
-    """
-    first = np.broadcast_to(cells.corners[0], cells.corners.shape)
-    size = cells.points.shape[1]
-    graph = coo_matrix((np.ones(first.size), (first.ravel(), cells.corners.ravel())), (size, size))
-    label = connected_components(graph, directed=False)[1]
-    return len(np.unique(label[cells.corners[0]]))
+def check_connected(cells: Cells, hint: str) -> None:
+    """Raise InputError, with a hint, if the elements fall into pieces that share no node."""
+    first = np.broadcast_to(cells.corners[0], cells.corners.shape).ravel()
+    label = _pieces(first, cells.corners.ravel(), cells.points.shape[1])
+    count = len(np.unique(label[cells.corners[0]]))
+    if count > 1:
+        raise InputError(
+            f"mesh file '{cells.path}': the body falls into {count} pieces that share no node;"
+            f" {hint}."
+        )
 
 
 def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
-    """Check that all elements have volume and nowhere fold over, and that no facet belongs to more
-    than two.
-
-    Parameters
-    ----------
-    cells : The elements of the file, whose names are told.
-    mesh : The mesh that was made of them.
-
-    Raises
-    ------
-    InputError : With the name of the first element that is wrong.
+    """Raise InputError, with the name of the first wrong element, unless all elements of the mesh
+    that was made of the cells share their nodes, have volume and nowhere fold over, no facet
+    belongs to more than two, and the surface is closed.
     """
-    nodes = (
-        mesh.doflocs[:, mesh.dofs.element_dofs]
-        if len(cells.nodes) > len(cells.corners)
-        else mesh.p[:, mesh.t]
-    )
+    curved = len(cells.nodes) > len(cells.corners)
+    nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if curved else mesh.p[:, mesh.t]
     apart = np.abs(nodes.sum(axis=1) - cells.points[:, cells.nodes].sum(axis=1)).max(axis=0)
     wrong = np.flatnonzero(apart > SAME * np.ptp(nodes, axis=1).max(axis=0))
     if len(wrong):
-        raise InputError(
-            f"mesh file '{cells.path}': {cells.name(wrong[0])} does not share the nodes within its"
-            " edges and faces with its neighbours; mesh this place anew."
+        raise cells.refused(
+            wrong[0],
+            "{} does not share the nodes within its edges and faces with its neighbours; mesh this"
+            " place anew.",
         )
     volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
     bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
     if len(bad):
-        how = (
-            "has no volume" if np.abs(volume[bad[0]]).max() <= FLAT * size[bad[0]] else "folds over"
-        )
-        raise InputError(
-            f"mesh file '{cells.path}': {cells.name(bad[0])} {how}; mesh this place anew."
-        )
+        flat = np.abs(volume[bad[0]]).max() <= FLAT * size[bad[0]]
+        how = "has no volume" if flat else "folds over"
+        raise cells.refused(bad[0], f"{{}} {how}; mesh this place anew.")
     shared = np.bincount(mesh.t2f.ravel())
     if shared.max() > 2:
-        element = int(np.argmax(np.any(mesh.t2f == np.argmax(shared), axis=0)))
-        raise InputError(
-            f"mesh file '{cells.path}': more than two elements share a facet, one of them is"
-            f" {cells.name(element)}; elements must not overlap."
+        raise cells.refused(
+            int(np.argmax(np.any(mesh.t2f == np.argmax(shared), axis=0))),
+            "more than two elements share a facet, one of them is {}; elements must not overlap.",
         )
-
-
-def volumes(mesh: skfem.Mesh) -> np.ndarray:
-    """Compute the ratio of volumes between elements and their reference.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh with e elements.
-
-    Returns
-    -------
-    (e, n + 1) ratios with their signs, at the n nodes of each element and at its centre.
-    """
-    places = np.asarray(mesh.elem().doflocs).T
-    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
-    return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
-
-
-def check_surface(path: Path, mesh: skfem.Mesh) -> None:
-    """Check that the outward normals of a body's surface integrate to zero, as those of a closed
-    surface do.
-
-    Parameters
-    ----------
-    path : The mesh file, for the message.
-    mesh : The mesh that was made of it.
-
-    Raises
-    ------
-    InputError : If they do not, because elements overlap.
-    """
-    facets = mesh.boundary_facets()
-    areas = _area_vectors(mesh.p[:, outer_corners(mesh, facets)])
+    # the outward normals of a closed surface integrate to zero
+    areas = area_vectors(mesh.p[:, outer_corners(mesh, mesh.boundary_facets())])
     total = np.abs(areas.sum(axis=1)).max()
     if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
-            f"mesh file '{path}': the surface of the body is not closed, its normals sum up to"
-            f" {total:.3g}; elements overlap."
+            f"mesh file '{cells.path}': the surface of the body is not closed, its normals sum up"
+            f" to {total:.3g}; elements overlap."
         )
-
-
-def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
-    """Order the corners of facets of the surface such that their normals point outwards.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-    facets : (f,) numbers of facets of its surface.
-
-    Returns
-    -------
-    (c, f) numbers of the corners in their order around each facet; in the plane the body is on
-    their left.
-    """
-    cell = mesh.f2t[0, facets]
-    local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
-    nodes = mesh.t[np.array(mesh.refdom.facets)[local].T, cell]
-    corners = mesh.p[:, nodes]
-    outwards = corners.mean(axis=1) - mesh.p[:, mesh.t[:, cell]].mean(axis=1)
-    wrong = np.sum(_area_vectors(corners) * outwards, axis=0) < 0
-    nodes[:, wrong] = nodes[::-1, wrong]
-    return np.asarray(nodes)
-
-
-def _area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Area times normal (dim, f) of facets with corners (dim, c, f); on the right of edges."""
-    if len(corners) == 2:
-        x, y = corners[:, 1] - corners[:, 0]
-        return np.stack([y, -x])
-    first, second = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
-    if corners.shape[1] == 3:
-        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return np.asarray(np.cross(first, second, axis=0) / 2)
 
 
 def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Signed volume (up to a factor) of each element, from the mean directions along its axes."""
     c = points[:, corners]
-    simplex = len(corners) == len(points) + 1
-    if simplex:
+    if len(corners) == len(points) + 1:
         axes = [c[:, i] - c[:, 0] for i in range(1, len(corners))]
-    else:
-        ends: list[tuple[tuple[int, ...], tuple[int, ...]]] = [((1, 2), (0, 3)), ((2, 3), (0, 1))]
-        if len(points) == 3:
-            ends = [
-                ((1, 2, 5, 6), (0, 3, 4, 7)),
-                ((2, 3, 6, 7), (0, 1, 4, 5)),
-                ((4, 5, 6, 7), (0, 1, 2, 3)),
-            ]
-        axes = [c[:, list(b)].sum(axis=1) - c[:, list(a)].sum(axis=1) for b, a in ends]
+    else:  # from the corners of one side to those of the side across; in the plane half of them
+        dim, count = len(points), len(corners) // 2
+        ends = [([1, 2, 5, 6], [0, 3, 4, 7]), ([2, 3, 6, 7], [0, 1, 4, 5])]
+        ends += [([4, 5, 6, 7], [0, 1, 2, 3])]
+        sides = [(c[:, b[:count]], c[:, a[:count]]) for b, a in ends[:dim]]
+        axes = [far.sum(axis=1) - near.sum(axis=1) for far, near in sides]
     return np.asarray(np.linalg.det(np.stack(axes).transpose(2, 0, 1)))

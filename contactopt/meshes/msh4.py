@@ -19,47 +19,24 @@ import numpy as np
 
 
 def version(path: Path) -> tuple[str | None, bool]:
-    """Read the version that a Gmsh file states.
-
-    Parameters
-    ----------
-    path : A file of any kind.
-
-    Returns
-    -------
-    The version, such as '4.1', where '4' stands for 4.0, or None if it is no file of Gmsh; and
-    whether it is binary.
+    """The version that a file states, such as '4.1', where '4' stands for 4.0 or 4.1, or None if it
+    is no file of Gmsh; and whether it is binary.
     """
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
     if head[:1] == ["$NOD"]:
         return "1", False
-    return (
-        (head[1], head[2] != "0") if len(head) > 2 and head[0] == "$MeshFormat" else (None, False)
-    )
+    if len(head) > 2 and head[0] == "$MeshFormat":
+        return head[1], head[2] != "0"
+    return None, False
 
 
 def read_msh4(path: Path, newer: bool) -> Any:
-    """Read a file of Gmsh of version 4.0 or 4.1.
-
-    Parameters
-    ----------
-    path : The file.
-    newer : Whether its version is 4.1.
-
-    Returns
-    -------
-    The mesh, with the physical groups as sets of elements by name.
-
-    Raises
-    ------
-    ValueError, KeyError : Where the file ends early or does not keep to the format.
+    """The mesh of a file of version 4.0, or of 4.1 if `newer`, with the physical groups as sets of
+    elements by name. ValueError or KeyError where the file ends early or breaks the format.
     """
-    from meshio._common import num_nodes_per_cell
-    from meshio.gmsh.common import _gmsh_to_meshio_type
-
     sections = _sections(path)
-    names = _names(sections.get("PhysicalNames", _Numbers(b"")).data)
+    names = _names(sections)
     groups = _groups(sections.get("Entities"), names, newer)
     tags, points = _nodes(sections["Nodes"], newer)
     reader = sections["Elements"]
@@ -68,72 +45,61 @@ def read_msh4(path: Path, newer: bool) -> Any:
     for _ in range(reader.head(newer)):
         first, second, kind = reader.take(3).tolist()
         count = reader.count()
-        width = 1 + num_nodes_per_cell[_gmsh_to_meshio_type[kind]]
+        width = 1 + _nodes_of(kind)
         rows = reader.take(count * width, "u8" if newer else "i4").reshape(count, width)
         blocks.append((kind, rows[:, 1:]))
         members.append(groups.get((first, second) if newer else (second, first), []))
-    sets = {
-        group: [
-            np.arange(len(nodes) if group in own else 0) for (_, nodes), own in zip(blocks, members)
-        ]
-        for group in sorted({group for own in members for group in own})
-    }
+    sets = {}
+    for group in sorted({group for own in members for group in own}):
+        sizes = (len(nodes) if group in own else 0 for (_, nodes), own in zip(blocks, members))
+        sets[group] = [np.arange(size) for size in sizes]
     return _mesh(points, tags, blocks, sets)
 
 
 def read_msh2(path: Path) -> Any:
-    """Read a binary file of Gmsh of version 2.2.
-
-    Parameters
-    ----------
-    path : The file.
-
-    Returns
-    -------
-    The mesh, with the physical groups as sets of elements by name.
-
-    Raises
-    ------
-    ValueError, KeyError : Where the file ends early or does not keep to the format.
-    """
-    from meshio._common import num_nodes_per_cell
-    from meshio.gmsh.common import _gmsh_to_meshio_type
-
+    """The same of a binary file of version 2.2."""
     sections = _sections(path)
-    names = _names(sections.get("PhysicalNames", _Numbers(b"")).data)
+    names = _names(sections)
     tags, points = sections["Nodes"].records(sections["Nodes"].line(), 3)
     reader = sections["Elements"]
     total = reader.line()
-    blocks: list[tuple[int, list[np.ndarray]]] = []
-    found: list[list[np.ndarray]] = []
+    blocks: list[tuple[int, list[np.ndarray], list[np.ndarray]]] = []  # kind, nodes, groups
     while total > 0:
         kind, count, extra = reader.take(3).tolist()
-        size = num_nodes_per_cell[_gmsh_to_meshio_type[kind]]
+        size = _nodes_of(kind)
         if not 0 < count <= total or extra < 0:
             raise ValueError(f"a block of {count} elements with {extra} tags")
         total -= count
         rows = reader.take(count * (1 + extra + size)).reshape(count, -1)
-        groups = rows[:, 1] if extra else np.zeros(count, dtype=np.int64)
-        if blocks and blocks[-1][0] == kind:
-            blocks[-1][1].append(rows[:, 1 + extra :])
-            found[-1].append(groups)
-        else:
-            blocks.append((kind, [rows[:, 1 + extra :]]))
-            found.append([groups])
-    joined = [(kind, np.concatenate(rows)) for kind, rows in blocks]
+        if not blocks or blocks[-1][0] != kind:
+            blocks.append((kind, [], []))
+        blocks[-1][1].append(rows[:, 1 + extra :])
+        blocks[-1][2].append(rows[:, 1] if extra else np.zeros(count, dtype=np.int64))
+    joined = [(kind, np.concatenate(rows)) for kind, rows, _ in blocks]
     sets: dict[str, list[np.ndarray]] = {}
-    for i, groups in enumerate(np.concatenate(parts) for parts in found):
+    for i, (kind, _, parts) in enumerate(blocks):
+        groups, dim = np.concatenate(parts), _dimension(kind)
         for tag in np.unique(groups[groups != 0]):
-            dim = _DIMENSION[_gmsh_to_meshio_type[blocks[i][0]].rstrip("0123456789")]
-            own = sets.setdefault(
-                names.get((dim, int(tag)), str(tag)), [np.arange(0)] * len(blocks)
-            )
+            name = names.get((dim, int(tag)), str(tag))
+            own = sets.setdefault(name, [np.arange(0)] * len(blocks))
             own[i] = np.flatnonzero(groups == tag)
     return _mesh(points, tags, joined, sets)
 
 
-_DIMENSION = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
-_DIMENSION |= dict.fromkeys(("tetra", "hexahedron", "wedge", "pyramid"), 3)
+def _nodes_of(kind: int) -> int:
+    """Number of nodes of an element of a kind of Gmsh."""
+    from meshio._common import num_nodes_per_cell
+    from meshio.gmsh.common import _gmsh_to_meshio_type
+
+    return int(num_nodes_per_cell[_gmsh_to_meshio_type[kind]])
+
+
+def _dimension(kind: int) -> int:
+    from meshio._mesh import topological_dimension
+    from meshio.gmsh.common import _gmsh_to_meshio_type
+
+    # meshio's table lacks some solids
+    return int(topological_dimension.get(_gmsh_to_meshio_type[kind], 3))
 
 
 def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any:
@@ -175,7 +141,7 @@ class _Numbers:
         return rows[:, 0].astype(np.int64), rows[:, 1:]
 
     def head(self, newer: bool) -> int:
-        """The number of entities of a section; their total, and the range of tags, are passed over."""
+        """The number of entities of a section; their total and range of tags are passed over."""
         return int(self.take(4 if newer else 2, "u8")[0])
 
 
@@ -227,15 +193,16 @@ def _sections(path: Path) -> dict[str, Any]:
     return found
 
 
-def _names(data: bytes) -> dict[tuple[int, int], str]:
+def _names(sections: dict[str, Any]) -> dict[tuple[int, int], str]:
     """(dimension, number) -> name of physical groups."""
+    data = sections["PhysicalNames"].data if "PhysicalNames" in sections else b""
     lines = data.decode(errors="replace").splitlines()
     rows = [shlex.split(line) for line in lines[1:] if line.strip()]
     return {(int(dim), int(tag)): name for dim, tag, name in rows}
 
 
 def _groups(reader: Any, names: dict, newer: bool) -> dict[tuple[int, int], list[str]]:
-    """(dimension, entity) -> names of its physical groups; a group without a name has its number."""
+    """(dimension, entity) -> names of its physical groups, or numbers of those without a name."""
     found = {}
     if reader is not None:
         for dim, count in enumerate(reader.take(4, "u8").tolist()):

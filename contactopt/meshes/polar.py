@@ -1,8 +1,5 @@
 """Structured meshes of round bodies: rings and sectors of rings, half discs and discs, divided
-evenly around the origin.
-
-Elements are of second order, with the nodes on edges along a circle on that circle. Linear
-displacements use the chords.
+evenly around the origin, with elements of second order that bend along circles.
 """
 
 from __future__ import annotations
@@ -34,14 +31,11 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
     points = radius * np.stack([np.cos(angle), np.sin(angle)])
     names = {"inner": "y-", "outer": "y+", "start": "x-", "end": "x+"}
     if angles[-1] - angles[0] < 2 * np.pi * (1 - NEAR):
-        made = _quads(points, flat.t).with_boundaries(
-            {new: flat.boundaries[old] for new, old in names.items()}
-        )
-        return _on_circles(made)
-    number, first, last = (
-        np.arange(len(angle)),
-        *(np.flatnonzero(angle == value) for value in (angles[0], angles[-1])),
-    )
+        made = _quads(points, flat.t)
+        old = flat.boundaries
+        return _on_circles(made.with_boundaries({new: old[name] for new, name in names.items()}))
+    first, last = (np.flatnonzero(angle == value) for value in (angles[0], angles[-1]))
+    number = np.arange(len(angle))
     number[last[np.argsort(radius[last])]] = first[np.argsort(radius[first])]
     kept = np.unique(number)
     made = _quads(points[:, kept], np.searchsorted(kept, number[flat.t]))
@@ -90,9 +84,8 @@ def disc(radius: float, sectors: int) -> MeshQuad2:
     above = np.flatnonzero(other < 0)
     other[above] = len(x) + np.arange(len(above))
     points = np.stack([x, y])
-    made = _quads(
-        np.concatenate([points, -points[:, above]], axis=1), np.concatenate([t, other[t]], axis=1)
-    )
+    points = np.concatenate([points, -points[:, above]], axis=1)
+    made = _quads(points, np.concatenate([t, other[t]], axis=1))
     return _on_circles(made.with_boundaries({"rim": made.boundary_facets()}), radius)
 
 
@@ -101,9 +94,7 @@ def _quads(points: np.ndarray, t: np.ndarray) -> MeshQuad:
 
 
 def _on_circles(mesh: MeshQuad, only: float | None = None) -> MeshQuad2:
-    """Elements of second order whose edges between nodes of one circle bend along it; None: on
-    every circle.
-    """
+    """Elements of second order whose edges between nodes of a circle, or of one radius, bend."""
     made = MeshQuad2.from_mesh(mesh)
     ends = mesh.p[:, mesh.facets]
     first, second = np.linalg.norm(ends, axis=0)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
-from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
+from scipy.optimize import brentq
+from skfem import Mesh, MeshHex, MeshQuad, MeshTet, MeshTri
 
 from contactopt.checks import check_memory
 from contactopt.errors import InputError
+from contactopt.meshes.cells import straight
 
 MOST_CELLS = 2e7  # of one mesh
 # bytes of memory that a run takes for each cell in the plane and in space, at least
@@ -19,8 +24,7 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
     """A grid whose spacing grows from one end to the other.
 
     The number of cells is the smallest that keeps the ratio of neighbours below its bound. The
-    ratio is then lowered so that the first cell is exactly as long as asked. A grid that would need
-    one cell or less is a single cell.
+    ratio is then lowered so that the first cell is exactly as long as asked.
 
     Parameters
     ----------
@@ -32,19 +36,18 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
     -------
     array (n,) : Ascending from 0 to `length`.
     """
-    from scipy.optimize import brentq
-
     if first >= length:
         return np.array([0.0, length])
     cells = int(np.ceil(np.log1p(length * (growth - 1) / first) / np.log(growth) - 1e-9))
     if first * cells >= length:  # so few cells that no growth is needed
         return np.linspace(0.0, length, int(np.ceil(length / first - 1e-9)) + 1)
+    powers = np.arange(cells)
 
     def excess(ratio: float) -> float:
-        return float(first * np.sum(ratio ** np.arange(cells)) - length)
+        return float(first * np.sum(ratio**powers) - length)
 
     ratio = brentq(excess, 1.0, growth * (1 + 1e-12)) if excess(growth) > 0 else growth
-    grid = np.concatenate([[0.0], np.cumsum(first * ratio ** np.arange(cells))])
+    grid = np.append(0.0, np.cumsum(first * ratio**powers))
     return np.asarray(grid * (length / grid[-1]))
 
 
@@ -104,19 +107,20 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
     for axis, (name, grid) in enumerate(zip("xyz", grids)):
         near = 1e-9 * (grid[-1] - grid[0])
         for sign, value in (("-", grid[0]), ("+", grid[-1])):
-            planes[name + sign] = lambda x, axis=axis, value=value, near=near: (
-                np.abs(x[axis] - value) < near
-            )
+            planes[name + sign] = partial(_across, axis, value, near)
     return mesh.with_boundaries(planes)
 
 
+def _across(axis: int, value: float, near: float, x: np.ndarray) -> np.ndarray:
+    return np.asarray(np.abs(x[axis] - value) < near)
+
+
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
-    """The mesh with further names for some of its boundaries.
+    """The mesh with further names for some of its boundaries, as in rename(mesh, contact="y-").
 
     Parameters
     ----------
-    mesh : As tensor_mesh() makes it.
-    names : New name = old name, as in rename(mesh, contact="y-").
+    mesh, names : Any mesh with named boundaries, and new name = old name.
 
     Returns
     -------
@@ -126,9 +130,8 @@ def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
 
 
 def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad:
-    """Meridian section of a half sphere that touches z = 0 at the origin.
-
-    The quarter disc has three corners; the middle of the arc serves as the fourth.
+    """Meridian section of a half sphere that touches z = 0 at the origin: a quarter disc, whose
+    fourth corner is the middle of the arc.
 
     Parameters
     ----------
@@ -152,15 +155,12 @@ def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad
     top = np.stack([radius * s_even, np.full_like(s, radius)])
     corner = _arc(radius, np.array(np.pi / 4))[:, None]
     p = (1 - t) * lower + t * top + (1 - s) * left + s * right
-    p -= (
-        (1 - s) * t * np.array([[0.0], [radius]])
-        + s * (1 - t) * corner
-        + s * t * np.array([[radius], [radius]])
-    )
-    names = {"axis": "x-", "top": "y+"}
-    arc = np.concatenate([mesh.boundaries["y-"], mesh.boundaries["x+"]])
-    boundaries = {new: mesh.boundaries[old] for new, old in names.items()} | {"arc": arc}
-    return MeshQuad(p, mesh.t).with_boundaries(boundaries)
+    p -= (1 - s) * t * np.array([[0.0], [radius]]) + s * (1 - t) * corner
+    p -= s * t * np.array([[radius], [radius]])
+    old = mesh.boundaries
+    arc = np.concatenate([old["y-"], old["x+"]])
+    names = {"axis": old["x-"], "top": old["y+"], "arc": arc}
+    return MeshQuad(p, mesh.t).with_boundaries(names)
 
 
 def _arc(radius: float, angle: np.ndarray) -> np.ndarray:
@@ -174,9 +174,7 @@ def patch(
 
     Parameters
     ----------
-    mesh : Any mesh with named boundaries.
-    boundary : Name of the whole.
-    name : Name of the part.
+    mesh, boundary, name : A mesh, and the names of the whole and of the part.
     limits : Facets whose midpoints are below limits[i] along each axis i belong to the part
         [length].
 
@@ -190,7 +188,7 @@ def patch(
     return mesh.with_boundaries({name: facets[inside]})
 
 
-def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
+def simplices(mesh: Mesh, alike: bool = True) -> MeshTri | MeshTet:
     """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra.
 
     Edges become straight. All cells are cut in the same way, so that bodies match whose meshes had
@@ -198,34 +196,30 @@ def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
 
     Parameters
     ----------
-    mesh : Of quadrilaterals or hexahedra.
+    mesh : Of any elements; triangles and tetrahedra stay whole.
+    alike : Whether neighbours have to be cut alike; otherwise they may meet at crossed diagonals.
 
     Returns
     -------
-    Boundaries keep their names.
-
-    Raises
-    ------
-    InputError : If neighbours are not cut alike; number the vertices of all cells in one order
-        then.
+    Boundaries keep their names. InputError if neighbours have to be cut alike and are not.
     """
-    vertices = mesh.p[:, : mesh.nvertices]
-    cut = (
-        MeshQuad(vertices, mesh.t).to_meshtri()
-        if len(vertices) == 2
-        else MeshHex(vertices, mesh.t).to_meshtet()
-    )
+    mesh = straight(mesh)
+    if isinstance(mesh, MeshTri | MeshTet):
+        return mesh
+    bare = replace(mesh, _boundaries=None)
+    cut = bare.to_meshtri() if isinstance(mesh, MeshQuad) else bare.to_meshtet()
     facets = cut.boundary_facets()
-    if len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
+    if alike and len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
         raise InputError(
             "the mesh cannot be cut into simplices: its cells number their vertices in different"
-            " orders."
+            " orders; make a mesh of triangles or tetrahedra, or number all cells in one order."
         )
+    if not mesh.boundaries:
+        return cut
     # those of the cell that each outer facet comes from
     sides = mesh.t2f[:, cut.f2t[0, facets] % mesh.nelements]
     corners = mesh.facets[:, sides]  # (corner, side, facet)
     inside = np.all([np.any(corners == vertex, axis=0) for vertex in cut.facets[:, facets]], axis=0)
     origin = sides[np.argmax(inside, axis=0), np.arange(len(facets))]
-    return cut.with_boundaries(
-        {name: facets[np.isin(origin, old)] for name, old in (mesh.boundaries or {}).items()}
-    )
+    names = {name: facets[np.isin(origin, old)] for name, old in mesh.boundaries.items()}
+    return cut.with_boundaries(names)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.coupling.charts import SymmetryPlane
+from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.meshes.local_refinement import Curve, Function, boundary_curves, split
+from contactopt.meshes.given_curves import Curve
+from contactopt.meshes.mesh_refinement import Function, boundary_curves, split
 from contactopt.scenes.scene import Part, Scene
 
 STEPS = 8  # of the iteration that keeps a coordinate

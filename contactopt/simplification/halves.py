@@ -90,7 +90,7 @@ def roller(whole: Whole) -> str:
     """A support that holds one component of contacts in a plane across it; empty if there is none.
 
     In a scene of mirror images such a support is a plane of symmetry
-    (contactopt.coupling.charts), in a whole scene it is not.
+    (contactopt.coupling.planes_of_symmetry), in a whole scene it is not.
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]

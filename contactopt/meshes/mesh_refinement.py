@@ -20,12 +20,10 @@ import skfem
 from scipy.spatial import cKDTree
 
 from contactopt.errors import InputError
-from contactopt.meshes.cells import CURVED, is_curved, straight
-from contactopt.meshes.curves import CORNER as CORNER
+from contactopt.meshes.cells import CURVED, is_curved, straight, volumes
 from contactopt.meshes.curves import plane_curves
 from contactopt.meshes.facet_surfaces import barycentric, space_curves
-from contactopt.meshes.given_curves import Curve as Curve
-from contactopt.meshes.mesh_repair import volumes
+from contactopt.meshes.given_curves import Curve
 
 log = logging.getLogger(__name__)
 FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curve
@@ -45,51 +43,13 @@ def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
     Parameters
     ----------
     mesh : A scikit-fem mesh in the plane or in space.
-    arcs : Whether only arcs, spheres and cylinders count as curved, where the mesh has straight
-        edges.
+    arcs : Whether only arcs, spheres and cylinders count as curved, if the mesh has straight edges.
 
     Returns
     -------
-    By the name of the boundary its curve, or None where it is flat. The name '' stands for what has
-    no name.
+    By the name of the boundary, '' for what has no name, its curve, or None where it is flat.
     """
     return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
-
-
-def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
-    """Find the line or surface of one boundary, as `boundary_curves` finds those of all.
-
-    Parameters
-    ----------
-    mesh, arcs : As there.
-    name : One of its boundaries, or ''.
-
-    Returns
-    -------
-    Its curve; None where it is flat.
-    """
-    return boundary_curves(mesh, arcs)[name]
-
-
-def simplices(mesh: Any) -> Any:
-    """Cut a mesh into straight triangles or tetrahedra.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh. Its quadrilaterals and hexahedra are cut, its curved edges become
-        straight.
-
-    Returns
-    -------
-    The mesh of simplices, with the names of the boundaries.
-    """
-    if is_curved(mesh):
-        mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
-    if isinstance(mesh, skfem.MeshQuad):
-        return named_like(mesh, replace(mesh.to_meshtri(), _boundaries=None))
-    if isinstance(mesh, skfem.MeshHex):
-        return named_like(mesh, replace(mesh.to_meshtet(), _boundaries=None))
-    return mesh
 
 
 def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
@@ -102,16 +62,13 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     ----------
     mesh : A mesh of straight triangles or tetrahedra, with named boundaries.
     marked : Numbers of the elements to divide.
-    curves : For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes
-        on the true surface. The name '' stands for the boundary that has no name.
+    curves : For the names of curved boundaries, and '' for what has no name, a function (dim, k) ->
+        (dim, k) that puts new nodes on the true surface.
 
     Returns
     -------
-    A mesh of the same kind with the same named boundaries.
-
-    Raises
-    ------
-    TooSmall : If none of the marked elements can be divided.
+    A mesh of the same kind with the same named boundaries. TooSmall if none of the marked elements
+    can be divided.
     """
     marked = np.asarray(marked)
     corners = mesh.p[:, mesh.t[:, marked]]
@@ -132,22 +89,19 @@ def split(mesh: Any, curves: Curves) -> Any:
 
     Parameters
     ----------
-    mesh : A scikit-fem mesh of any kind; of second order, its nodes on edges and faces become
-        corners.
-    curves : The curves of its boundaries, as for `divide`.
+    mesh, curves : Any scikit-fem mesh and the curves of its boundaries, as for `divide`.
 
     Returns
     -------
-    A mesh of the same kind and order of half the element size, with the same named boundaries.
+    A mesh of the same kind and order of half the element size, with the same named boundaries. Of
+    second order, its nodes on edges and faces have become corners.
     """
     fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
     return bent(fine, curves) if is_curved(mesh) else fine
 
 
 def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
-    """The mesh divided as scikit-fem is told, its new nodes at `places`, if given, and on the
-    curves.
-    """
+    """The mesh divided as scikit-fem is told, its new nodes at `places`, if any, and on curves."""
     with _no_word_of_copies():
         fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
@@ -160,12 +114,11 @@ def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = No
 
 
 def facets_of(mesh: Any, name: str) -> np.ndarray:
-    """The numbers of the facets of a boundary; the name '' stands for what has no name.
+    """Number the facets of a boundary.
 
     Parameters
     ----------
-    mesh : a scikit-fem mesh
-    name : of a boundary
+    mesh, name : A scikit-fem mesh and one of its boundaries; '' stands for what has no name.
 
     Returns
     -------
@@ -173,9 +126,8 @@ def facets_of(mesh: Any, name: str) -> np.ndarray:
     """
     if name:
         return np.asarray(mesh.boundaries[name])
-    return np.setdiff1d(
-        mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()])
-    )
+    named = np.concatenate([[0][:0], *(mesh.boundaries or {}).values()])
+    return np.setdiff1d(mesh.boundary_facets(), named)
 
 
 def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
@@ -199,9 +151,8 @@ def _unfolded(mesh: Any, points: np.ndarray) -> Any:
             break
         points[:, back], kept = mesh.doflocs[:, back], kept + len(back)
     if kept:
-        log.warning(
-            "%d nodes stay off the curved boundary, where they would turn elements inside out", kept
-        )
+        said = "%d nodes stay off the curved boundary, where they would turn elements inside out"
+        log.warning(said, kept)
     return replace(mesh, doflocs=points)
 
 
@@ -220,46 +171,39 @@ def bent(mesh: Any, curves: Curves) -> Any:
     -------
     A mesh of second order, or the same mesh where there is no curve.
     """
-    known = _present(mesh, curves)
+    known = {name: (facets_of(mesh, name), curve) for name, curve in _present(mesh, curves).items()}
     if not known:
         return mesh
     with _no_word_of_copies():
-        made = CURVED[mesh.refdom.__name__].from_mesh(
-            replace(mesh, _boundaries=None, _subdomains=None)
-        )
-    shift = np.zeros_like(made.doflocs)
-    plane = len(mesh.p) == 2
-    edges, middle = (
-        (mesh.facets, made.dofs.facet_dofs[0]) if plane else (mesh.edges, made.dofs.edge_dofs[0])
-    )
-    for name, curve in known.items():
-        facets = facets_of(mesh, name)
+        flat = replace(mesh, _boundaries=None, _subdomains=None)
+        made = CURVED[mesh.refdom.__name__].from_mesh(flat)
+    shift, plane = np.zeros_like(made.doflocs), len(mesh.p) == 2
+    edges = mesh.facets if plane else mesh.edges
+    middle = (made.dofs.facet_dofs if plane else made.dofs.edge_dofs)[0]
+    for facets, curve in known.values():
         mine = facets if plane else np.unique(mesh.f2e[:, facets])
-        start, end = mesh.p[:, edges[:, mine]].transpose(1, 0, 2)
-        _shift(shift, middle[mine], (start + end) / 2, np.linalg.norm(end - start, axis=0), curve)
-    if isinstance(mesh, skfem.MeshHex):
+        ends = mesh.p[:, edges[:, mine]]
+        _shift(shift, middle[mine], ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=0), curve)
+    # the node within a face or an element follows those around it
+    within, local = made.dofs.element_dofs, shift[:, made.dofs.element_dofs]
+    if isinstance(mesh, skfem.MeshQuad):
+        shift[:, within[8]] = local[:, 4:8].sum(axis=1) / 2
+    elif isinstance(mesh, skfem.MeshHex):
         faces = made.dofs.facet_dofs[0]
         shift[:, faces] = shift[:, middle[mesh.f2e]].sum(axis=1) / 2
-        for name, curve in known.items():
-            own = facets_of(mesh, name)
-            corners = mesh.p[:, mesh.facets[:, own]]
-            _shift(
-                shift, faces[own], corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=0), curve
-            )
-    local = shift[:, made.dofs.element_dofs]  # the node within follows those around it
-    if isinstance(mesh, skfem.MeshQuad):
-        shift[:, made.dofs.element_dofs[8]] = local[:, 4:8].sum(axis=1) / 2
-    elif isinstance(mesh, skfem.MeshHex):
-        shift[:, made.dofs.element_dofs[26]] = (
-            local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
-        )
+        for facets, curve in known.values():
+            corners = mesh.p[:, mesh.facets[:, facets]]
+            _shift(shift, faces[facets], corners, np.ptp(corners, axis=1).max(axis=0), curve)
+        local = shift[:, within]
+        shift[:, within[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
     return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
 
 
 def _shift(
-    shift: np.ndarray, nodes: np.ndarray, places: np.ndarray, size: np.ndarray, curve: Function
+    shift: np.ndarray, nodes: np.ndarray, corners: np.ndarray, size: np.ndarray, curve: Function
 ) -> None:
-    """Write down how nodes at these places move to a curve, where it is near beside their size."""
+    """Write down how nodes amid corners (dim, c, n) move to a curve that is near beside `size`."""
+    places = corners.mean(axis=1)
     off = curve(places) - places
     near = np.linalg.norm(off, axis=0) <= BENT * size
     shift[:, nodes[near]] = off[:, near]
@@ -281,25 +225,15 @@ def _no_word_of_copies() -> Iterator[None]:
 
 
 def named_like(old: Any, new: Any) -> Any:
-    """Give a mesh the named boundaries of another one, whose boundary facets hold its own.
-
-    Parameters
-    ----------
-    old : A scikit-fem mesh with named boundaries.
-    new : A mesh of simplices of the same body, or of a part of it.
-
-    Returns
-    -------
-    `new` with the boundaries of `old`.
+    """Give a mesh of the same body, or of a part of it, the named boundaries of another one, whose
+    boundary facets hold its own.
     """
     if not old.boundaries:
         return new
-    dim, facets, outer = len(old.p), old.boundary_facets(), new.boundary_facets()
+    facets, outer = old.boundary_facets(), new.boundary_facets()
     # of quadrilaterals all triangles between their corners
-    choices = list(combinations(range(len(old.facets)), dim))
-    corners = np.concatenate(
-        [old.p[:, old.facets[list(choice)][:, facets]] for choice in choices], axis=2
-    )
+    choices = np.array(list(combinations(range(len(old.facets)), len(old.p))))
+    corners = np.concatenate([old.p[:, old.facets[c][:, facets]] for c in choices], axis=2)
     facets = np.tile(facets, len(choices))
     centres = new.p[:, new.facets[:, outer]].mean(axis=1)
     middle = corners.mean(axis=1)
@@ -313,8 +247,8 @@ def named_like(old: Any, new: Any) -> Any:
     found, first = np.unique(within[order], return_index=True)
     parent = np.full(len(outer), -1)
     parent[found] = facets[of[order[first]]]
-    names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
-    return replace(
-        new,
-        _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()},
-    )
+    names = {
+        name: np.sort(outer[np.isin(parent, members)]).astype(np.int32)
+        for name, members in old.boundaries.items()
+    }
+    return replace(new, _boundaries=names)

@@ -1,0 +1,151 @@
+"""Q, the compliance of the bodies at the contacts: an array, sparse rows, or its products."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.protocol import Body
+from contactopt.coupling.coupling import Coupling
+from contactopt.errors import InputError
+from contactopt.linear.concurrency import each
+from contactopt.linear.convolution import Convolution
+from contactopt.linear.operators import (
+    Interface,
+    InterfaceOperator,
+    Product,
+    dense,
+    estimate_diagonal,
+)
+from contactopt.linear.saddle_point import BodyTerm, CoupledForm
+from contactopt.problem.chart import nodal_weights
+
+# share of the entries of Q that may be other than zero for it to be kept by sparse rows
+SPARSE = 0.25
+Maps = Sequence[sp.csr_matrix]  # the signed map B (k dim, n) of each body
+
+
+def compliance(
+    bodies: Sequence[Body], maps: Maps, couplings: Sequence[Coupling], implicit: bool
+) -> Interface:
+    """Q = sum B_b C_b B_b' by its products (`implicit`) or by its entries."""
+    return operator(bodies, maps, couplings) if implicit else _entries(bodies, maps)
+
+
+def filling(maps: Maps) -> int:
+    """Number of the entries of Q between contacts that share a body."""
+    return min(sum(len(_rows(B)) ** 2 for B in maps), maps[0].shape[0] ** 2)
+
+
+def _entries(bodies: Sequence[Body], maps: Maps) -> np.ndarray | sp.csr_array:
+    """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs
+    share no body.
+    """
+    n = maps[0].shape[0]
+    moving = _moving(bodies, maps)
+    made = each(lambda term: term[0].compliance(term[1]), moving, _parallel(moving))
+    parts = [(rows, own) for (*_, rows), own in zip(moving, made)]
+    if filling(maps) < SPARSE * n**2:
+        rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
+        columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])
+        values = np.concatenate([own.ravel() for _, own in parts])
+        return sp.csr_array((values, (rows, columns)), (n, n))
+    Q = np.zeros((n, n))
+    for rows, own in parts:
+        if len(rows) == n:
+            Q += own
+        else:
+            Q[np.ix_(rows, rows)] += own
+    return Q
+
+
+def operator(
+    bodies: Sequence[Body], maps: Maps, couplings: Sequence[Coupling]
+) -> InterfaceOperator:
+    """Q by its products: a convolution where every body has one. Otherwise its diagonal is an
+    estimate, which takes one product.
+    """
+    kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    known = [kernel for kernel in kernels if kernel is not None]
+    if known and len(known) == len(kernels):
+        if len({kernel.padded for kernel in known}) > 1:
+            raise InputError(
+                "one half-space repeats itself periodically and the other does not; make both"
+                " periodic or none."
+            )
+        return Convolution(sum(known[1:], known[0]))
+    moving = _moving(bodies, maps)
+    parallel = _parallel(moving)
+    acts = each(lambda term: term[0].product(term[1]), moving, parallel)
+    terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
+
+    def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+        def moves(term: tuple[Product, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+            """The columns that load a body at all, and what they make of it."""
+            act, rows = term
+            load, columns = X[rows], np.arange(X.shape[1])
+            if len(couplings) > 1:
+                columns = np.flatnonzero(load.any(axis=0))
+            return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
+
+        out = np.zeros(X.shape)
+        for (_, rows), (columns, own) in zip(terms, each(moves, terms, parallel)):
+            out[np.ix_(rows, columns)] += own
+        return out
+
+    weights = [nodal_weights(made.chart, made.areas) for made in couplings]
+    moved = np.any([body.moved(B) for body, B in zip(bodies, maps)], axis=0)
+    complete = all(body.complete for body in bodies)
+    iterative = any(body.iterative for body in bodies)
+    return InterfaceOperator(
+        product,
+        estimate_diagonal(product, weights, moved),
+        (lambda: dense(_entries(bodies, maps))) if complete else None,
+        None,
+        iterative,
+        _before_condensation(bodies, maps) if iterative else None,
+    )
+
+
+def _before_condensation(bodies: Sequence[Body], maps: Maps) -> CoupledForm:
+    """Q from the equilibrium of the iterative bodies, at least one, all at once, and from products
+    with the others.
+    """
+    terms: list[BodyTerm] = []
+    others = []
+    for body, B in zip(bodies, maps):
+        if body.equilibrium is not None:
+            terms.append(body.equilibrium.term(B))
+        elif body.moved(B).any():
+            others.append(body.product(B))
+    L, R = (np.concatenate([term.low_rank[side] for term in terms], axis=1) for side in (0, 1))
+
+    def rest(r: np.ndarray) -> np.ndarray:
+        total = L @ (R.T @ r)
+        for product in others:
+            total += product(r[:, None], None)[:, 0]
+        return np.asarray(total)
+
+    return CoupledForm(tuple(terms), rest)
+
+
+def _moving(bodies: Sequence[Body], maps: Maps) -> list[tuple[Body, sp.csr_matrix, np.ndarray]]:
+    """The bodies that contact forces move, with the rows of their maps that are needed, and which
+    rows of Q these are.
+    """
+    needed = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    return [(body, B[rows], rows) for body, B, rows in needed]
+
+
+def _parallel(moving: list[tuple[Body, sp.csr_matrix, np.ndarray]]) -> list[bool]:
+    return [body.parallel for body, *_ in moving]
+
+
+def _rows(B: sp.csr_matrix) -> np.ndarray:
+    """The rows of a map that are not empty; all of them where most are not, so that nothing needs
+    to be picked out.
+    """
+    filled = np.flatnonzero(np.diff(B.indptr))
+    return filled if 4 * len(filled) < 3 * B.shape[0] else np.arange(B.shape[0])
