@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import skfem
 
-from contactopt.bodies.body import Assembly
+from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import weight_at
 from contactopt.material import lame
 from contactopt.meshes.cells import SHAPES, elements_of, second_order, straight
@@ -63,6 +63,19 @@ class Fields:
         data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
         points = np.pad(self.mesh.p.T, ((0, 0), (0, 3 - len(self.mesh.p))))
         meshio.Mesh(points, [elements_of(self.mesh)], data).write(path, file_format="vtu")
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where in a body: on a named boundary, at a point, in the circle or ball around a point, or
+    everywhere.
+
+    boundary  its name;   point  coordinates [length];   radius  around the point [length]
+    """
+
+    boundary: str = ""
+    point: tuple[float, ...] = ()
+    radius: float | None = None
 
 
 class Validity(NamedTuple):

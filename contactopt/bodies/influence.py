@@ -6,7 +6,8 @@ surface point (x, y) at the distance rho by (Boussinesq; Cerruti; G is the shear
 Poisson's ratio)
 
     2 pi G u_z = (1 - nu) F_z / rho - (1 - 2 nu)/2 (x F_x + y F_y) / rho^2
-    2 pi G u_x = ((1 - nu) / rho + nu x^2 / rho^3) F_x + nu x y / rho^3 F_y + (1 - 2 nu)/2 x F_z / rho^2
+    2 pi G u_x = ((1 - nu) / rho + nu x^2 / rho^3) F_x + nu x y / rho^3 F_y
+                 + (1 - 2 nu)/2 x F_z / rho^2
 
 and u_y likewise. A line force on a half-plane makes displacements that grow without end (Flamant).
 They are measured from the point that lies `depth` beneath the line force, d below:

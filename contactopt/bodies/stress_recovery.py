@@ -34,9 +34,8 @@ import scipy.sparse as sp
 import skfem
 from skfem.quadrature import get_quadrature
 
-from contactopt.bodies.body import Assembly
-from contactopt.bodies.fields import PLACES
-from contactopt.bodies.protocol import Region
+from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.fields import PLACES, Region
 from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 from contactopt.meshes.cells import straight

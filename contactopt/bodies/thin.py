@@ -23,7 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactopt.bodies.body import Assembly
+from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import weight_at
 
 # stiffness of the ground over that of a block of the softest material on the contact surface

@@ -21,7 +21,7 @@ from importlib import import_module
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import AssembledBody, Surface
+from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.coupling.charts import SymmetryPlane
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.bodies.protocol import AssembledBody, Surface
+from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.coupling.charts import ContactPoints, lay_out, normals_in_planes, symmetry_planes
 from contactopt.coupling.coupling import Coupling, local_map, renumbered
 from contactopt.errors import InputError

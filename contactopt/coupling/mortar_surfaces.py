@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
+from contactopt.bodies.assembled import AssembledBody, Mesh, Surface
 from contactopt.coupling.charts import NEAR, ContactPoints, lay_out, symmetry_planes
 from contactopt.coupling.coupling import Coupling, renumbered
 from contactopt.coupling.faces import Faces, faces_of

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactopt.bodies.protocol import Guides
+from contactopt.bodies.assembled import Guides
 from contactopt.coupling.charts import SymmetryPlane
 from contactopt.coupling.coupling import Coupling
 from contactopt.errors import InputError

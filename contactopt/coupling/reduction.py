@@ -30,7 +30,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies import assemble
-from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
@@ -245,7 +246,7 @@ class Reduction:
         (k, dim), with the initial gap [length].
         """
         u = sum(
-            (body.seen(B, U) for body, B, U in zip(self.bodies, self.maps, displaced)),
+            (B @ U for B, U in zip(self.maps, displaced)),
             0 * self.problem.q.ravel(),
         )
         return (

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from contactopt.bodies.protocol import Region
+from contactopt.bodies.fields import Region
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution

@@ -19,15 +19,14 @@ import numpy as np
 
 from contactopt.bodies.solvers.constants import MOST_ITERATIONS, RTOL
 from contactopt.bodies.solvers.multigrid import nodal_blocks, rigid_motions
-from contactopt.bodies.solvers.system import Iteration, System, asked, block_product, inverse_block
+from contactopt.bodies.solvers.system import BodySolver, Iteration, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.linear.operators import Product
 
 ALONE = threading.RLock()  # PETSc does not allow calls from two threads at the same time
 
 
-class PetscSolver:
+class PetscSolver(BodySolver):
     """A body on one process of PETSc.
 
     A solve ends where (r' B r)^1/2, B the preconditioner, has fallen by `rtol`.
@@ -39,11 +38,10 @@ class PetscSolver:
 
     name = "petsc"
     iterative = True
-    releases_lock = False
 
     def __init__(self, system: System):
+        super().__init__(system)
         petsc, dim = _library(), len(system.points)
-        self.trailing, self.n = system.trailing, system.A.shape[0]
         blocks, self.place, present = nodal_blocks(system.A, system.node, system.component, dim)
         modes = rigid_motions(system.points[:, present])
         modes[np.setdiff1d(np.arange(len(modes)), self.place)] = 0.0
@@ -68,10 +66,6 @@ class PetscSolver:
             self.ksp.setUp()
 
     @property
-    def complete(self) -> bool:
-        return self.trailing is not None
-
-    @property
     def iteration(self) -> Iteration:
         return Iteration(self._acting(self.A.mult), self._acting(self.ksp.getPC().apply))
 
@@ -82,15 +76,6 @@ class PetscSolver:
         for b, x in zip(load.reshape(self.n, -1).T, out.reshape(self.n, -1).T):
             x[:] = self._solution(b, rtol)
         return out
-
-    def trailing_inverse(self) -> np.ndarray:
-        return inverse_block(self, asked(self.trailing), self.n)
-
-    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        return block_product(self, asked(self.trailing), self.n, load, rtol)
-
-    def restricted(self, at: np.ndarray) -> Product:
-        return lambda load, rtol: block_product(self, at, self.n, load, rtol)
 
     def _solution(self, b: np.ndarray, rtol: float) -> np.ndarray:
         if not b.any():
@@ -126,7 +111,6 @@ class PetscSolver:
 
 
 def _library() -> Any:
-    """The module petsc4py.PETSc; InputError if it is missing."""
     try:
         from petsc4py import PETSc
     except ImportError as error:
