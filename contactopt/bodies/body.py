@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.elements import contact_trace, make_basis, node_unknowns, weight_at
+from contactopt.bodies.elements import Weight, contact_trace, make_basis, node_unknowns, weight_at
 from contactopt.bodies.mirror_planes import mirrored_nodes
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
@@ -139,7 +139,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 
-def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.ndarray:
+def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
     total = np.zeros(basis.N)
     for load in part.loads:
         if isinstance(load, Plate):

@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.assembly import Assembly, Equilibrium
 from contactopt.bodies.body import reload_body
 from contactopt.bodies.fields import Fields, Region, Validity, fields_of, limits_of, recovery_errors
-from contactopt.bodies.protocol import Body, Equilibrium
+from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.bodies.stress_recovery import StressMap, stress_map

@@ -29,12 +29,12 @@ BLOCK = 2000
 class Fields:
     """One body after the solve, at the n nodes of its mesh, of which the vertices come first.
 
-    mesh         of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the
-                 displacement is quadratic, with nodes in the middle of edges, quadrilaterals and
-                 hexahedra
-    displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;
-                                     von_mises (n,)
-    contact      name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
+    mesh          of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the
+                  displacement is quadratic, with nodes in the middle of edges, quadrilaterals and
+                  hexahedra
+    names         of the components of the stress;   displacement  (dim, n) [length]
+    stress        (n, 4 or 6) [stress];   von_mises  (n,)
+    contact       name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
     """
 
     name: str
@@ -49,8 +49,8 @@ class Fields:
         """Write the body as a VTU file with displacement, stress, von Mises stress and contact
         quantities at the nodes.
 
-        Cells of second order are quadratic triangles and tetrahedra, biquadratic quadrilaterals and
-        triquadratic hexahedra of VTK (22, 24, 28 and 29).
+        Cells of second order are VTK's quadratic triangles and tetrahedra, biquadratic
+        quadrilaterals and triquadratic hexahedra (22, 24, 28 and 29).
 
         Parameters
         ----------
@@ -95,17 +95,8 @@ class Validity(NamedTuple):
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
-    """Compute how far a body is from equilibrium, strained and turned, from its stiffness and its
-    elements alone.
+    """How far a body is from equilibrium under the contact forces (n,), strained and turned.
 
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-    U : (n,) displacement [length].
-    force : (n,) contact forces on its unknowns [force].
-
-    Returns
-    -------
     The imbalance counts the free unknowns and, for each plate that moves, the sum over its
     unknowns.
     """
@@ -133,25 +124,11 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
-    """Compute the fields of a body at a displacement of all its unknowns.
-
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-    U : (n,) displacement [length].
-
-    Returns
-    -------
-    Displacement, stress and von Mises stress at the vertices of the mesh.
-    """
     basis = body.basis
     stress = nodal_stress(body, U)
     full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
-    mean = np.trace(stress) / 3
-    deviator = stress - mean * np.eye(3)[:, :, None]
-    von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
     mesh = straight(basis.mesh) if body.degree == 1 else second_order(basis.mesh, body.locations)
-    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises)
+    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises(full))
 
 
 def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
@@ -160,10 +137,8 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
 
     An element counts with its mean stress where the displacement is linear, with its stress at the
     node where it is quadratic; at planes of symmetry its mirror image counts as well, so that no
-    shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
-
-    everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh
-                alone
+    shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta. Not
+    `everywhere` asks for the vertices of the mesh alone.
     """
     basis, mesh = body.basis, body.basis.mesh
     volume = basis.dx.sum(axis=1)
@@ -191,26 +166,17 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
 
 
 def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Estimate for every element how much it adds to the error of the energy, or of other
+    """For every element (elements,) how much it adds to the error of the energy, or of other
     functionals.
 
-    For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the
-    stress of a displacement and s* the continuous stress with its averages at the vertices, which
-    is more accurate where the solution is smooth. With W = U it is twice the energy of the
-    estimated error in each element; with W the displacement of an adjoint problem it is what the
-    element adds to the error of that problem's functional.
+    This is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)) [force length] for each W of the
+    others. s is the stress of a displacement and s* the continuous stress with its averages at the
+    vertices, which is more accurate where the solution is smooth. With W = U it is twice the energy
+    of the estimated error in each element; with W the displacement of an adjoint problem it is what
+    the element adds to the error of that problem's functional.
 
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical
     engineering analysis.
-
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-    U, W : (n,) displacements [length].
-
-    Returns
-    -------
-    (elements,) integrals [force length].
     """
     basis, mesh = body.basis, straight(body.basis.mesh)
     vertices = skfem.Basis(
@@ -238,14 +204,57 @@ def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple
 
 def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
     """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    lam, shear = lame(body.material)
     field = basis.interpolate(U)
-    gradient = np.asarray(field.grad)
+    gradient, hoop = np.asarray(field.grad), None
+    if body.weight[1]:  # u_r / r, on the axis its limit
+        r = np.asarray(basis.global_coordinates())[0]
+        away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
+        hoop = np.divide(np.asarray(field)[0], r, where=away, out=limit)
+    return stress_of(lame(body.material), gradient, hoop)
+
+
+def stress_of(
+    constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
+) -> np.ndarray:
+    """Stress tensor (3, 3, ...) of a gradient (dim, dim, ...) and a hoop strain, if there is one."""
+    lam, shear = constants
     dim = len(gradient)
     strain = np.zeros((3, 3, *gradient.shape[2:]))
     strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
-    if body.weight[1]:  # u_r / r, on the axis its limit
-        r = np.asarray(basis.global_coordinates())[0]
-        away = r > 1e-12 * r.max()
-        strain[2, 2] = np.divide(np.asarray(field)[0], r, where=away, out=gradient[0, 0].copy())
+    if hoop is not None:
+        strain[2, 2] = hoop
     return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Compute the von Mises stress.
+
+    Parameters
+    ----------
+    stress : (m, 4 or 6) stresses, whose first three columns are the normal ones.
+
+    Returns
+    -------
+    (m,) their von Mises stress.
+    """
+    normal, shear = stress[:, :3], stress[:, 3:]
+    deviator = normal - normal.mean(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))
+
+
+def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
+    """Differentiate the von Mises stress.
+
+    Parameters
+    ----------
+    stress : (m, 4 or 6) as for `von_mises`.
+
+    Returns
+    -------
+    (m, 4 or 6) derivatives by the components; 0 where there is no stress.
+    """
+    normal, size = stress[:, :3], von_mises(stress)[:, None]
+    slopes = np.concatenate(
+        [1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1
+    )
+    return np.divide(slopes, size, out=np.zeros(slopes.shape), where=size > 0)

@@ -29,7 +29,7 @@ import scipy.sparse as sp
 import skfem
 from skfem.helpers import dot
 
-from contactopt.bodies.elements import node_unknowns, weight_at
+from contactopt.bodies.elements import Weight, node_unknowns, weight_at
 from contactopt.errors import InputError
 
 # mean square of a motion (largest displacement one) over the held unknowns below which nothing
@@ -76,11 +76,7 @@ def _planes(dim: int) -> list[tuple[int, int]]:
 
 
 def free_motions(
-    kind: str,
-    components: tuple[str, ...],
-    basis: skfem.CellBasis,
-    held: np.ndarray,
-    weight: tuple[float, bool],
+    kind: str, components: tuple[str, ...], basis: skfem.CellBasis, held: np.ndarray, weight: Weight
 ) -> Motions:
     """The rigid motions of a body that leave all held unknowns (n,) at rest.
 
@@ -134,7 +130,7 @@ def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
     return labels[int(np.argmax(size))]
 
 
-def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: tuple[float, bool]) -> np.ndarray:
+def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.ndarray:
     """Nodal forces (n,) of the field as a force per volume."""
 
     @skfem.LinearForm

@@ -17,48 +17,18 @@ where C (n, n) is its compliance: symmetric, positive semidefinite and never for
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.fields import Fields, Region, Validity
-from contactopt.linear.saddle_point import BodyTerm, LocalTerm
+from contactopt.linear.saddle_point import BodyTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
     from contactopt.linear.convolution import Kernel
     from contactopt.linear.operators import Product
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """The linear system of a body that is solved by iteration, by what each iteration needs.
-
-    With E (n, j) the columns of the identity for the unknowns `free`, the compliance is C = E A^-1
-    E' + L R', whose second term is symmetric as well.
-
-    stiffness  x (j,) -> A x [force]
-    cycle      f (j,) -> B f, symmetric positive definite and close to A^-1 f [length]
-    diagonal   (j,) diagonal of A
-    free       (j,) numbers of the displacement unknowns that A has
-    low_rank   L and R (n, i): plates that supports resist, free motions of a body that floats
-    """
-
-    stiffness: Callable[[np.ndarray], np.ndarray]
-    cycle: Callable[[np.ndarray], np.ndarray]
-    diagonal: np.ndarray
-    free: np.ndarray
-    low_rank: tuple[np.ndarray, np.ndarray]
-
-    def term(self, T: sp.csr_matrix) -> LocalTerm:
-        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
-        left, right = self.low_rank
-        return LocalTerm(
-            T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right)
-        )
 
 
 class Equilibrated(Protocol):

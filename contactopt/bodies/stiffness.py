@@ -6,13 +6,13 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import weight_at
+from contactopt.bodies.elements import Weight, weight_at
 
 PIECE = 2**20  # entries of element matrices that are held at the same time
 
 
 def isotropic_stiffness(
-    basis: skfem.CellBasis, constants: tuple[float, float], weight: tuple[float, bool]
+    basis: skfem.CellBasis, constants: tuple[float, float], weight: Weight
 ) -> sp.csr_matrix:
     """Elastic stiffness (N, N) [force / length]: the integral of sigma(u) : epsilon(v), with the
     hoop strain u_r / r if axisymmetric.
@@ -48,10 +48,7 @@ def isotropic_stiffness(
 
 
 def _element_matrices(
-    basis: skfem.CellBasis,
-    elements: np.ndarray,
-    constants: tuple[float, float],
-    weight: tuple[float, bool],
+    basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: Weight
 ) -> np.ndarray:
     """Stiffness of some elements, (element, i, a, j, b) for component a of node i and b of node j.
 

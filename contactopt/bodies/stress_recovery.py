@@ -35,17 +35,14 @@ import skfem
 from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.fields import PLACES, Region
+from contactopt.bodies.fields import PLACES, Region, stress_of
 from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 from contactopt.meshes.cells import straight
 from contactopt.meshes.local_refinement import simplices
 
-OUTSIDE = (
-    # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a
-    # coarse mesh
-    0.2
-)
+# how far beyond an element a point may lie, over its size: an arc lies beyond a coarse mesh
+OUTSIDE = 0.2
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 
 
@@ -54,13 +51,11 @@ class StressMap:
     """The recovered stress at m places of a body as a linear map of its displacement, as in the
     head of this module.
 
-    places   (dim, m) [length]
-    sources  (m,) vertices of the mesh, -1 for a place that is none
-    fit      of the stresses of the elements around each place
-    used     numbers of the elements whose stresses are fitted
-    even     (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
-    body, basis, constants  of the element stress: the quadrature points, and the constants lambda
-                            and mu of the material
+    places     (dim, m) [length];   sources  (m,) vertices of the mesh, -1 for a place that is none
+    fit        of the stresses of the elements around each place
+    used       numbers of the elements whose stresses are fitted
+    even       (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
+    basis      of the element stress at its quadrature points;   constants  lambda and mu
     """
 
     places: np.ndarray
@@ -74,40 +69,22 @@ class StressMap:
 
     @property
     def mesh(self) -> skfem.Mesh:
-        """The mesh of the body."""
         return self.body.basis.mesh
 
     def stress(self, U: np.ndarray) -> np.ndarray:
-        """Recover the stress.
-
-        Parameters
-        ----------
-        U : (n,) The displacement of the body [length].
-
-        Returns
-        -------
-        (m, 4 or 6) array : The stress at every place, components as in
-            contactopt.bodies.fields.STRESSES.
-        """
+        """The stress (m, 4 or 6) at every place under the displacement U (n,), components as in
+        contactopt.bodies.fields.STRESSES."""
         return (
             np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
             * self.even
         )
 
     def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """Estimate how uncertain a function of the recovered stress is.
+        """Standard error (m,) of a function of the recovered stress at every place, from its
+        derivatives `slopes` (m, 4 or 6).
 
         The stresses of the elements around a place scatter about the fit, and what is fitted is as
         uncertain as that.
-
-        Parameters
-        ----------
-        U : (n,) The displacement of the body [length].
-        slopes : (m, 4 or 6) Derivatives of the function by the recovered stress.
-
-        Returns
-        -------
-        (m,) array : Its standard error at every place.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(
@@ -115,44 +92,18 @@ class StressMap:
         )
 
     def elements(self, places: np.ndarray) -> np.ndarray:
-        """List the elements around some of the places.
-
-        Parameters
-        ----------
-        places : Numbers of places.
-
-        Returns
-        -------
-        Numbers of elements.
-        """
+        """Numbers of the elements around some of the places, given by their numbers."""
         chosen = np.isin(self.fit.row, places)
         return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
 
     def transposed(self, slopes: np.ndarray) -> np.ndarray:
-        """Apply the transpose of the map.
-
-        Parameters
-        ----------
-        slopes : (m, 4 or 6) Derivatives of a function by the recovered stress.
-
-        Returns
-        -------
-        (n,) array : Its derivative by the displacement U.
-        """
+        """The derivative (n,) by the displacement U of a function whose derivatives by the
+        recovered stress are `slopes` (m, 4 or 6)."""
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
 
     def size(self, number: int) -> float:
-        """Measure the elements in the patch of a place.
-
-        Parameters
-        ----------
-        number : Number of the place.
-
-        Returns
-        -------
-        Their mean size [length].
-        """
+        """Mean size [length] of the elements in the patch of the place of that number."""
         own = np.unique(self.weights[number].indices // len(self.basis.W))
         volume = np.asarray(self.basis.dx)[own].sum(axis=1)
         return float(np.mean(volume) ** (1 / len(self.places)))
@@ -166,7 +117,6 @@ class StressMap:
     @cached_property
     def _element_stress(self) -> tuple[sp.csr_matrix, ...]:
         """D, one matrix (points, n) per component."""
-        lam, shear = self.constants
         basis, dofs = self.basis, self.basis.element_dofs
         shape = (basis.nelems * len(basis.W), self.body.basis.N)
         radius = np.asarray(basis.global_coordinates())[0] if self.body.weight[1] else None
@@ -174,14 +124,10 @@ class StressMap:
         entries: list[list[np.ndarray]] = [[] for _ in places]
         for number in range(basis.Nbfun):
             field = basis.basis[number][0]
-            gradient = np.asarray(field.grad)
-            strain = np.zeros((3, 3, *gradient.shape[2:]))
-            strain[: len(gradient), : len(gradient)] = (gradient + gradient.swapaxes(0, 1)) / 2
-            if radius is not None:
-                strain[2, 2] = np.asarray(field)[0] / radius
-            trace = np.trace(strain)
+            hoop = None if radius is None else np.asarray(field)[0] / radius
+            stress = stress_of(self.constants, np.asarray(field.grad), hoop)
             for own, (i, j) in zip(entries, places):
-                own.append(2 * shear * strain[i, j] + (lam * trace if i == j else 0.0))
+                own.append(stress[i, j])
         row = np.tile(np.arange(shape[0]), basis.Nbfun)
         column = np.repeat(dofs[:, :, None], len(basis.W), axis=2).ravel()
         return tuple(
@@ -190,17 +136,11 @@ class StressMap:
 
 
 def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> StressMap:
-    """The recovered stress in a region of a body.
+    """The recovered stress in a region of a body, at the vertices of the mesh there; a point is a
+    place by itself.
 
-    Parameters
-    ----------
-    body : assembled, of finite elements
-    region : where. The places are the vertices of the mesh there; a point is a place by itself
-    by_poisson : the derivative of the recovered stress by Poisson's ratio instead
-
-    Raises
-    ------
-    InputError : for a boundary that the body does not have, and for a point outside the body
+    by_poisson asks for its derivative by Poisson's ratio instead. InputError for a boundary that
+    the body does not have, and for a point outside the body.
     """
     mesh = straight(body.basis.mesh)
     places, sources, seeds = _places(body.name, mesh, region)
@@ -230,8 +170,7 @@ def _both_sides(
     offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points of patches with their mirror images across the planes (dim, m) in which their places
-    lie.
-    """
+    lie."""
     for axis, there in enumerate(in_plane):
         images = np.flatnonzero(there[row])
         other = offset[:, images].copy()
@@ -243,8 +182,7 @@ def _both_sides(
 
 def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
     """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements
-    make each patch.
-    """
+    make each patch."""
     count = mesh.p.shape[1]
     vertices, point = np.unique(mesh.t), np.asarray(region.point, dtype=float)
     if region.boundary:
@@ -284,8 +222,7 @@ def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarra
 
 def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
-    size it misses the point.
-    """
+    size it misses it."""
     cells = simplices(mesh)
     origin = cells.p[:, cells.t[0]]
     edges = cells.p[:, cells.t[1:]] - origin[:, None]
@@ -300,10 +237,8 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
 def _patches(
     mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float
 ) -> sp.csr_matrix:
-    """Mask (m, elements) of the elements that make each patch.
-
-    With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at
-    least `least` where the mesh has them.
+    """Mask (m, elements) of the elements that make each patch. With their mirror images beyond the
+    planes of symmetry of `mirrored` (dim, nodes) they are at least `least` where the mesh has them.
     """
     count = mesh.t.shape[1]
     around = sp.csr_matrix(
@@ -325,7 +260,6 @@ def _patches(
 
 
 def _replaced(rows: sp.csr_matrix, chosen: np.ndarray, others: sp.csr_matrix) -> sp.csr_matrix:
-    """The matrix with the chosen rows replaced."""
     stacked = sp.vstack([rows, others]).tocsr()
     order = np.arange(rows.shape[0])
     order[chosen] = rows.shape[0] + np.arange(others.shape[0])
@@ -345,9 +279,8 @@ def _terms(dim: int, degree: int) -> list[tuple[int, ...]]:
 class PatchFit:
     """The least-squares fits around m places.
 
-    row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among
-             all points
-    powers   (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
+    row     (p,) the place of each point of a patch;   column  (p,) its number among all points
+    powers  (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
     """
 
     row: np.ndarray
@@ -361,9 +294,7 @@ class PatchFit:
         return np.asarray(np.sum(self.inverse[self.row, 0] * self.powers, axis=1))
 
     def deviation(self, values: np.ndarray) -> np.ndarray:
-        """Standard error (m,) of the fit of values (points,) at the places, from what the fit
-        leaves.
-        """
+        """Standard error (m,) of the fit of values (points,), from what the fit leaves."""
         count, own = len(self.inverse), values[self.column]
         sums = [np.bincount(self.row, own * power, count) for power in self.powers.T]
         coefficients = np.einsum("mab,bm->ma", self.inverse, np.array(sums))
@@ -390,37 +321,3 @@ def _fit(
         for j, second in enumerate(powers[: i + 1]):
             moments[:, i, j] = moments[:, j, i] = np.bincount(row, first * second, count)
     return PatchFit(row, column, powers.T, np.linalg.pinv(moments, rcond=1e-10, hermitian=True))
-
-
-def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Compute the von Mises stress.
-
-    Parameters
-    ----------
-    stress : (m, 4 or 6) Stresses, whose first three columns are the normal ones.
-
-    Returns
-    -------
-    (m,) array : Their von Mises stress, in the unit of the stresses.
-    """
-    normal, shear = stress[:, :3], stress[:, 3:]
-    deviator = normal - normal.mean(axis=1, keepdims=True)
-    return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))
-
-
-def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
-    """Differentiate the von Mises stress.
-
-    Parameters
-    ----------
-    stress : (m, 4 or 6) Stresses, whose first three columns are the normal ones.
-
-    Returns
-    -------
-    (m, 4 or 6) array : Derivatives by the components; 0 where there is no stress.
-    """
-    normal, size = stress[:, :3], von_mises(stress)[:, None]
-    slopes = np.concatenate(
-        [1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1
-    )
-    return np.divide(slopes, size, out=np.zeros(slopes.shape), where=size > 0)

@@ -213,8 +213,7 @@ def read_stress(
     ------
     InputError : For a boundary that the body does not have, and a point outside the body.
     """
-    from contactopt.bodies.fields import STRESSES
-    from contactopt.bodies.stress_recovery import von_mises, von_mises_slopes
+    from contactopt.bodies.fields import STRESSES, von_mises, von_mises_slopes
 
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = map_of(place, reduction)

@@ -24,11 +24,6 @@ SOLVERS = {
         "MultigridSolver",
         "conjugate gradients with a V-cycle of smoothed aggregation (pyamg)",
     ),
-    "petsc": (
-        f"{ROOM}.petsc",
-        "PetscSolver",
-        "conjugate gradients with PETSc's multigrid (petsc4py)",
-    ),
 }
 
 
