@@ -90,7 +90,8 @@ class Assembly:
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
         """The derivative (n,) of the elastic forces by the material's constant 'E' or 'nu' at fixed
-        U."""
+        U.
+        """
         return np.asarray(self.A @ U / self.material.E if constant == "E" else self.by_poisson @ U)
 
     @property

@@ -172,7 +172,8 @@ class ElasticBody(Body):
 
     def _under(self, force: np.ndarray) -> np.ndarray:
         """Displacement (n,) under loads, supports, plates and nodal forces (n,), with multipliers
-        of zero."""
+        of zero.
+        """
         body = self.body
         missing = body.load + force + self.pull - self._stiffness @ body.prescribed
         resisted = body.plate_forces + self.extended.T @ missing
@@ -184,7 +185,8 @@ class ElasticBody(Body):
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
         """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at
-        rest."""
+        rest.
+        """
         U, Z = np.zeros(force.shape), self.body.rigid_motions.fields
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))

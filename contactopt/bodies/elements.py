@@ -122,7 +122,8 @@ class LeanBasis(skfem.CellBasis):
 
     def _volumes(self) -> np.ndarray:
         """Volume per reference volume, elements by quadrature points; InputError for an element
-        that is flat or folds over."""
+        that is flat or folds over.
+        """
         bad = np.zeros(self.nelems, dtype=bool)
         with np.errstate(all="ignore"):
             try:
@@ -159,7 +160,8 @@ class _Shapes(Sequence[Any]):
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
     """The unknowns of every node (dim, N / dim) of a displacement basis; the vertices of the mesh
-    come first."""
+    come first.
+    """
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
@@ -241,7 +243,8 @@ def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, Rule]:
     """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one
-    rule per cell."""
+    rule per cell.
+    """
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])
@@ -272,7 +275,8 @@ def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and
-    these nodes."""
+    these nodes.
+    """
     nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     # Of the element's shape functions, the one of a node is that which is 1 there.
     local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)

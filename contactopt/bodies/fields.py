@@ -216,7 +216,7 @@ def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarr
 def stress_of(
     constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
 ) -> np.ndarray:
-    """Stress tensor (3, 3, ...) of a gradient (dim, dim, ...) and a hoop strain, if there is one."""
+    """Stress (3, 3, e, q) of a gradient (dim, dim, e, q) and of a hoop strain, if there is one."""
     lam, shear = constants
     dim = len(gradient)
     strain = np.zeros((3, 3, *gradient.shape[2:]))

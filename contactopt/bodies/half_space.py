@@ -248,7 +248,8 @@ class HalfSpaceBody(AssembledBody, Body):
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         """What keeps the body in equilibrium with the contact forces; it acts on the body as a
-        whole."""
+        whole.
+        """
         m, dim = self.unknowns, len(self.components)
         return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
 

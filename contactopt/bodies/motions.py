@@ -142,7 +142,8 @@ def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.nd
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
     """Check that the stiffness A (n, n) of a body does not resist its free motions, because of the
-    rounding of extreme coordinates."""
+    rounding of extreme coordinates.
+    """
     if not len(motions.names):
         return
     error = np.abs(A @ motions.fields).max(axis=0) / (

@@ -162,7 +162,8 @@ class Team:
 
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
         """Send without waiting; the bytes are kept until they have arrived. InputError once the
-        ranks were dismissed."""
+        ranks were dismissed.
+        """
         if self._dismissed:
             raise InputError(
                 "the ranks that hold the bodies of this result were dismissed; ask before, or run"
@@ -245,7 +246,8 @@ def serve(comm: Any) -> None:
 
 def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     """What the function makes of its arguments, or the exception: its own, or that which an
-    argument should have been."""
+    argument should have been.
+    """
     found = [kept[item.number] if isinstance(item, _Reference) else item for item in arguments]
     for item in found:
         if isinstance(item, Raised):
@@ -267,7 +269,8 @@ def _portable(error: Exception) -> Exception:
 
 def shipped(message: Any) -> bytes:
     """Pack anything as bytes: functions without a name, such as those that make meshes, travel by
-    their code."""
+    their code.
+    """
     import cloudpickle
 
     return bytes(cloudpickle.dumps(message))

@@ -116,7 +116,8 @@ class RigidBody(AssembledBody, Body):
 
     def _gap(self, other: Surface) -> np.ndarray:
         """The initial gap at the contacts from that at the nodes, by the weights of the
-        displacements."""
+        displacements.
+        """
         if other.mesh is None:  # its points lie in a plane, its places on the surface
             height = np.sum(other.normals * (other.places - other.points), axis=0)
             if self.part.gap is None:

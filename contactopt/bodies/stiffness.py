@@ -96,7 +96,8 @@ def _pattern(
     graph: sp.csr_matrix, dim: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Indices and indptr of the CSR form from the pattern of its nodes, and for each pair of nodes
-    the place of its first entry and the distance from one of its rows to the next."""
+    the place of its first entry and the distance from one of its rows to the next.
+    """
     degree = np.diff(graph.indptr)
     indptr = np.concatenate([[0], np.cumsum(np.repeat(dim * degree, dim), dtype=np.int64)])
     start = np.repeat(graph.indptr[:-1].astype(np.int64), degree)
@@ -112,7 +113,8 @@ def _pattern(
 
 def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
     """Integrals of f_ia f_jb: f (element, i, a, point), measure (element, point) -> (element, i, a,
-    j, b)."""
+    j, b).
+    """
     flat = f.reshape(len(f), -1, f.shape[3])
     return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(
         *f.shape[:3], *f.shape[1:3]

@@ -72,19 +72,35 @@ class StressMap:
         return self.body.basis.mesh
 
     def stress(self, U: np.ndarray) -> np.ndarray:
-        """The stress (m, 4 or 6) at every place under the displacement U (n,), components as in
-        contactopt.bodies.fields.STRESSES."""
+        """Recover the stress.
+
+        Parameters
+        ----------
+        U : (n,) displacement of the body [length].
+
+        Returns
+        -------
+        (m, 4 or 6) at every place, components as in contactopt.bodies.fields.STRESSES.
+        """
         return (
             np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
             * self.even
         )
 
     def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """Standard error (m,) of a function of the recovered stress at every place, from its
-        derivatives `slopes` (m, 4 or 6).
+        """Estimate how uncertain a function of the recovered stress is.
 
         The stresses of the elements around a place scatter about the fit, and what is fitted is as
         uncertain as that.
+
+        Parameters
+        ----------
+        U : (n,) displacement of the body [length].
+        slopes : (m, 4 or 6) derivatives of the function by the recovered stress.
+
+        Returns
+        -------
+        (m,) its standard error at every place.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(
@@ -92,18 +108,44 @@ class StressMap:
         )
 
     def elements(self, places: np.ndarray) -> np.ndarray:
-        """Numbers of the elements around some of the places, given by their numbers."""
+        """List the elements around some of the places.
+
+        Parameters
+        ----------
+        places : Their numbers.
+
+        Returns
+        -------
+        Numbers of elements.
+        """
         chosen = np.isin(self.fit.row, places)
         return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
 
     def transposed(self, slopes: np.ndarray) -> np.ndarray:
-        """The derivative (n,) by the displacement U of a function whose derivatives by the
-        recovered stress are `slopes` (m, 4 or 6)."""
+        """Apply the transpose of the map.
+
+        Parameters
+        ----------
+        slopes : (m, 4 or 6) derivatives of a function by the recovered stress.
+
+        Returns
+        -------
+        (n,) its derivative by the displacement U.
+        """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
 
     def size(self, number: int) -> float:
-        """Mean size [length] of the elements in the patch of the place of that number."""
+        """Measure the elements in the patch of a place.
+
+        Parameters
+        ----------
+        number : Number of the place.
+
+        Returns
+        -------
+        Their mean size [length].
+        """
         own = np.unique(self.weights[number].indices // len(self.basis.W))
         volume = np.asarray(self.basis.dx)[own].sum(axis=1)
         return float(np.mean(volume) ** (1 / len(self.places)))
@@ -170,7 +212,8 @@ def _both_sides(
     offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points of patches with their mirror images across the planes (dim, m) in which their places
-    lie."""
+    lie.
+    """
     for axis, there in enumerate(in_plane):
         images = np.flatnonzero(there[row])
         other = offset[:, images].copy()
@@ -182,7 +225,8 @@ def _both_sides(
 
 def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
     """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements
-    make each patch."""
+    make each patch.
+    """
     count = mesh.p.shape[1]
     vertices, point = np.unique(mesh.t), np.asarray(region.point, dtype=float)
     if region.boundary:
@@ -222,7 +266,8 @@ def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarra
 
 def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
-    size it misses it."""
+    size it misses it.
+    """
     cells = simplices(mesh)
     origin = cells.p[:, cells.t[0]]
     edges = cells.p[:, cells.t[1:]] - origin[:, None]

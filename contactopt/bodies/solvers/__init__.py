@@ -61,8 +61,17 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
 
 
 def factors_of(name: str, dim: int) -> str:
-    """The solver with factors, a key of FACTORS_UP_TO, that a name stands for in a large body:
-    'auto' takes PARDISO in space where it is installed."""
+    """Name the solver with factors that a name stands for in a large body.
+
+    Parameters
+    ----------
+    name : A key of SOLVERS, or 'auto', which takes PARDISO in space where it is installed.
+    dim : Number of dimensions, 2 or 3.
+
+    Returns
+    -------
+    A key of FACTORS_UP_TO.
+    """
     if name in FACTORS_UP_TO:
         return name
     return "pardiso" if dim == 3 and find_spec("pypardiso") is not None else "superlu"

@@ -85,7 +85,8 @@ class Level:
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x =
-        r' - A z: x, r', z."""
+        r' - A z: x, r', z.
+        """
         z = SINGLE(4 / 3) / self.largest * r
         x = z.copy()
         for k in range(2, DEGREE + 1):
@@ -153,7 +154,8 @@ class VCycle:
 
     def _correct(self, r: np.ndarray, depth: int) -> np.ndarray:
         """Approximate solution on the levels from `depth` on: smooth, correct on the next level,
-        smooth."""
+        smooth.
+        """
         if depth == len(self.levels):
             return np.asarray(self.coarsest @ r)
         level = self.levels[depth]

@@ -15,7 +15,8 @@ from contactopt.errors import InputError
 
 class PardisoSolver(BodySolver):
     """Cholesky factors of oneMKL PARDISO in its own nested dissection order (pip install
-    pypardiso)."""
+    pypardiso).
+    """
 
     name = "pardiso"
     releases_lock = True

@@ -40,7 +40,8 @@ class FactorThread:
 
     def __getitem__(self, number: int) -> Any:
         """SciPy's SuperLU object; whoever keeps it longer than this thread keeps its memory for
-        good."""
+        good.
+        """
         return self._held[number]
 
 
@@ -96,7 +97,8 @@ class SuperLUSolver(BodySolver):
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
         """None where SuperLU changed the order for its pivots, and where rounding left some that
-        are not positive."""
+        are not positive.
+        """
         factors, n = self.factors, self.n
         head = n - len(self._asked())
         symmetric = np.array_equal(factors.perm_c, factors.perm_r)
@@ -136,7 +138,8 @@ class SuperLUSolver(BodySolver):
 
 def _ancestors(L: sp.csc_matrix, first: np.ndarray) -> np.ndarray:
     """Unknowns (sorted) that substitution from `first` on reaches: those in the columns of L of
-    those reached before."""
+    those reached before.
+    """
     reached = np.zeros(L.shape[0], dtype=bool)
     front = np.unique(first)
     while len(front):

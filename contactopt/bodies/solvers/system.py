@@ -155,8 +155,15 @@ class BodySolver(ABC):
         return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Prepare products (load, rtol) with the block of the inverse of A on the unknowns `at`
-        (m,), of loads (m,) or (m, j).
+        """Prepare products with the block of the inverse of A on some unknowns.
+
+        Parameters
+        ----------
+        at : (m,) the unknowns.
+
+        Returns
+        -------
+        A function (load, rtol) of loads (m,) or (m, j) to the product of that shape.
         """
 
         def product(load: np.ndarray, rtol: float | None) -> np.ndarray:
