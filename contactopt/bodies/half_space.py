@@ -100,9 +100,8 @@ class HalfSpaceBody(AssembledBody, Body):
         k, dim = int(np.prod(self.grid)), len(self.components)
         columns = [self.components.index(name) for name in self.part.force or {}]
         shifts = np.eye(dim)[:, columns]
-        return np.concatenate(
-            [np.tile(shifts, (k, 1)), np.zeros((self.unknowns, len(columns))), shifts]
-        )
+        still = np.zeros((self.unknowns, len(columns)))
+        return np.concatenate([np.tile(shifts, (k, 1)), still, shifts])
 
     @cached_property
     def motion_names(self) -> tuple[str, ...]:
@@ -173,19 +172,16 @@ class HalfSpaceBody(AssembledBody, Body):
         signs = T.data.reshape(k, dim)
         if np.any(signs != signs[0]) or not np.allclose(np.abs(signs[0]), 1.0, rtol=1e-12):
             return None
-        symbols = {
-            (a, b): signs[0, a] * signs[0, b] * symbol
-            for (a, b), symbol in self.kernel.symbols.items()
-        }
+        sign, known = signs[0], self.kernel.symbols
+        symbols = {(a, b): sign[a] * sign[b] * symbol for (a, b), symbol in known.items()}
         return replace(self.kernel, symbols=symbols)
 
     def product(self, T: sp.csr_matrix) -> Product:
         back, act = T.T.tocsr(), self._compliance_product
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-            return np.asarray(
-                T @ np.stack([act(force, accuracy) for force in (back @ X).T], axis=1)
-            )
+            moved = [act(force, accuracy) for force in (back @ X).T]
+            return np.asarray(T @ np.stack(moved, axis=1))
 
         return product
 
@@ -272,10 +268,7 @@ def _infinite(body: HalfSpaceBody) -> Kernel:
             body.part.material, body.spacing[0], distances[0], depth
         )
     else:
-        spacing = (body.spacing[0], body.spacing[1])
-        coefficients = half_space_influence(
-            body.part.material, spacing, (distances[0], distances[1])
-        )
+        coefficients = half_space_influence(body.part.material, body.spacing, distances)
     last = len(body.grid)
     turned = {}
     for (a, b), part in coefficients.items():
@@ -293,8 +286,7 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
 
     Under tractions with the wave vector k the surface moves by (1 - nu)/(G |k|) along the normal
     and along k, by 1/(G |k|) across k, and by (1 - 2 nu)/(2 G |k|) along k under normal tractions,
-    with a quarter of a period between. Sources: Johnson (1985), section 13.2; Stanley, Kato (1997),
-    An FFT-based method for rough surface contact.
+    with a quarter of a period between. Sources: Johnson (1985), section 13.2; Stanley, Kato (1997).
     """
     G, nu = lame(body.part.material)[1], body.part.material.nu
     grid, spacing = body.grid, body.spacing

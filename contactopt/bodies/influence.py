@@ -39,7 +39,7 @@ Antiderivative = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def half_space_influence(
-    material: Material, spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]
+    material: Material, spacing: tuple[float, ...], offsets: tuple[np.ndarray, ...]
 ) -> dict[tuple[int, int], np.ndarray]:
     """Influence coefficients of rectangular cells on a half-space.
 
@@ -119,9 +119,7 @@ WHOLE: dict[str, Antiderivative] = {
 }
 
 
-def _means(
-    spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]
-) -> dict[str, np.ndarray]:
+def _means(spacing: tuple[float, ...], offsets: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
     """Means of the functions of WHOLE over the cell at each offset (i, j)."""
     farthest, longer = GAUSS[-1][1], max(spacing)
 
@@ -149,7 +147,7 @@ def _means(
 
 
 def _by_gauss(
-    spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray], points: int
+    spacing: tuple[float, ...], offsets: tuple[np.ndarray, ...], points: int
 ) -> dict[str, np.ndarray]:
     """The same by Gauss's rule, with that many points a side; worthless next to the loaded cell."""
     nodes, weights = np.polynomial.legendre.leggauss(points)

@@ -155,9 +155,8 @@ class RigidBody(AssembledBody, Body):
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
     ) -> np.ndarray:
-        return np.asarray(
-            self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components))
-        )
+        follows = np.roll(force, len(self.components))
+        return np.asarray(self.at_rest + self.motions @ multipliers + follows)
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         dim = len(self.components)
