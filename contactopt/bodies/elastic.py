@@ -29,7 +29,8 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembly import Assembly, Equilibrium
 from contactopt.bodies.body import reload_body
-from contactopt.bodies.fields import Fields, Region, Validity, fields_of, limits_of, recovery_errors
+from contactopt.bodies.element_stress import fields_of, limits_of, recovery_errors
+from contactopt.bodies.fields import Fields, Region, Validity
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System

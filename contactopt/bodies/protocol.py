@@ -303,7 +303,7 @@ class Body(ABC):
 
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
         """Compute for each element the products of the stress errors of displacements
-        (contactopt.bodies.fields).
+        (contactopt.bodies.element_stress).
 
         Parameters
         ----------

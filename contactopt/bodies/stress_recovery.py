@@ -35,7 +35,8 @@ import skfem
 from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.fields import PLACES, Region, stress_of
+from contactopt.bodies.element_stress import stress_of
+from contactopt.bodies.fields import PLACES, Region
 from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 from contactopt.meshes.cells import straight
