@@ -18,8 +18,6 @@ import pytest
 
 from contactopt import InputError, reduce, scenes, solve
 from contactopt.bodies.launch import OUTCOME, launch, mpiexec
-from contactopt.bodies.protocol import Body
-from contactopt.bodies.remote import RemoteBody
 from contactopt.cli import main
 from contactopt.methods.preconditioners import degrees
 from contactopt.scenes.slices import sliced
@@ -166,11 +164,6 @@ def test_refinement_is_that_of_one_process(found, quantity):
 def test_gradients_are_those_of_one_process(found, scene, quantity):
     one, many = map(np.array, found[f"gradient {scene} {quantity}"])
     assert np.abs(one - many).max() <= 1e-10 * np.abs(one).max() and np.any(one)
-
-
-def test_a_body_elsewhere_has_every_member_of_a_body():
-    members = {name for name in vars(Body) if not name.startswith("_")}
-    assert not [name for name in sorted(members) if not hasattr(RemoteBody, name)]
 
 
 def test_messages_do_not_grow_with_the_unknowns_of_the_bodies(found):

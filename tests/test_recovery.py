@@ -9,9 +9,9 @@ from conftest import MATERIAL
 
 import contactopt
 from contactopt import InputError, Part, Rigid, Scene, Support, scenes
-from contactopt.bodies.fields import STRESSES, fields_of, nodal_stress
-from contactopt.bodies.protocol import Region
-from contactopt.bodies.stress_recovery import stress_map, von_mises, von_mises_slopes
+from contactopt.bodies.element_stress import fields_of, nodal_stress
+from contactopt.bodies.fields import STRESSES, Region, von_mises, von_mises_slopes
+from contactopt.bodies.stress_recovery import stress_map
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.readings.places import place_of, read_place, read_stress
 from contactopt.scenes import make_scene

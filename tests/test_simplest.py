@@ -24,7 +24,7 @@ from contactopt import (
     scenes,
     simplify,
 )
-from contactopt.bodies.protocol import Region
+from contactopt.bodies.fields import Region
 from contactopt.meshes.polar import ring
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
 from contactopt.readings.quantities import approach, elastic_energy

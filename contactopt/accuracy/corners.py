@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.accuracy.estimate import Level
-from contactopt.bodies.protocol import Region
+from contactopt.bodies.fields import Region
 from contactopt.meshes.cells import straight
 from contactopt.meshes.curves import CORNER
 from contactopt.meshes.structured import simplices

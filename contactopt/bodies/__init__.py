@@ -1,5 +1,4 @@
-"""Bodies as matrices: what the interface needs to know of them stands in
-contactopt.bodies.protocol.
+"""Bodies as matrices: contactopt.bodies.protocol says what the interface needs to know of them.
 
 A new kind of body is one module and one line of the table BODIES.
 """
@@ -9,23 +8,24 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from contactopt.bodies.protocol import AssembledBody
+from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.ranks import RemotePart
 from contactopt.errors import InputError
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 # class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody,
 # what it is)
+ROOM = "contactopt.bodies"
 BODIES: dict[type, tuple[str, str, str]] = {
     Part: (
-        "contactopt.bodies.elastic",
+        f"{ROOM}.assembled_elastic",
         "assemble_elastic",
         "finite elements with linear elasticity",
     ),
-    RemotePart: ("contactopt.bodies.remote", "assemble_remote", "finite elements on another rank"),
-    Rigid: ("contactopt.bodies.rigid", "assemble_rigid", "a rigid body"),
+    RemotePart: (f"{ROOM}.remote", "assemble_remote", "finite elements on another rank"),
+    Rigid: (f"{ROOM}.rigid", "assemble_rigid", "a rigid body"),
     HalfSpace: (
-        "contactopt.bodies.half_space",
+        f"{ROOM}.half_space",
         "assemble_half_space",
         "a half-space on a regular grid, without a mesh",
     ),

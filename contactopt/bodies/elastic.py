@@ -27,17 +27,16 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.body import Assembly, build_body, guides_of, reload_body
-from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, Validity, fields_of, limits_of, recovery_errors
-from contactopt.bodies.protocol import Equilibrium, Guides, Mesh, Region, Surface
+from contactopt.bodies.assembly import Assembly, Equilibrium
+from contactopt.bodies.body import reload_body
+from contactopt.bodies.element_stress import fields_of, limits_of, recovery_errors
+from contactopt.bodies.fields import Fields, Region, Validity
+from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.bodies.stress_recovery import StressMap, stress_map
 from contactopt.bodies.thin import is_thin, on_ground
-from contactopt.errors import InputError
 from contactopt.linear.operators import Product
-from contactopt.meshes.given_curves import check_curve
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
@@ -46,8 +45,8 @@ KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticBody:
-    """An Assembly with a solver of its linear system, as contactopt.bodies.protocol.Body asks.
+class ElasticBody(Body):
+    """An Assembly with a solver of its linear system.
 
     kept        free unknowns without the fixing unknowns of a body that floats
     interface   (m,) kept unknowns of the contact surfaces, on which contact forces act
@@ -74,7 +73,7 @@ class ElasticBody:
     ground: sp.csr_matrix | None = None
     pull: np.ndarray | float = 0.0
 
-    @property
+    @cached_property
     def name(self) -> str:
         return self.body.name
 
@@ -83,19 +82,19 @@ class ElasticBody:
         """What the solver solves with, on all unknowns."""
         return self.body.A if self.ground is None else self.body.A + self.ground
 
-    @property
+    @cached_property
     def unknowns(self) -> int:
         return len(self.body.free)
 
-    @property
+    @cached_property
     def iterative(self) -> bool:
         return self.solver.iterative
 
-    @property
+    @cached_property
     def complete(self) -> bool:
         return self.solver.complete
 
-    @property
+    @cached_property
     def parallel(self) -> bool:
         return self.solver.releases_lock
 
@@ -109,13 +108,6 @@ class ElasticBody:
             *iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere)
         )
 
-    @property
-    def interface_compliance(self) -> np.ndarray:
-        """(m, m) block of A_ff^-1 on `interface` [length / force]; InputError if the body was not
-        prepared for it.
-        """
-        return self.solver.trailing_inverse()
-
     @cached_property
     def motions(self) -> np.ndarray:
         """(n, p + i) displacement fields of the free motions, those of plates first."""
@@ -123,7 +115,7 @@ class ElasticBody:
             [self.extended @ self.modes[0], self.body.rigid_motions.fields], axis=1
         )
 
-    @property
+    @cached_property
     def motion_names(self) -> tuple[str, ...]:
         strongest = np.argmax(np.abs(self.modes[0]), axis=0) if self.modes[0].size else []
         return (*(self.body.driven[i] for i in strongest), *self.body.rigid_motions.names)
@@ -157,21 +149,15 @@ class ElasticBody:
 
         return product
 
-    def convolution(self, T: sp.csr_matrix) -> None:
-        return None
-
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        # T G T' from the block of G on the contact unknowns, and T C T' with what is of low rank;
-        # both made symmetric.
+        # T G T' from the block of G on the contact unknowns, and what is of low rank
         local, (left, right) = T[:, self.interface], self._low_rank(T)
-        C, added = local @ (local @ self.interface_compliance).T, left @ right.T
+        C, added = local @ (local @ self.solver.trailing_inverse()).T, left @ right.T
         return np.asarray((C + C.T) / 2 + (added + added.T) / 2)
 
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(
-            self._low_rank(T)[1]
-        ).sum(axis=1)
-        return np.asarray(size > 0)
+        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel()
+        return np.asarray(size + np.abs(self._low_rank(T)[1]).sum(axis=1) > 0)
 
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
@@ -186,8 +172,8 @@ class ElasticBody:
         return np.asarray(self._under(force) + self.motions @ multipliers)
 
     def _under(self, force: np.ndarray) -> np.ndarray:
-        """Displacement (n,) under the loads, supports, plates and nodal forces (n,), with
-        multipliers of zero.
+        """Displacement (n,) under loads, supports, plates and nodal forces (n,), with multipliers
+        of zero.
         """
         body = self.body
         missing = body.load + force + self.pull - self._stiffness @ body.prescribed
@@ -260,9 +246,6 @@ class ElasticBody:
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 
-    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
-        return np.asarray(T @ U)
-
     def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
         return limits_of(self.body, U, force)
 
@@ -271,11 +254,8 @@ class ElasticBody:
 
     def on_elements(self, values: np.ndarray) -> np.ndarray:
         dofs = self.body.basis.element_dofs
-        return np.asarray(
-            (values / np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1))[dofs].sum(
-                axis=0
-            )
-        )
+        count = np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1)
+        return np.asarray((values / count)[dofs].sum(axis=0))
 
     def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
         return stress_map(self.body, region, by_poisson)
@@ -284,9 +264,8 @@ class ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))
 
     def grounded(self, modulus: float) -> ElasticBody:
-        if self.ground is not None or self.solver.iterative:
-            return self
-        if not is_thin(self.body, self.relieved):
+        told = self.ground is None and not self.solver.iterative
+        if not (told and is_thin(self.body, self.relieved)):
             return self
         body, ground = on_ground(self.body, modulus)
         return condense(body, self.solver.name, self.complete, sp.diags(ground, format="csr"))
@@ -299,165 +278,56 @@ class ElasticBody:
         return _at_rest(replace(self, pull=pull), self.body)
 
 
-@dataclass(frozen=True, eq=False)
-class AssembledElastic:
-    """An Assembly with its part of the scene, as contactopt.bodies.protocol.AssembledBody asks."""
-
-    body: Assembly
-    part: Part
-    meshed = True
-
-    @property
-    def name(self) -> str:
-        return self.body.name
-
-    @property
-    def unknowns(self) -> int:
-        return len(self.body.free)
-
-    @property
-    def interface_unknowns(self) -> int:
-        return self.body.contact_dofs.size
-
-    def iterates(self, solver: str) -> bool:
-        return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
-
-    def surface(self, name: str | None = None) -> Surface:
-        """The contact surface, with the places of its nodes on the curve that the part gives."""
-        name = name or self.part.contact
-        if name not in self.body.traces:
-            raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has"
-                f" {', '.join(sorted(self.body.traces))}."
-            )
-        return self._surfaces[name]
-
-    @cached_property
-    def _surfaces(self) -> dict[str, Surface]:
-        """All of them, made once: a surface may take part in several pairs."""
-        return {name: self._surface(name) for name in self.body.traces}
-
-    def _surface(self, name: str) -> Surface:
-        body = self.body
-        trace, unknowns = body.traces[name], body.unknowns
-        nodes = np.unique(trace.weights.indices)
-        places = body.locations[:, nodes]
-        curve = self.part.curve_of(name)
-        if curve is not None:
-            check_curve(curve, body.basis.mesh, name)
-            places = curve(places)
-        held = np.ones(len(body.load), dtype=bool)
-        held[body.free] = False
-        kind, facets = body.basis.mesh.refdom.__name__, np.asarray(body.basis.mesh.boundaries[name])
-        faces, outward = face_nodes(body.basis, body.degree, facets)
-        return Surface(
-            body.name,
-            body.locations[:, trace.nodes],
-            trace.normals,
-            trace.areas,
-            trace.weights[:, nodes],
-            places,
-            tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
-            held[unknowns[:, trace.nodes]],
-            trace.cells,
-            Mesh(
-                kind,
-                body.degree,
-                faces,
-                outward,
-                body.weight,
-                body.locations,
-                unknowns,
-                held,
-                curve,
-            ),
-        )
-
-    def guides(self) -> Guides:
-        return guides_of(self.body, self.part)
-
-    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
-        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
-
-    def prepare(self, solver: str, entries: bool) -> ElasticBody:
-        return condense(self.body, solver, entries)
-
-
-def _trace(
-    weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
-) -> sp.csr_matrix:
-    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,).
-
-    In general the neighbours of a contact node take part, by its row of the weights. Where the
-    component is prescribed at the contact node itself, as on a plane of symmetry, its displacement
-    is that of the node alone: the weights of a neighbour and of its mirror image, which the model
-    leaves out, cancel each other there.
-    """
-    k = len(nodes)
-    alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
-    prescribed = sp.diags(held[unknowns[nodes]].astype(float))
-    part = sp.coo_matrix(weights - prescribed @ (weights - alone))
-    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k, len(held)))
-    trace.eliminate_zeros()
-    return trace
-
-
-def assemble_elastic(
-    scene: Scene, part: Part, elements: int, zone: float | None
-) -> AssembledElastic:
-    """Assemble an elastic part of a scene.
-
-    Parameters
-    ----------
-    scene, part : The scene and one of its parts.
-    elements, zone : Number of elements across the contact half-width, and the half-width that the
-        mesh resolves [length].
-
-    Returns
-    -------
-    The body as matrices, whose linear system is not solved yet.
-
-    Raises
-    ------
-    InputError : For a part that cannot be modelled.
-    """
-    return AssembledElastic(build_body(scene, part, elements, zone), part)
-
-
 def condense(
     body: Assembly, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
 ) -> ElasticBody:
     """Make one body's linear system solvable and condense its plates.
 
-    Parameters
-    ----------
-    body : The assembled body.
-    solver : 'auto' or a name in contactopt.bodies.solvers.SOLVERS.
-    entries : Whether to eliminate the contact unknowns last, so that the factors hold their Schur
-        complement: this makes the entries of the compliance cheap, and serves an explicit Q.
-    ground : (n, n) stiffness that is added (contactopt.bodies.thin), if any.
-
-    Returns
-    -------
-    The body, which moves under contact forces.
+    solver is 'auto' or a name in contactopt.bodies.solvers.SOLVERS. With `entries` the contact
+    unknowns are eliminated last, so that the factors hold their Schur complement: this makes the
+    entries of the compliance cheap, and serves an explicit Q. ground (n, n) is a stiffness that is
+    added (contactopt.bodies.thin), if any.
     """
-    # The free unknowns without the fixing ones, with node and component of each, and those of the
-    # contact surfaces.
+    whole = body.A if ground is None else sp.csr_matrix(body.A + ground)
+    kept = body.free if ground is not None else np.setdiff1d(body.free, body.rigid_motions.fixing)
+    interface = np.intersect1d(body.contact_dofs, kept)
+    made = _solver(body, solver, whole, kept, interface if entries else None)
+    extended = _extended(body, made, whole, kept)
+    # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes
+    # E = Z v / stiffness^1/2.
+    K = extended.T @ (whole @ extended)
+    stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
+    own = np.sum(body.motion * (whole @ body.motion), axis=0)
+    moves = stiffness <= KERNEL * np.max(own, initial=0.0)
+    # keep one multiplier per plate component
+    free = np.eye(len(K)) if moves.all() else vectors[:, moves]
+    modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
+    relief, load = _relief(body, made, kept), body.plate_forces
+    parts = (body, made, kept, interface, body.prescribed, relief, extended, modes, load, ground)
+    return _at_rest(ElasticBody(*parts), body)
+
+
+def _solver(
+    body: Assembly, name: str, whole: sp.csr_matrix, kept: np.ndarray, trailing: np.ndarray | None
+) -> BodySolver:
+    """A solver for the matrix on the kept unknowns, some of which may be eliminated last."""
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
-    whole = body.A if ground is None else sp.csr_matrix(body.A + ground)
-    kept = body.free if ground is not None else np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
-    interface = np.intersect1d(body.contact_dofs, kept)
     # Factors of A on these unknowns, or multigrid, which needs no copy of A.
-    iterative = solver_type(solver, len(kept), len(dofs)).iterative
+    iterative = solver_type(name, len(kept), len(dofs)).iterative
     A = Block(whole, kept) if iterative else whole[kept][:, kept]
-    trailing = place[interface] if entries else None
-    made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
+    last = None if trailing is None else place[trailing]
+    made = make_solver(name, System(A, node[kept], component[kept], body.locations, last))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
-    # Y, with which the generalised inverse of a floating body is G - Z Y' - Y Z'.
-    relief = _relief(body, made, kept)
+    return made
+
+
+def _extended(
+    body: Assembly, solver: BodySolver, whole: sp.csr_matrix, kept: np.ndarray
+) -> np.ndarray:
+    """The plate motions M extended into the body, Z = M - A_ff^-1 A_f: M (n, p)."""
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is
     # nothing to solve.
     extended = _rigid_extension(body)
@@ -466,40 +336,16 @@ def condense(
         for motion in (extended, body.motion)
     )
     strained = lacking > RIGID * forces
-    # The extension of the other plate motions M into the body: Z = M - A_ff^-1 A_f: M.
     if strained.any():
-        extended[np.ix_(kept, strained)] -= made.solve((whole @ extended[:, strained])[kept])
+        extended[np.ix_(kept, strained)] -= solver.solve((whole @ extended[:, strained])[kept])
     # Rigid motions are multipliers of their own, so that plate motions have no part along them.
     if len(body.rigid_motions.names):
         extended -= body.rigid_motions.fields @ (body.rigid_motions.forces.T @ extended)
-    # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes E
-    # = Z v /
-    # stiffness^1/2.
-    K = extended.T @ (whole @ extended)
-    stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
-    moves = stiffness <= KERNEL * np.max(
-        np.sum(body.motion * (whole @ body.motion), axis=0), initial=0.0
-    )
-    # keep one multiplier per plate component
-    free = np.eye(len(K)) if moves.all() else vectors[:, moves]
-    modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
-    parts = (
-        body,
-        made,
-        kept,
-        interface,
-        body.prescribed,
-        relief,
-        extended,
-        modes,
-        body.plate_forces,
-        ground,
-    )
-    return _at_rest(ElasticBody(*parts), body)
+    return extended
 
 
 def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
-    """Y = G S - Z (S' G S) / 2 of contactopt.bodies.motions, (n, i)."""
+    """Y = G S - Z (S' G S) / 2 of contactopt.bodies.motions, (n, i), for floating bodies."""
     Z, S = body.rigid_motions.fields, body.rigid_motions.forces
     Y = np.zeros(Z.shape)
     if Z.shape[1]:

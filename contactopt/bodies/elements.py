@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -36,20 +36,11 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, is_curved
 
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
-_TRIANGLE = (
-    RefTri,
-    skfem.ElementTriP1(),
-    np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]]),
-)
+_TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
 _SQUARE = (
     RefQuad,
     skfem.ElementQuad1(),
-    np.array(
-        [
-            [0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5],
-            [0.0, 0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.5],
-        ]
-    ),
+    np.array([[0, 2, 2, 0, 1, 2, 1, 0, 1], [0, 0, 2, 2, 0, 1, 2, 1, 1]]) / 2,
 )
 # faces: reference cell, hat functions, places of the quadratic nodes with the vertices first; the
 # cells at degree 2
@@ -65,6 +56,8 @@ TIED = {
     "RefTri": FACES["RefQuad"][3],
     "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
 }
+Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
+Rule: TypeAlias = tuple[np.ndarray, np.ndarray]  # places and weights of a quadrature
 NOISE = 1e-14  # what rounding leaves of a zero
 
 
@@ -85,7 +78,7 @@ class Trace(NamedTuple):
     cells: np.ndarray
 
 
-def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
+def weight_at(weight: Weight, x: np.ndarray) -> np.ndarray | float:
     """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an
     axisymmetric scene.
 
@@ -103,20 +96,10 @@ def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
 
 
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
-    """Make the vector-valued displacement basis of a mesh.
+    """The vector-valued displacement basis of a mesh, of degree 1 or 2.
 
     Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor
     1/r.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-    degree : Degree of the displacement, 1 or 2.
-    axisymmetric : Whether the integrals carry the weight r.
-
-    Returns
-    -------
-    The basis of N unknowns.
     """
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
@@ -125,14 +108,10 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
 
 
 class LeanBasis(skfem.CellBasis):
-    """A CellBasis that evaluates each shape function when it is asked for.
+    """A CellBasis, with quadrature of an order, that evaluates each shape function when it is asked
+    for.
 
     The values of all shape functions would take more memory than the stiffness matrix.
-
-    Parameters
-    ----------
-    mesh, element : of scikit-fem
-    order : of the quadrature
     """
 
     def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
@@ -155,9 +134,8 @@ class LeanBasis(skfem.CellBasis):
                     f"the mesh has an element without volume, or one that folds over: {error}."
                 ) from error
         if np.any(bad):
-            place = ", ".join(
-                f"{x:g}" for x in self.mesh.p[:, self.mesh.t[:, np.argmax(bad)]].mean(axis=1)
-            )
+            corners = self.mesh.p[:, self.mesh.t[:, np.argmax(bad)]]
+            place = ", ".join(f"{x:g}" for x in corners.mean(axis=1))
             raise InputError(
                 f"the mesh has an element without volume, or one that folds over, at ({place})."
             )
@@ -166,8 +144,6 @@ class LeanBasis(skfem.CellBasis):
 
 @dataclass(frozen=True)
 class _Shapes(Sequence[Any]):
-    """Shape functions of all elements at the quadrature points, evaluated one by one."""
-
     element: skfem.Element
     mapping: skfem.mapping.Mapping
     points: np.ndarray
@@ -183,43 +159,20 @@ class _Shapes(Sequence[Any]):
 
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
-    """Number the unknowns of every node.
-
-    Parameters
-    ----------
-    basis : A displacement basis of N unknowns.
-
-    Returns
-    -------
-    (dim, N / dim) unknowns, one row for each component. The vertices of the mesh come first.
+    """The unknowns of every node (dim, N / dim) of a displacement basis; the vertices of the mesh
+    come first.
     """
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
 
 def contact_trace(
-    basis: skfem.CellBasis,
-    degree: int,
-    boundary: np.ndarray,
-    weight: tuple[float, bool],
-    tied: bool = False,
+    basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: Weight, tied: bool = False
 ) -> Trace:
-    """Make the trace of the displacement on a boundary, with contact nodes, nodal areas and
-    normals.
+    """The trace of the displacement on a boundary, given by the numbers (f,) of its facets.
 
-    Parameters
-    ----------
-    basis : The displacement basis of the body.
-    degree : Its degree, 1 or 2.
-    boundary : (f,) numbers of the facets of the mesh.
-    weight : The measure of the integrals, as for `weight_at`.
-    tied : Whether every node of the boundary shall be a contact, as where it is tied to another
-        body.
-
-    Returns
-    -------
-    The contact nodes with areas [length^2], unit normals, and the sparse matrix W of this module's
-    head.
+    degree is that of the basis, weight the measure of the integrals as for `weight_at`. If `tied`,
+    every node of the boundary is a contact, as where it is tied to another body.
     """
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
@@ -288,7 +241,7 @@ def face_nodes(
 
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, Rule]:
     """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one
     rule per cell.
     """
@@ -300,10 +253,7 @@ def _cell_rule(
 
 
 def _face_basis(
-    mesh: skfem.Mesh,
-    shape: skfem.Element,
-    boundary: np.ndarray,
-    rule: tuple[np.ndarray, np.ndarray],
+    mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: Rule
 ) -> skfem.FacetBasis:
     """FacetBasis that finds the places on the elements to what rounding of the coordinates allows.
 
@@ -313,13 +263,11 @@ def _face_basis(
     mapping = mesh._mapping()
     if not isinstance(mapping, skfem.MappingAffine):
         corners = mesh.p[:, mesh.facets[:, boundary]]
-        rounding = (
-            np.finfo(float).eps * np.abs(corners).max() / np.ptp(corners, axis=1).max(axis=0).min()
-        )
+        least = np.ptp(corners, axis=1).max(axis=0).min()
+        rounding = np.finfo(float).eps * np.abs(corners).max() / least
+        tolerance = max(1e-12, 16 * rule[0].shape[1] * rounding)
         mapping = copy(mapping)  # the mesh keeps its own
-        mapping.invF = partial(
-            type(mapping).invF, mapping, newton_tol=max(1e-12, 16 * rule[0].shape[1] * rounding)
-        )
+        mapping.invF = partial(type(mapping).invF, mapping, newton_tol=tolerance)
     return skfem.FacetBasis(mesh, shape, mapping, facets=boundary, quadrature=rule)
 
 
@@ -327,7 +275,7 @@ def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and
-    these nodes (face, j).
+    these nodes.
     """
     nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     # Of the element's shape functions, the one of a node is that which is 1 there.

@@ -1,4 +1,4 @@
-"""Displacement and stress inside a body of finite elements."""
+"""What is read inside a body: where, and what displacement and stress are found there."""
 
 from __future__ import annotations
 
@@ -8,12 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import skfem
-
-from contactopt.bodies.body import Assembly
-from contactopt.bodies.elements import weight_at
-from contactopt.material import lame
-from contactopt.meshes.cells import SHAPES, elements_of, second_order, straight
 
 STRESSES = {
     "plane-strain": ("xx", "yy", "zz", "xy"),
@@ -21,20 +15,18 @@ STRESSES = {
     "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
 }
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
-# elements whose shape functions are evaluated at a time, which bounds the memory that they take
-BLOCK = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
     """One body after the solve, at the n nodes of its mesh, of which the vertices come first.
 
-    mesh         of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the
-                 displacement is quadratic, with nodes in the middle of edges, quadrilaterals and
-                 hexahedra
-    displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;
-                                     von_mises (n,)
-    contact      name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
+    mesh          of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the
+                  displacement is quadratic, with nodes in the middle of edges, quadrilaterals and
+                  hexahedra
+    names         of the components of the stress;   displacement  (dim, n) [length]
+    stress        (n, 4 or 6) [stress];   von_mises  (n,)
+    contact       name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
     """
 
     name: str
@@ -49,8 +41,8 @@ class Fields:
         """Write the body as a VTU file with displacement, stress, von Mises stress and contact
         quantities at the nodes.
 
-        Cells of second order are quadratic triangles and tetrahedra, biquadratic quadrilaterals and
-        triquadratic hexahedra of VTK (22, 24, 28 and 29).
+        Cells of second order are VTK's quadratic triangles and tetrahedra, biquadratic
+        quadrilaterals and triquadratic hexahedra (22, 24, 28 and 29).
 
         Parameters
         ----------
@@ -58,11 +50,26 @@ class Fields:
         """
         import meshio
 
+        from contactopt.meshes.cells import elements_of
+
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
         vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
         data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
         points = np.pad(self.mesh.p.T, ((0, 0), (0, 3 - len(self.mesh.p))))
         meshio.Mesh(points, [elements_of(self.mesh)], data).write(path, file_format="vtu")
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where in a body: on a named boundary, at a point, in the circle or ball around a point, or
+    everywhere.
+
+    boundary  its name;   point  coordinates [length];   radius  around the point [length]
+    """
+
+    boundary: str = ""
+    point: tuple[float, ...] = ()
+    radius: float | None = None
 
 
 class Validity(NamedTuple):
@@ -81,158 +88,35 @@ class Validity(NamedTuple):
     moved: float = 0.0
 
 
-def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
-    """Compute how far a body is from equilibrium, strained and turned, from its stiffness and its
-    elements alone.
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Compute the von Mises stress.
 
     Parameters
     ----------
-    body : The assembled body of n unknowns.
-    U : (n,) displacement [length].
-    force : (n,) contact forces on its unknowns [force].
+    stress : (m, 4 or 6) stresses, whose first three columns are the normal ones.
 
     Returns
     -------
-    The imbalance counts the free unknowns and, for each plate that moves, the sum over its
-    unknowns.
+    (m,) their von Mises stress.
     """
-    internal = body.A @ U
-    missing = internal - body.load - force
-    plates = body.motion.T @ missing - body.plate_forces
-    sizes = (
-        np.abs(part).sum()
-        for part in (force, body.load, body.plate_forces, np.delete(internal, body.free))
-    )
-    size = max(sizes)
-    unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
-    gradient = np.asarray(body.basis.interpolate(U).grad)
-    mean = (
-        np.einsum("abeq,eq->eab", gradient, body.basis.dx)
-        / body.basis.dx.sum(axis=1)[:, None, None]
-    )
-    turned = mean.swapaxes(1, 2)
-    strain = np.abs(np.linalg.eigvalsh((mean + turned) / 2)).max(initial=0.0)
-    rotation = np.linalg.norm(mean - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
-    moved = float(np.abs(U).max(initial=0.0))
-    return Validity(
-        unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved
-    )
+    normal, shear = stress[:, :3], stress[:, 3:]
+    deviator = normal - normal.mean(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))
 
 
-def fields_of(body: Assembly, U: np.ndarray) -> Fields:
-    """Compute the fields of a body at a displacement of all its unknowns.
+def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
+    """Differentiate the von Mises stress.
 
     Parameters
     ----------
-    body : The assembled body of n unknowns.
-    U : (n,) displacement [length].
+    stress : (m, 4 or 6) as for `von_mises`.
 
     Returns
     -------
-    Displacement, stress and von Mises stress at the vertices of the mesh.
+    (m, 4 or 6) derivatives by the components; 0 where there is no stress.
     """
-    basis = body.basis
-    stress = nodal_stress(body, U)
-    full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
-    mean = np.trace(stress) / 3
-    deviator = stress - mean * np.eye(3)[:, :, None]
-    von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
-    mesh = straight(basis.mesh) if body.degree == 1 else second_order(basis.mesh, body.locations)
-    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises)
-
-
-def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
-    """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their
-    volumes.
-
-    An element counts with its mean stress where the displacement is linear, with its stress at the
-    node where it is quadratic; at planes of symmetry its mirror image counts as well, so that no
-    shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
-
-    everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh
-                alone
-    """
-    basis, mesh = body.basis, body.basis.mesh
-    volume = basis.dx.sum(axis=1)
-    shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
-    if body.degree == 1:
-        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
-        values = np.repeat(element[..., None], len(mesh.t), axis=3)
-    else:
-        places = shape.doflocs.T
-        blocks = np.array_split(np.arange(mesh.nelements), -(-mesh.nelements // BLOCK))
-        rule = places, np.ones(places.shape[1])
-        bases = (skfem.Basis(mesh, basis.elem, elements=block, quadrature=rule) for block in blocks)
-        values = np.concatenate([stress_in(body, at, U) for at in bases], axis=2)
-    nodes = skfem.Dofs(mesh, shape).element_dofs  # numbered as the nodes are
-    where, count = nodes.T.ravel(), int(nodes.max()) + 1
-    weight = np.bincount(where, np.repeat(volume, len(nodes)), count)
-    total = np.zeros((3, 3, count))
-    for i in range(3):
-        for j in range(3):
-            total[i, j] = np.bincount(where, (values[i, j] * volume[:, None]).ravel(), count)
-    for axis, there in enumerate(body.mirrored[:, :count]):
-        total[axis, :axis, there] = total[axis, axis + 1 :, there] = 0.0
-        total[:axis, axis, there] = total[axis + 1 :, axis, there] = 0.0
-    return total / weight
-
-
-def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Estimate for every element how much it adds to the error of the energy, or of other
-    functionals.
-
-    For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the
-    stress of a displacement and s* the continuous stress with its averages at the vertices, which
-    is more accurate where the solution is smooth. With W = U it is twice the energy of the
-    estimated error in each element; with W the displacement of an adjoint problem it is what the
-    element adds to the error of that problem's functional.
-
-    Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical
-    engineering analysis.
-
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-    U, W : (n,) displacements [length].
-
-    Returns
-    -------
-    (elements,) integrals [force length].
-    """
-    basis, mesh = body.basis, straight(body.basis.mesh)
-    vertices = skfem.Basis(
-        mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W)
+    normal, size = stress[:, :3], von_mises(stress)[:, None]
+    slopes = np.concatenate(
+        [1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1
     )
-
-    def missing(field: np.ndarray) -> np.ndarray:
-        nodal = nodal_stress(body, field, everywhere=False)
-        smooth = sum(
-            nodal[:, :, own][..., None] * np.asarray(shape[0])
-            for own, shape in zip(mesh.t, vertices.basis)
-        )
-        return np.asarray(smooth - stress_in(body, basis, field))
-
-    E, nu = body.material.E, body.material.nu
-    measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
-    first, found = missing(U), []
-    for W in others:
-        second = first if W is U else missing(W)
-        traces = np.trace(first) * np.trace(second)
-        density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
-        found.append(np.asarray(np.sum(density * measure, axis=1)))
-    return tuple(found)
-
-
-def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    lam, shear = lame(body.material)
-    field = basis.interpolate(U)
-    gradient = np.asarray(field.grad)
-    dim = len(gradient)
-    strain = np.zeros((3, 3, *gradient.shape[2:]))
-    strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
-    if body.weight[1]:  # u_r / r, on the axis its limit
-        r = np.asarray(basis.global_coordinates())[0]
-        away = r > 1e-12 * r.max()
-        strain[2, 2] = np.divide(np.asarray(field)[0], r, where=away, out=gradient[0, 0].copy())
-    return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])
+    return np.divide(slopes, size, out=np.zeros(slopes.shape), where=size > 0)

@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.fields import Validity
+from contactopt.bodies.assembled import AssembledBody, Guides, Surface
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
-from contactopt.bodies.protocol import Guides, Surface
+from contactopt.bodies.protocol import Body
 from contactopt.errors import InputError
 from contactopt.linear.convolution import Convolution, Kernel, embedding
 from contactopt.linear.operators import Product
@@ -36,9 +36,8 @@ from contactopt.scenes.scene import HalfSpace, Scene
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSpaceBody:
-    """A half-space of a scene; it needs no preparation, so it is both stages of
-    contactopt.bodies.protocol.
+class HalfSpaceBody(AssembledBody, Body):
+    """A half-space of a scene; it needs no preparation, so it is both stages.
 
     part        as the scene gives it;  components  of displacements, the normal of the surface last
     ticks       places of the points along each axis of the grid [length]
@@ -52,10 +51,7 @@ class HalfSpaceBody:
     outward: float
     thickness: float
 
-    meshed = complete = True
-    iterative = parallel = False
-
-    @property
+    @cached_property
     def name(self) -> str:
         return self.part.name
 
@@ -67,11 +63,13 @@ class HalfSpaceBody:
     def spacing(self) -> tuple[float, ...]:
         return tuple(float(row[-1] - row[0]) / (len(row) - 1) for row in self.ticks)
 
-    @property
+    @cached_property
     def unknowns(self) -> int:
         return int(np.prod(self.grid)) * len(self.components)
 
-    interface_unknowns = unknowns
+    @cached_property
+    def interface_unknowns(self) -> int:
+        return self.unknowns
 
     @property
     def cell(self) -> float:
@@ -92,25 +90,24 @@ class HalfSpaceBody:
         values = self.part.displacement or {}
         return np.array([float(values.get(name, 0.0)) for name in self.components])
 
-    @property
+    @cached_property
     def at_rest(self) -> np.ndarray:
         k = int(np.prod(self.grid))
         return np.concatenate([np.tile(self._given, k), np.zeros(self.unknowns), self._given])
 
-    @property
+    @cached_property
     def motions(self) -> np.ndarray:
         k, dim = int(np.prod(self.grid)), len(self.components)
         columns = [self.components.index(name) for name in self.part.force or {}]
         shifts = np.eye(dim)[:, columns]
-        return np.concatenate(
-            [np.tile(shifts, (k, 1)), np.zeros((self.unknowns, len(columns))), shifts]
-        )
+        still = np.zeros((self.unknowns, len(columns)))
+        return np.concatenate([np.tile(shifts, (k, 1)), still, shifts])
 
-    @property
+    @cached_property
     def motion_names(self) -> tuple[str, ...]:
         return tuple(f"translation along {name}" for name in self.part.force or {})
 
-    @property
+    @cached_property
     def resultants(self) -> np.ndarray:
         return np.array(list((self.part.force or {}).values()), dtype=float)
 
@@ -131,10 +128,9 @@ class HalfSpaceBody:
             for c in range(dim)
         )
         middle = flat - (flat.max(axis=1) + flat.min(axis=1))[:, None] / 2
-        return Surface(
-            self.name, points, normals, np.full(k, self.cell), sp.identity(k, format="csr"), places, traces,
-            np.zeros((dim, k), dtype=bool), self._cells(), chart=Chart(middle, (False,) * (dim - 1)),
-        )  # fmt: skip
+        areas, held = np.full(k, self.cell), np.zeros((dim, k), dtype=bool)
+        own = self.name, points, normals, areas, sp.identity(k, format="csr"), places, traces, held
+        return Surface(*own, self._cells(), chart=Chart(middle, (False,) * (dim - 1)))
 
     def _height(self, flat: np.ndarray) -> np.ndarray:
         height = self.part.height
@@ -155,9 +151,6 @@ class HalfSpaceBody:
         corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
         return np.stack([corner.ravel() for corner in corners])
 
-    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
-        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
-
     def guides(self) -> Guides:
         return Guides(np.zeros((len(self.components), 0)))
 
@@ -169,9 +162,7 @@ class HalfSpaceBody:
         return self
 
     def convolution(self, T: sp.csr_matrix) -> Kernel | None:
-        """T C T' as a convolution, for maps to displacements of all points in their order in
-        components +-n, +-t1[, +-t2].
-        """
+        """For maps to displacements of all points in their order, in components +-n, +-t1, +-t2."""
         k, dim = int(np.prod(self.grid)), len(self.components)
         own = np.roll(np.arange(dim), 1)  # n is the last component
         if T.shape[0] != k * dim or T.nnz != k * dim or np.any(np.diff(T.indptr) != 1):
@@ -181,19 +172,16 @@ class HalfSpaceBody:
         signs = T.data.reshape(k, dim)
         if np.any(signs != signs[0]) or not np.allclose(np.abs(signs[0]), 1.0, rtol=1e-12):
             return None
-        symbols = {
-            (a, b): signs[0, a] * signs[0, b] * symbol
-            for (a, b), symbol in self.kernel.symbols.items()
-        }
+        sign, known = signs[0], self.kernel.symbols
+        symbols = {(a, b): sign[a] * sign[b] * symbol for (a, b), symbol in known.items()}
         return replace(self.kernel, symbols=symbols)
 
     def product(self, T: sp.csr_matrix) -> Product:
         back, act = T.T.tocsr(), self._compliance_product
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-            return np.asarray(
-                T @ np.stack([act(force, accuracy) for force in (back @ X).T], axis=1)
-            )
+            moved = [act(force, accuracy) for force in (back @ X).T]
+            return np.asarray(T @ np.stack(moved, axis=1))
 
         return product
 
@@ -242,19 +230,6 @@ class HalfSpaceBody:
             )
         return change, np.zeros(len(self.resultants))
 
-    def material_work(
-        self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray
-    ) -> float:
-        return float(dual @ self.material_change(constant, U, force)[0])
-
-    def load_work(
-        self, scene: Scene, part: HalfSpace, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
-    ) -> float:
-        new = self.loaded(scene, part)
-        return float(
-            dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants)
-        )
-
     def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         by_force = self._compliance_product(force)
         by_force[self.unknowns :] = 0.0
@@ -262,15 +237,6 @@ class HalfSpaceBody:
 
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return float(force @ self.material_change(constant, U, force)[0]) / 2
-
-    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
-        return (np.zeros(0),) * len(others)
-
-    def on_elements(self, values: np.ndarray) -> np.ndarray:
-        return np.zeros(0)
-
-    def stress_map(self, region: object, by_poisson: bool = False) -> None:
-        return None
 
     def energy(self, U: np.ndarray) -> float:
         force = U[self.unknowns : 2 * self.unknowns]
@@ -282,25 +248,6 @@ class HalfSpaceBody:
         """
         m, dim = self.unknowns, len(self.components)
         return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
-
-    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Nothing: a half-space is held at infinity."""
-        return {}
-
-    def fields(self, U: np.ndarray) -> None:
-        return None
-
-    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
-        return np.asarray(T @ U)
-
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        return Validity()
-
-    def grounded(self, modulus: float) -> HalfSpaceBody:
-        return self
-
-    def pulled(self, U: Any) -> HalfSpaceBody:
-        return self
 
     def loaded(self, scene: Scene, part: HalfSpace) -> HalfSpaceBody:
         """With other values of the total force and of the displacement."""
@@ -321,10 +268,7 @@ def _infinite(body: HalfSpaceBody) -> Kernel:
             body.part.material, body.spacing[0], distances[0], depth
         )
     else:
-        spacing = (body.spacing[0], body.spacing[1])
-        coefficients = half_space_influence(
-            body.part.material, spacing, (distances[0], distances[1])
-        )
+        coefficients = half_space_influence(body.part.material, body.spacing, distances)
     last = len(body.grid)
     turned = {}
     for (a, b), part in coefficients.items():
@@ -342,8 +286,7 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
 
     Under tractions with the wave vector k the surface moves by (1 - nu)/(G |k|) along the normal
     and along k, by 1/(G |k|) across k, and by (1 - 2 nu)/(2 G |k|) along k under normal tractions,
-    with a quarter of a period between. Sources: Johnson (1985), section 13.2; Stanley, Kato (1997),
-    An FFT-based method for rough surface contact.
+    with a quarter of a period between. Sources: Johnson (1985), section 13.2; Stanley, Kato (1997).
     """
     G, nu = lame(body.part.material)[1], body.part.material.nu
     grid, spacing = body.grid, body.spacing
@@ -369,21 +312,8 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
 def assemble_half_space(
     scene: Scene, part: HalfSpace, elements: int, zone: float | None
 ) -> HalfSpaceBody:
-    """Make a half-space of a scene on its grid. The upper body fills the upper half.
-
-    Parameters
-    ----------
-    scene, part : The scene and one of its half-spaces.
-    elements, zone : Number of points across the contact half-width, and the half-width that the
-        grid resolves [length], for grids that depend on them.
-
-    Returns
-    -------
-    The half-space on its grid.
-
-    Raises
-    ------
-    InputError : In an axisymmetric scene and in one with mirror images.
+    """A half-space on its grid, which `elements` and `zone` may resolve; the upper body fills the
+    upper half. InputError in an axisymmetric scene and in one with mirror images.
     """
     if scene.kind == "axisymmetric" or scene.copies > 1:
         raise InputError(

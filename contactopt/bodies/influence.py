@@ -6,7 +6,8 @@ surface point (x, y) at the distance rho by (Boussinesq; Cerruti; G is the shear
 Poisson's ratio)
 
     2 pi G u_z = (1 - nu) F_z / rho - (1 - 2 nu)/2 (x F_x + y F_y) / rho^2
-    2 pi G u_x = ((1 - nu) / rho + nu x^2 / rho^3) F_x + nu x y / rho^3 F_y + (1 - 2 nu)/2 x F_z / rho^2
+    2 pi G u_x = ((1 - nu) / rho + nu x^2 / rho^3) F_x + nu x y / rho^3 F_y
+                 + (1 - 2 nu)/2 x F_z / rho^2
 
 and u_y likewise. A line force on a half-plane makes displacements that grow without end (Flamant).
 They are measured from the point that lies `depth` beneath the line force, d below:
@@ -31,30 +32,22 @@ import numpy as np
 from contactopt.material import Material, lame
 
 # Number of the longer sides of a cell from the loaded one from which on Gauss's rule with that many
-# points a side is used,
-# farthest last.
+# points a side is used, farthest last.
 GAUSS = ((12, 8), (64, 3))
 
 Antiderivative = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def half_space_influence(
-    material: Material, spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]
+    material: Material, spacing: tuple[float, ...], offsets: tuple[np.ndarray, ...]
 ) -> dict[tuple[int, int], np.ndarray]:
     """Influence coefficients of rectangular cells on a half-space.
 
-    Parameters
-    ----------
-    material : Of the half-space.
-    spacing : Sides of a cell along x and y [length].
-    offsets : Whole numbers (i,) and (j,) of cells along x and y between the cell that is loaded and
-        the one that moves.
-
-    Returns
-    -------
-    (moved component, loaded component) -> coefficients (i, j) [length / force] for the components
-    x, y, z = 0, 1, 2. Pairs with the first number larger than the second are left out: u_a under
-    F_b is minus u_b under F_a for the pairs of z with x and y, and equal to it for x with y.
+    spacing are the sides of a cell along x and y [length], offsets whole numbers (i,) and (j,) of
+    cells along x and y between the cell that is loaded and the one that moves. Returns (moved
+    component, loaded component) -> coefficients (i, j) [length / force] for the components x, y, z
+    = 0, 1, 2. Pairs with the first number larger than the second are left out: u_a under F_b is
+    minus u_b under F_a for the pairs of z with x and y, and equal to it for x with y.
 
     Sources: Love (1929); Johnson (1985), sections 3.2 and 3.6.
     """
@@ -75,19 +68,12 @@ def half_space_influence(
 def half_plane_influence(
     material: Material, spacing: float, offsets: np.ndarray, depth: float
 ) -> dict[tuple[int, int], np.ndarray]:
-    """Influence coefficients of strips on a half-plane, per unit of length across it.
+    """Influence coefficients of strips of a width on a half-plane in plane strain, per unit of
+    length across it.
 
-    Parameters
-    ----------
-    material : Of the half-plane, in plane strain.
-    spacing : Width of a strip [length].
-    offsets : Whole numbers (i,) of strips between the one that is loaded and the one that moves.
-    depth : Of the point beneath each force from which its displacements are measured [length].
-
-    Returns
-    -------
-    (moved component, loaded component) -> coefficients (i,) [length^2 / force] for the components
-    x, y = 0, 1 with y the outward normal; as in half_space_influence.
+    depth is that of the point beneath each force from which its displacements are measured
+    [length]. Returns (moved component, loaded component) -> coefficients (i,) [length^2 / force]
+    for the components x, y = 0, 1 with y the outward normal; else as in half_space_influence.
 
     Source: Johnson (1985), sections 2.2 and 2.3.
     """
@@ -133,12 +119,8 @@ WHOLE: dict[str, Antiderivative] = {
 }
 
 
-def _means(
-    spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Means of x^2/rho^3, y^2/rho^3, x y/rho^3, x/rho^2 and y/rho^2 over the cell at each offset
-    (i, j).
-    """
+def _means(spacing: tuple[float, ...], offsets: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
+    """Means of the functions of WHOLE over the cell at each offset (i, j)."""
     farthest, longer = GAUSS[-1][1], max(spacing)
 
     def within(reach: int) -> list[np.ndarray]:
@@ -148,12 +130,11 @@ def _means(
         ]
 
     out = _by_gauss(spacing, offsets, farthest)
-    for reach, points in [*((GAUSS[n + 1][0], GAUSS[n][1]) for n in range(len(GAUSS) - 1))][::-1]:
-        some = within(reach)
-        for name, value in _by_gauss(
-            spacing, (offsets[0][some[0]], offsets[1][some[1]]), points
-        ).items():
-            out[name][np.ix_(*some)] = value
+    near = within(GAUSS[1][0])
+    for name, value in _by_gauss(
+        spacing, (offsets[0][near[0]], offsets[1][near[1]]), GAUSS[0][1]
+    ).items():
+        out[name][np.ix_(*near)] = value
     some = within(GAUSS[0][0])
     (hx, hy), corners = spacing, [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
     x, y = np.meshgrid(hx * offsets[0][some[0]], hy * offsets[1][some[1]], indexing="ij")
@@ -166,17 +147,15 @@ def _means(
 
 
 def _by_gauss(
-    spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray], points: int
+    spacing: tuple[float, ...], offsets: tuple[np.ndarray, ...], points: int
 ) -> dict[str, np.ndarray]:
     """The same by Gauss's rule, with that many points a side; worthless next to the loaded cell."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     out = {name: np.zeros((len(offsets[0]), len(offsets[1]))) for name in WHOLE}
     for a, p in zip(nodes, weights):
         for b, q in zip(nodes, weights):
-            x, y = (
-                spacing[0] * (offsets[0] + a / 2)[:, None],
-                spacing[1] * (offsets[1] + b / 2)[None, :],
-            )
+            x = spacing[0] * (offsets[0] + a / 2)[:, None]
+            y = spacing[1] * (offsets[1] + b / 2)[None, :]
             square = np.maximum(x**2 + y**2, (1e-9 * spacing[0]) ** 2)
             first = p * q / 4 / square
             third = first / np.sqrt(square)

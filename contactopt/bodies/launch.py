@@ -40,7 +40,8 @@ def launch(ranks: int, arguments: Sequence[str]) -> int:
 
     Returns
     -------
-    The exit code of rank 0.
+    The exit code of rank 0. Where it left none, a rank ended before the work was done, and mpiexec
+    ended the others.
 
     Raises
     ------
@@ -52,15 +53,23 @@ def launch(ranks: int, arguments: Sequence[str]) -> int:
             "mpiexec started ranks that do not see each other; it must belong to the MPI that"
             " mpi4py was built with."
         )
-    start = mpiexec(ranks)
+    command = [*mpiexec(ranks), sys.executable, "-m", "contactopt", *arguments]
     with tempfile.TemporaryDirectory() as folder:
         outcome = Path(folder) / "exit code"
-        environment = (
-            {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
-        )
-        command = [*start, sys.executable, "-m", "contactopt", *arguments]
-        code = _watched(command, environment)
-        return int(outcome.read_text()) if outcome.exists() else ended_early(code)
+        own = {OUTCOME: str(outcome)}
+        code = _watched(command, dict.fromkeys(ONE_THREAD, "1") | dict(os.environ) | own)
+        if outcome.exists():
+            return int(outcome.read_text())
+    why = f" by signal {code - 128}, which may mean that there was too little memory"
+    _tell(
+        f"a rank was ended{why if code > 128 else ''}; all others were stopped and nothing was"
+        " written."
+    )
+    return code or 1
+
+
+def _tell(sentence: str) -> None:
+    print(f"contactopt: {sentence}", file=sys.stderr)
 
 
 def _watched(command: list[str], environment: dict[str, str]) -> int:
@@ -70,65 +79,51 @@ def _watched(command: list[str], environment: dict[str, str]) -> int:
     """
     import psutil
 
-    stopped: dict[int, float] = {}  # number of a process -> when it was first seen stopped
+    since: dict[int, float] = {}  # number of a stopped process -> when that was first seen
     with subprocess.Popen(command, env=environment) as process:
         try:
             while True:
                 with suppress(subprocess.TimeoutExpired):
                     return process.wait(BEAT)
                 with suppress(psutil.NoSuchProcess):
-                    ranks = psutil.Process(process.pid).children(recursive=True)
-                    found = [own for own in ranks if own.status() == psutil.STATUS_STOPPED]
-                    stopped = {
-                        own.pid: stopped.get(own.pid) or _told_stopped(own.pid) for own in found
-                    }
-                    for own in found:
-                        if time.monotonic() - stopped[own.pid] > PATIENCE:
-                            own.kill()
+                    for rank in psutil.Process(process.pid).children(recursive=True):
+                        if rank.status() != psutil.STATUS_STOPPED:
+                            since.pop(rank.pid, None)
+                        elif rank.pid not in since:
+                            since[rank.pid] = time.monotonic()
+                            _tell(
+                                f"a rank (process {rank.pid}) was stopped and all others wait for"
+                                f" it; go on with 'kill -CONT {rank.pid}', or it is ended in"
+                                f" {PATIENCE:g} s."
+                            )
+                        elif time.monotonic() - since[rank.pid] > PATIENCE:
+                            rank.kill()
         except BaseException:
             process.kill()
             raise
 
 
-def _told_stopped(number: int) -> float:
-    """Say that a rank was stopped; the time at which that was said."""
-    print(
-        f"contactopt: a rank (process {number}) was stopped and all others wait for it; go on with"
-        f" 'kill -CONT {number}', or it is ended in {PATIENCE:g} s.",
-        file=sys.stderr,
-    )
-    return time.monotonic()
-
-
 def mpiexec(ranks: int) -> list[str]:
     """The beginning of a command that runs on several ranks of this machine.
 
-    Raises
-    ------
-    InputError : Where MPI is missing, and for more ranks than PER_CORE on each core.
+    InputError where MPI is missing, and for more ranks than PER_CORE on each core.
     """
     check_count("the number of ranks", ranks)
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     if ranks > PER_CORE * cores:
         raise InputError(
             f"{ranks} ranks are too many for {count(cores, 'core')}; take {PER_CORE * cores} at"
             f" most, better {cores}."
         )
-    program = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which(
-        "mpiexec"
-    )
+    beside = shutil.which("mpiexec", path=str(Path(sys.executable).parent))
+    program = beside or shutil.which("mpiexec")
     if program is None or find_spec("mpi4py") is None or find_spec("psutil") is None:
         raise InputError("ranks need mpi4py, psutil and mpiexec: pip install 'contactopt[mpi]'.")
-    placed = (
-        ["--bind-to", "core", "--map-by", "core"]
-        if ranks <= cores
-        else ["--oversubscribe", "--bind-to", "none"]
-    )
-    root = (
-        ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
-    )  # whoever is root runs this as root
+    shared = ["--oversubscribe", "--bind-to", "none"]
+    placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else shared
+    # whoever is root runs this as root
+    root = ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
     return [program, *root, *placed, "-n", str(ranks)]
 
 
@@ -152,22 +147,6 @@ def check_bodies(scene: Scene, ranks: int) -> None:
             f"scene '{scene.name}' has {have}, and each rank needs one; take {max(bodies, 1)} of"
             f" the {ranks} ranks."
         )
-
-
-def ended_early(code: int) -> int:
-    """The exit code where rank 0 left none: a rank ended before the work was done, and mpiexec
-    ended the others.
-    """
-    why = (
-        f" by signal {code - 128}, which may mean that there was too little memory"
-        if code > 128
-        else ""
-    )
-    print(
-        f"contactopt: a rank was ended{why}; all others were stopped and nothing was written.",
-        file=sys.stderr,
-    )
-    return code or 1
 
 
 def leave(code: int) -> int:

@@ -21,18 +21,11 @@ FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 def mirrored_nodes(
     scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray
 ) -> np.ndarray:
-    """Find the nodes in planes across an axis beyond which the body goes on as its mirror image.
+    """Nodes in planes across an axis beyond which the body goes on as its mirror image.
 
-    Parameters
-    ----------
-    scene, part : The scene and one of its parts.
-    basis : Of the displacement, with n unknowns.
-    held : (n,) whether a displacement is prescribed or driven by a plate.
-
-    Returns
-    -------
-    (dim, nodes) whether a node lies in a plane across that axis on which nothing else than the
-    displacement along this axis is held, and no traction acts; none where the scene has no copies.
+    Returns (dim, nodes) whether a node lies in a plane across that axis on which nothing else than
+    the displacement along this axis is held (n,), and no traction acts; none where the scene has no
+    copies.
     """
     mesh, unknowns = basis.mesh, node_unknowns(basis)
     names = list(scene.surfaces_of(part))

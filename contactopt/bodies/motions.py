@@ -29,7 +29,7 @@ import scipy.sparse as sp
 import skfem
 from skfem.helpers import dot
 
-from contactopt.bodies.elements import weight_at
+from contactopt.bodies.elements import Weight, node_unknowns, weight_at
 from contactopt.errors import InputError
 
 # mean square of a motion (largest displacement one) over the held unknowns below which nothing
@@ -56,63 +56,43 @@ class Motions:
     forces: np.ndarray
 
 
-def _rigid_motions(
-    kind: str, components: tuple[str, ...], x: np.ndarray
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """All rigid motions of points x (dim, k) as displacements (dim, k, m), and their names.
-
-    Translations have length one; rotations are about the middle of the points and move the furthest
-    of them by one. In an axisymmetric scene there is one motion, along the axis.
+def rigid_fields(x: np.ndarray) -> np.ndarray:
+    """All rigid motions of points x (dim, k) as displacements (dim, k, m): translations of length
+    one, then rotations about the middle of the points, which move the furthest of them by one.
     """
-    dim = len(components)
-    if kind == "axisymmetric":
-        field = np.zeros((*x.shape, 1))
-        field[1] = 1.0
-        return field, (f"translation along {components[1]}",)
-    made, names = [], []
-    for i, component in enumerate(components):
-        made.append(np.zeros_like(x))
-        made[-1][i] = 1.0
-        names.append(f"translation along {component}")
+    dim = len(x)
+    made = np.zeros((*x.shape, dim * (dim + 1) // 2))
+    made[range(dim), :, range(dim)] = 1.0
     centred = x - x.mean(axis=1, keepdims=True)
-    size = np.linalg.norm(centred, axis=0).max() or 1.0
-    for i in range(dim):
-        for j in range(i):
-            made.append(np.zeros_like(x))
-            made[-1][i], made[-1][j] = centred[j] / size, -centred[i] / size
-            names.append(f"rotation in the {components[j]}-{components[i]} plane")
-    return np.stack(made, axis=-1), tuple(names)
+    centred /= np.linalg.norm(centred, axis=0).max(initial=0.0) or 1.0
+    for mode, (i, j) in enumerate(_planes(dim), dim):
+        made[i, :, mode], made[j, :, mode] = centred[j], -centred[i]
+    return made
+
+
+def _planes(dim: int) -> list[tuple[int, int]]:
+    """The axes of the planes in which a body can turn."""
+    return [(i, j) for i in range(dim) for j in range(i)]
 
 
 def free_motions(
-    kind: str,
-    components: tuple[str, ...],
-    basis: skfem.CellBasis,
-    unknowns: np.ndarray,
-    held: np.ndarray,
-    weight: tuple[float, bool],
+    kind: str, components: tuple[str, ...], basis: skfem.CellBasis, held: np.ndarray, weight: Weight
 ) -> Motions:
-    """Find the rigid motions of a body that leave all held unknowns at rest.
+    """The rigid motions of a body that leave all held unknowns (n,) at rest.
 
-    Parameters
-    ----------
-    kind, components : Of the scene.
-    basis, weight : Displacement basis of n unknowns, and the measure of its integrals
-        (contactopt.bodies.elements.weight_at).
-    unknowns : (dim, nodes) displacement unknowns of every node.
-    held : (n,) mask of the unknowns that supports or plates prescribe.
-
-    Returns
-    -------
-    The motions Z (n, m) with their names, fixing unknowns (m,) and inertia forces S (n, m), as in
-    this module's head.
+    kind and components are those of the scene; basis and weight are the displacement basis of n
+    unknowns and the measure of its integrals (contactopt.bodies.elements.weight_at). In an
+    axisymmetric scene there is one motion, along the axis.
     """
+    unknowns = node_unknowns(basis)
     x = basis.doflocs[:, unknowns[0]]
-    rigid, labels = _rigid_motions(kind, components, x)
+    labels = [f"translation along {component}" for component in components]
+    labels += [f"rotation in the {components[j]}-{components[i]} plane" for i, j in _planes(len(x))]
     R = np.zeros((basis.N, len(labels)))
-    for mode, column in zip(np.moveaxis(rigid, 2, 0), R.T):
-        column[unknowns] = mode
-    combined, names = _kernel(R[held], labels)
+    R[unknowns] = rigid_fields(x)
+    if kind == "axisymmetric":
+        R, labels = R[:, 1:2], labels[1:2]
+    combined, names = _kernel(R[held], tuple(labels))
     Z = R @ combined
     Z[held] = 0.0
     if not len(names):
@@ -125,8 +105,8 @@ def free_motions(
 
 
 def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, and the name of
-    each.
+    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, with their
+    names.
 
     A translation or rotation that is free by itself is a column of its own.
     """
@@ -143,19 +123,14 @@ def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tupl
 
 
 def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
-    """The name of a combination of motions: that of its rotation, if it has one, otherwise of its
-    largest translation.
-    """
+    """That of its rotation, if a combination has one, otherwise of its largest translation."""
     turning = np.array([label.startswith("rotation") for label in labels])
-    size = (
-        np.abs(column)
-        * np.where(turning, 1e3, 1.0)
-        * (np.abs(column) > 1e-3 * np.abs(column).max())
-    )
+    size = np.abs(column)
+    size = size * np.where(turning, 1e3, 1.0) * (size > 1e-3 * size.max())
     return labels[int(np.argmax(size))]
 
 
-def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: tuple[float, bool]) -> np.ndarray:
+def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.ndarray:
     """Nodal forces (n,) of the field as a force per volume."""
 
     @skfem.LinearForm
@@ -166,17 +141,8 @@ def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: tuple[float, boo
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
-    """Check that the stiffness of a body does not resist its free motions.
-
-    Parameters
-    ----------
-    name : The body, for the message.
-    A : (n, n) its stiffness [force / length].
-    motions : Its free motions.
-
-    Raises
-    ------
-    InputError : Where it does, because of the rounding of extreme coordinates.
+    """Check that the stiffness A (n, n) of a body does not resist its free motions, because of the
+    rounding of extreme coordinates.
     """
     if not len(motions.names):
         return

@@ -28,9 +28,11 @@ from contactopt.scenes.scene import Part, Scene
 
 # tag of orders, and tags of replies: one per order, used again in turn
 ORDERS, FIRST, TICKETS = 1, 2, 30000
+PROTOCOL = pickle.HIGHEST_PROTOCOL
 SHORTEST, LONGEST = 1e-5, 1e-3  # sleep between two looks for a message [s]
-# of that sleep from look to look, so that nobody waits longer than by about this share less one
-GROWTH = 1.15
+GROWTH = (
+    1.15  # of that sleep from look to look: nobody waits longer by more than this share less one
+)
 # set by mpiexec of Open MPI, and of MPICH and its kin
 STARTED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 
@@ -69,7 +71,6 @@ class Traffic:
     length: int = 0
 
     def add(self, message: bytes | bytearray) -> None:
-        """Count one message."""
         self.messages += 1
         self.length += len(message)
 
@@ -87,9 +88,7 @@ class Team:
         self._dismissed = False
 
     def __reduce__(self) -> tuple[type[None], tuple[()]]:
-        """Travel as None: functions that make meshes may hold parts of a team, which other ranks
-        have no use for.
-        """
+        """Travel as None: functions that make meshes may hold parts of a team."""
         return type(None), ()
 
     @property
@@ -112,15 +111,10 @@ class Team:
         return self.start(rank, function, *arguments)()
 
     def start(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-        """Let a rank begin to call a function.
+        """Let a rank begin to call a function, as for `ask`.
 
-        Parameters
-        ----------
-        rank, function, arguments : As for `ask`.
-
-        Returns
-        -------
-        A function without arguments that waits for the end and returns what the function returned.
+        Returns a function without arguments that waits for the end and returns what the function
+        returned.
         """
         tag = FIRST + self._next_number() % TICKETS
         self._order(rank, (tag, function, arguments))
@@ -138,7 +132,7 @@ class Team:
         return end
 
     def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
-        """What stands for the result, which stays there.
+        """What stands for the result of a function, which stays on its rank.
 
         Nobody waits for it: whoever uses it learns of an exception.
         """
@@ -149,10 +143,8 @@ class Team:
 
     def cpu(self) -> list[float]:
         """CPU time of every rank so far [s]."""
-        return [
-            time.process_time(),
-            *(self.ask(rank, time.process_time) for rank in range(1, self.size)),
-        ]
+        others = (self.ask(rank, time.process_time) for rank in range(1, self.size))
+        return [time.process_time(), *others]
 
     def dismiss(self) -> None:
         """End the loops of all other ranks."""
@@ -169,9 +161,8 @@ class Team:
             return self._number
 
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
-        """Send without waiting; the bytes are kept until they have arrived.
-
-        InputError once the ranks were dismissed.
+        """Send without waiting; the bytes are kept until they have arrived. InputError once the
+        ranks were dismissed.
         """
         if self._dismissed:
             raise InputError(
@@ -181,9 +172,9 @@ class Team:
         freed, waiting = [], self._freed[rank]
         while waiting:
             freed.append(waiting.popleft())
-        data = _packed((order, number, freed))
+        data = pickle.dumps((order, number, freed), PROTOCOL)
         with self._lock:
-            self._sent.append((self.comm.Isend([data, _byte()], rank, ORDERS), data))
+            self._sent.append((self.comm.Isend(data, rank, ORDERS), data))
             self.traffic.add(data)
         self._forget_what_arrived()
 
@@ -224,7 +215,7 @@ def spread(scene: Scene, team: Team) -> Scene:
 
 
 def values_of(part: Part) -> dict[str, Any]:
-    """Collect the arguments that make a part: the values of its fields by their names."""
+    """The arguments that make a part: the values of its fields by their names."""
     return {item.name: getattr(part, item.name) for item in fields(Part)}
 
 
@@ -247,7 +238,9 @@ def serve(comm: Any) -> None:
         if number is not None:
             kept[number] = result
         else:
-            _send(comm, lock, _packed(result), 0, order[0])
+            # the bytes live as long as the request
+            request = comm.Isend(pickle.dumps(result, PROTOCOL), 0, order[0])
+            _wait(lock, request.Test)
         del order, result
 
 
@@ -268,42 +261,29 @@ def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple
 def _portable(error: Exception) -> Exception:
     """The exception itself, or where it cannot travel one that says the same."""
     try:
-        return (
-            error
-            if type(pickle.loads(pickle.dumps(error))) is type(error)
-            else RuntimeError(str(error))
-        )
+        same = type(pickle.loads(pickle.dumps(error))) is type(error)
+        return error if same else RuntimeError(str(error))
     except Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
 
 
 def shipped(message: Any) -> bytes:
-    """Pack anything as bytes.
-
-    Functions without a name, such as those that make the meshes of scenes, travel by their
-    code.
+    """Pack anything as bytes: functions without a name, such as those that make meshes, travel by
+    their code.
     """
     import cloudpickle
 
     return bytes(cloudpickle.dumps(message))
 
 
-def _packed(message: Any) -> bytes:
-    return pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
-
-
-def _send(comm: Any, lock: threading.Lock, data: bytes, rank: int, tag: int) -> None:
-    with lock:
-        request = comm.Isend([data, _byte()], rank, tag)
-    _wait(lock, request.Test)
-
-
 def _receive(comm: Any, lock: threading.Lock, rank: int, tag: int) -> bytearray:
-    status = _mpi().Status()
+    from mpi4py import MPI
+
+    status = MPI.Status()
     _wait(lock, lambda: comm.Iprobe(rank, tag, status))
-    data = bytearray(status.Get_count(_byte()))
+    data = bytearray(status.Get_count(MPI.BYTE))
     with lock:
-        comm.Recv([data, _byte()], rank, tag)
+        comm.Recv(data, rank, tag)
     return data
 
 
@@ -315,16 +295,6 @@ def _wait(lock: threading.Lock, done: Callable[[], bool]) -> None:
                 return
         time.sleep(pause)
         pause = min(GROWTH * pause, LONGEST)
-
-
-def _mpi() -> Any:
-    from mpi4py import MPI
-
-    return MPI
-
-
-def _byte() -> Any:
-    return _mpi().BYTE
 
 
 def world() -> Any:
@@ -342,10 +312,9 @@ def world() -> Any:
         return None
     try:
         import cloudpickle  # noqa: F401
-
-        comm = _mpi().COMM_WORLD
+        from mpi4py import MPI
     except ImportError as error:
         raise InputError(
             "ranks need the packages mpi4py and cloudpickle: pip install 'contactopt[mpi]'."
         ) from error
-    return comm if comm.size > 1 else None
+    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None

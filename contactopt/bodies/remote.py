@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import operator
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -20,14 +20,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies import resident
-from contactopt.bodies.elastic import AssembledElastic
-from contactopt.bodies.fields import Fields, Validity
-from contactopt.bodies.protocol import Guides, Region, Surface
+from contactopt.bodies.assembled import AssembledBody, Guides, Surface
+from contactopt.bodies.fields import Region
+from contactopt.bodies.protocol import Body
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
-from contactopt.bodies.stress_recovery import StressMap
-from contactopt.errors import InputError
+from contactopt.bodies.solvers import SOLVERS
 from contactopt.linear.operators import Product
-from contactopt.linear.saddle_point import LocalTerm
 from contactopt.linear.stacked import dot
 from contactopt.scenes.scene import Part, Scene
 
@@ -38,16 +36,35 @@ def _sent(scene: Scene, part: Part) -> bytes:
     def change(other: Any) -> Any:
         if not isinstance(other, Part):
             return other
-        values = values_of(other)
-        return Part(
-            **(values if other.name == part.name else values | {"mesh": None, "curve": None})
-        )
+        without = {} if other.name == part.name else {"mesh": None, "curve": None}
+        return Part(**values_of(other) | without)
 
     return shipped((replace(scene.with_parts(change), reference=None), Part(**values_of(part))))
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class Remote:
+    """What stands for an object on another rank."""
+
+    team: Team
+    kept: Kept
+
+    def _ask(self, member: str, *arguments: Any) -> Any:
+        """What a member of the object is or returns."""
+        return self.team.ask(self.kept.rank, resident.call, self.kept, member, *arguments)
+
+    def _keep(self, member: str, *arguments: Any) -> Kept:
+        """What stands for it, where it stays on its rank."""
+        return self.team.keep(self.kept.rank, resident.call, self.kept, member, *arguments)
+
+
+def _operator(function: Callable[..., Any]) -> Callable[..., Any]:
+    """An operator of a Field whose result stays on its rank."""
+    return lambda self, other: self._make(function, other)
+
+
+@dataclass(frozen=True, eq=False)
+class Field(Remote):
     """A vector of the unknowns of a body, on its rank, with the operators of an array that the
     callers of bodies use.
 
@@ -56,65 +73,42 @@ class Field:
     known  its values on the contact unknowns (m,) where they are known here
     """
 
-    team: Team
-    kept: Kept
     body: Kept | None = None
     known: np.ndarray | None = None
     elsewhere = True
     __array_ufunc__ = None  # NumPy's arrays leave the operators to this class
 
     def _make(self, function: Any, other: Any) -> Field:
-        # forces on the contact unknowns
-        if isinstance(other, np.ndarray) and self.body is not None:
-            other = Field(
-                self.team, self.team.keep(self.kept.rank, resident.Resident.force, self.body, other)
-            )
+        rank = self.kept.rank
+        if isinstance(other, np.ndarray) and self.body is not None:  # forces on the contacts
+            other = self.team.keep(rank, resident.Resident.force, self.body, other)
         own = other.kept if isinstance(other, Field) else other
-        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own), self.body)
+        return Field(self.team, self.team.keep(rank, function, self.kept, own), self.body)
 
-    def __add__(self, other: Field | np.ndarray) -> Field:
-        return self._make(operator.add, other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Field) -> Field:
-        return self._make(operator.sub, other)
-
-    def __mul__(self, other: Field | float) -> Field:
-        return self._make(operator.mul, other)
-
-    def __rmul__(self, factor: float) -> Field:
-        return self._make(operator.mul, factor)
-
-    def __truediv__(self, other: Field | float) -> Field:
-        return self._make(operator.truediv, other)
-
-    def __pow__(self, power: float) -> Field:
-        return self._make(operator.pow, power)
+    __add__ = __radd__ = _operator(operator.add)
+    __sub__ = _operator(operator.sub)
+    __mul__ = __rmul__ = _operator(operator.mul)
+    __truediv__ = _operator(operator.truediv)
+    __pow__ = _operator(operator.pow)
+    astype = _operator(np.ndarray.astype)
 
     def __matmul__(self, other: Field) -> float:
-        return float(self.team.ask(self.kept.rank, operator.matmul, self.kept, other.kept))
+        return float(self._ask("__matmul__", other.kept))
 
     def __rmatmul__(self, T: sp.csr_matrix) -> np.ndarray:
         """A map (rows, m) of the contact unknowns applied to the vector."""
-        known = self.known
+        known, contacts = self.known, resident.Resident.on_contacts
         if known is None:
-            known = self.team.ask(
-                self.kept.rank, resident.Resident.on_contacts, self.body, self.kept
-            )
+            known = self.team.ask(self.kept.rank, contacts, self.body, self.kept)
         return np.asarray(T @ known)
 
     def any(self, axis: None = None, out: None = None) -> bool:
         """Whether an entry is not zero, as numpy.any asks."""
-        return bool(self.team.ask(self.kept.rank, np.any, self.kept))
+        return bool(self._ask("any"))
 
     def sum(self, axis: None = None, out: None = None, **more: Any) -> float:
         """The sum of all entries, as numpy.sum asks."""
-        return float(self.team.ask(self.kept.rank, np.sum, self.kept))
-
-    def astype(self, kind: Any) -> Field:
-        """The vector in another precision."""
-        return self._make(np.ndarray.astype, kind)
+        return float(self._ask("sum"))
 
     def started_dot(self, other: Field) -> Callable[[], float]:
         """The scalar product, when it is called; the work begins now."""
@@ -122,34 +116,32 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
-class RemoteTerm:
+class RemoteTerm(Remote):
     """The term of a body on another rank, as contactopt.linear.saddle_point.BodyTerm asks.
 
     rows  (m,) rows of u that the body moves, which alone travel;   length  number of all rows
     """
 
-    team: Team
-    kept: Kept
     rows: np.ndarray
     length: int
     size: int
     low_rank: tuple[np.ndarray, np.ndarray]
     elsewhere = True
 
-    def _make(self, function: Any, *arguments: Any) -> Field:
-        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, *arguments))
+    def _field(self, member: str, *arguments: Any) -> Field:
+        return Field(self.team, self._keep(member, *arguments))
 
     def diagonal(self) -> Field:
-        return self._make(LocalTerm.diagonal)
+        return self._field("diagonal")
 
     def stiffness(self, X: Field) -> Field:
-        return self._make(resident.stiffness, X.kept)
+        return self._field("stiffness", X.kept)
 
     def cycle(self, F: Field) -> Field:
-        return self._make(resident.cycle, F.kept)
+        return self._field("cycle", F.kept)
 
     def pulled(self, r: np.ndarray) -> Field:
-        return self._make(LocalTerm.pulled, r[self.rows])
+        return self._field("pulled", r[self.rows])
 
     def started_trace(self, X: Field) -> Callable[[], np.ndarray]:
         own = self.team.start(self.kept.rank, resident.trace, self.kept, X.kept)
@@ -169,165 +161,12 @@ class RemoteEquilibrium:
     body: RemoteBody
 
     def term(self, T: sp.csr_matrix) -> RemoteTerm:
-        team, rows = self.body.team, np.flatnonzero(np.diff(T.indptr))
-        kept = team.keep(self.body.kept.rank, resident.term, self.body.kept, T[rows])
-        size, low_rank = team.ask(kept.rank, resident.size, kept)
-        spread = sp.csr_matrix(
-            (np.ones(len(rows)), (rows, np.arange(len(rows)))), (T.shape[0], len(rows))
-        )
-        return RemoteTerm(
-            team, kept, rows, T.shape[0], size, (spread @ low_rank[0], spread @ low_rank[1])
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class RemoteBody:
-    """A body on another rank, as contactopt.bodies.protocol.Body asks; its n unknowns are the m of
-    its contact surfaces.
-    """
-
-    team: Team
-    kept: Kept
-    facts: resident.Facts
-    parallel = True
-
-    def _ask(self, function: Any, *arguments: Any) -> Any:
-        return self.team.ask(self.kept.rank, function, self.kept, *arguments)
-
-    def _keep(self, function: Any, *arguments: Any) -> Kept:
-        return self.team.keep(self.kept.rank, function, self.kept, *arguments)
-
-    @property
-    def name(self) -> str:
-        return self.facts.name
-
-    @property
-    def unknowns(self) -> int:
-        return self.facts.unknowns
-
-    @cached_property
-    def at_rest(self) -> Any:
-        return Field(self.team, self._keep(resident.whole), self.kept, self.facts.at_rest)
-
-    @property
-    def motions(self) -> np.ndarray:
-        return self.facts.motions
-
-    @property
-    def motion_names(self) -> tuple[str, ...]:
-        return self.facts.motion_names
-
-    @property
-    def resultants(self) -> np.ndarray:
-        return self.facts.resultants
-
-    @property
-    def iterative(self) -> bool:
-        return self.facts.iterative
-
-    @property
-    def complete(self) -> bool:
-        return self.facts.complete
-
-    @property
-    def equilibrium(self) -> RemoteEquilibrium | None:
-        return RemoteEquilibrium(self) if self.facts.equilibrated else None
-
-    def product(self, T: sp.csr_matrix) -> Product:
-        made = self._keep(resident.product, T)
-        return lambda X, accuracy: self.team.ask(made.rank, resident.act, made, X, accuracy)
-
-    def convolution(self, T: sp.csr_matrix) -> None:
-        return None
-
-    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(self._ask(resident.compliance, T))
-
-    def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(self._ask(resident.moved, T))
-
-    def _act(self, member: str, *arguments: Any) -> Any:
-        """What the member of that name returns on the rank of the body."""
-        return self._ask(resident.Resident.act, member, *map(_sendable, arguments))
-
-    def _field(self, member: str, *arguments: Any) -> Field:
-        """The same where it is a vector (n,), which stays there."""
-        return Field(
-            self.team,
-            self._keep(resident.Resident.act, member, *map(_sendable, arguments)),
-            self.kept,
-        )
-
-    def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
-        known = None if free is None else free.kept
-        own = self._keep(
-            resident.Resident.act, "displacement", _sendable(force), multipliers, known
-        )
-        return Field(self.team, own, self.kept)
-
-    def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
-        made = self._keep(
-            resident.Resident.act, "material_change", constant, _sendable(U), _sendable(force)
-        )
-        return self._item(made, 0), self.team.ask(made.rank, operator.getitem, made, 1)
-
-    def material_work(self, constant: str, U: Any, force: np.ndarray, dual: Any, W: Any) -> float:
-        return float(self._act("material_work", constant, U, force, dual, W))
-
-    def load_work(self, scene: Scene, part: Part, dual: Any, weights: np.ndarray, W: Any) -> float:
-        sent = _sent(scene, part)
-        return float(self._ask(resident.load_work, sent, _sendable(dual), weights, W.kept))
-
-    def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
-        made = self._keep(resident.Resident.act, "energy_gradient", _sendable(U), _sendable(force))
-        return self._item(made, 0), self._item(made, 1)
-
-    def _item(self, made: Kept, number: int) -> Field:
-        return Field(
-            self.team, self.team.keep(made.rank, operator.getitem, made, number), self.kept
-        )
-
-    def energy_change(self, constant: str, U: Any, force: np.ndarray) -> float:
-        return float(self._act("energy_change", constant, U, force))
-
-    def energy(self, U: Any) -> float:
-        return float(self._act("energy", U))
-
-    def external_forces(self, U: Any) -> Any:
-        return self._field("external_forces", U)
-
-    def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(resident.held_by, U.kept, force)
-        return found
-
-    def recovery_errors(self, U: Any, *others: Any) -> tuple[np.ndarray, ...]:
-        return tuple(self._act("recovery_errors", U, *others))
-
-    def on_elements(self, values: np.ndarray) -> np.ndarray:
-        return np.asarray(self._act("on_elements", values))
-
-    def stress_map(self, region: Region, by_poisson: bool = False) -> RemoteStressMap:
-        made = self._keep(resident.Resident.act, "stress_map", region, by_poisson)
-        return RemoteStressMap(self, made, *self.team.ask(made.rank, resident.map_facts, made))
-
-    def fields(self, U: Any) -> Fields:
-        found: Fields = self._act("fields", U)
-        return found
-
-    def seen(self, T: sp.csr_matrix, U: Any) -> np.ndarray:
-        return np.asarray(self._ask(resident.seen, T, U.kept))
-
-    def limits(self, U: Any, force: np.ndarray) -> Validity:
-        return Validity(*self._act("limits", U, force))
-
-    def grounded(self, modulus: float) -> RemoteBody:
-        return self
-
-    def pulled(self, U: Any) -> RemoteBody:
-        return self
-
-    def loaded(self, scene: Scene, part: Part) -> RemoteBody:
-        return _known(self.team, self._keep(resident.loaded, _sent(scene, part)))
+        rows = np.flatnonzero(np.diff(T.indptr))
+        made = Remote(self.body.team, self.body._keep("term", T[rows]))
+        narrow = np.stack(made._ask("low_rank"))
+        wide = np.zeros((2, T.shape[0], narrow.shape[2]))
+        wide[:, rows] = narrow
+        return RemoteTerm(made.team, made.kept, rows, T.shape[0], made._ask("size"), tuple(wide))
 
 
 def _sendable(value: Any) -> Any:
@@ -339,105 +178,176 @@ def _sendable(value: Any) -> Any:
     return resident.Forces(value) if isinstance(value, np.ndarray) else value
 
 
+def _forwarded(member: str) -> Callable[..., Any]:
+    """A member of a body whose result comes here."""
+
+    def act(self: RemoteBody, *arguments: Any) -> Any:
+        return self._ask("act", member, *map(_sendable, arguments))
+
+    return act
+
+
 @dataclass(frozen=True, eq=False)
-class RemoteStressMap:
+class RemoteBody(Remote, Body):
+    """A body on another rank; its n unknowns are the m of its contact surfaces.
+
+    resting       at_rest (m,), where it is known here
+    equilibrated  whether it is solved by iteration
+    """
+
+    name: str
+    unknowns: int
+    resting: np.ndarray
+    motions: np.ndarray
+    motion_names: tuple[str, ...]
+    resultants: np.ndarray
+    equilibrated: bool
+    iterative: bool
+    complete: bool
+    parallel = True
+
+    @cached_property
+    def at_rest(self) -> Any:
+        return Field(self.team, self._keep("act", "at_rest"), self.kept, self.resting)
+
+    @cached_property
+    def equilibrium(self) -> RemoteEquilibrium | None:
+        return RemoteEquilibrium(self) if self.equilibrated else None
+
+    compliance = _forwarded("compliance")
+    moved = _forwarded("moved")
+    material_work = _forwarded("material_work")
+    energy = _forwarded("energy")
+    energy_change = _forwarded("energy_change")
+    recovery_errors = _forwarded("recovery_errors")
+    on_elements = _forwarded("on_elements")
+    fields = _forwarded("fields")
+    limits = _forwarded("limits")
+
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None  # an elastic body has none
+
+    def product(self, T: sp.csr_matrix) -> Product:
+        made = Remote(self.team, self._keep("product", T))
+        return lambda X, accuracy: made._ask("__call__", X, accuracy)
+
+    def _items(self, member: str, *arguments: Any) -> tuple[Field, Remote]:
+        """The first of the two vectors that a member returns, and both together."""
+        both = Remote(self.team, self._keep("act", member, *map(_sendable, arguments)))
+        return Field(self.team, both._keep("__getitem__", 0), self.kept), both
+
+    def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
+        known = None if free is None else free.kept
+        own = self._keep("act", "displacement", _sendable(force), multipliers, known)
+        return Field(self.team, own, self.kept)
+
+    def external_forces(self, U: Any) -> Any:
+        return Field(self.team, self._keep("act", "external_forces", U.kept), self.kept)
+
+    def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
+        own, both = self._items("material_change", constant, U, force)
+        return own, both._ask("__getitem__", 1)
+
+    def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
+        own, both = self._items("energy_gradient", U, force)
+        return own, Field(self.team, both._keep("__getitem__", 1), self.kept)
+
+    def load_work(self, scene: Scene, part: Part, dual: Any, weights: np.ndarray, W: Any) -> float:
+        sent = _sent(scene, part)
+        return float(self._ask("load_work", sent, _sendable(dual), weights, W.kept))
+
+    def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask("held_by", U.kept, force)
+        return found
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> Any:
+        made = Remote(self.team, self._keep("act", "stress_map", region, by_poisson))
+        return RemoteStressMap(
+            self.team, made.kept, self.kept, made._ask("places"), made._ask("sources")
+        )
+
+    def _changed(self, member: str, argument: Any) -> RemoteBody:
+        made = self._keep("changed", member, argument)
+        same = self.team.ask(made.rank, operator.is_, self.kept, made)
+        return self if same else _known(self.team, made)
+
+    def grounded(self, modulus: float) -> RemoteBody:
+        return self._changed("grounded", modulus)
+
+    def pulled(self, U: Any) -> RemoteBody:
+        return self._changed("pulled", U.kept)
+
+    def loaded(self, scene: Scene, part: Part) -> RemoteBody:
+        return _known(self.team, self._keep("loaded", _sent(scene, part)))
+
+
+@dataclass(frozen=True, eq=False)
+class RemoteStressMap(Remote):
     """A contactopt.bodies.stress_recovery.StressMap on the rank of its body, with its places and
     sources here.
     """
 
-    owner: RemoteBody
-    kept: Kept
+    body: Kept
     places: np.ndarray
     sources: np.ndarray
 
-    def _ask(self, function: Any, *arguments: Any) -> Any:
-        return self.owner.team.ask(self.kept.rank, function, self.kept, *arguments)
-
     @property
     def mesh(self) -> Any:
-        return pickle.loads(self._ask(resident.mesh))
+        return pickle.loads(self.team.ask(self.kept.rank, resident.shipped_mesh, self.kept))
 
     def stress(self, U: Field) -> np.ndarray:
-        return np.asarray(self._ask(StressMap.stress, U.kept))
+        return np.asarray(self._ask("stress", U.kept))
 
     def deviation(self, U: Field, slopes: np.ndarray) -> np.ndarray:
-        return np.asarray(self._ask(StressMap.deviation, U.kept, slopes))
+        return np.asarray(self._ask("deviation", U.kept, slopes))
 
     def elements(self, places: np.ndarray) -> np.ndarray:
-        return np.asarray(self._ask(StressMap.elements, places))
+        return np.asarray(self._ask("elements", places))
 
     def size(self, number: int) -> float:
-        return float(self._ask(StressMap.size, number))
+        return float(self._ask("size", number))
 
     def transposed(self, slopes: np.ndarray) -> Field:
-        team = self.owner.team
-        made = team.keep(self.kept.rank, StressMap.transposed, self.kept, slopes)
-        return Field(team, made, self.owner.kept)
+        return Field(self.team, self._keep("transposed", slopes), self.body)
 
 
 def _known(team: Team, kept: Kept) -> RemoteBody:
-    return RemoteBody(team, kept, team.ask(kept.rank, resident.facts, kept))
+    return RemoteBody(team, kept, **Remote(team, kept)._ask("facts"))
 
 
 @dataclass(frozen=True, eq=False)
-class AssembledRemote:
-    """An assembled body on another rank, as contactopt.bodies.protocol.AssembledBody asks."""
+class AssembledRemote(Remote, AssembledBody):
+    """An assembled body on another rank."""
 
-    team: Team
-    kept: Kept
     name: str
-    meshed = True
-
-    def _ask(self, function: Any, *arguments: Any) -> Any:
-        return self.team.ask(self.kept.rank, function, self.kept, *arguments)
 
     @cached_property
-    def _sizes(self) -> Sequence[int]:
-        found: tuple[int, int] = self._ask(resident.sizes)
-        return found
-
-    @property
     def unknowns(self) -> int:
-        return self._sizes[0]
+        return int(self._ask("unknowns"))
 
-    @property
+    @cached_property
     def interface_unknowns(self) -> int:
-        return self._sizes[1]
+        return int(self._ask("interface_unknowns"))
 
     def guides(self) -> Guides:
-        return Guides(*self._ask(AssembledElastic.guides))
+        return Guides(*self._ask("guides"))
 
     def iterates(self, solver: str) -> bool:
-        return bool(self._ask(AssembledElastic.iterates, solver))
+        return bool(self._ask("iterates", solver))
 
     def surface(self, name: str | None = None) -> Surface:
-        found: Surface = pickle.loads(self._ask(resident.surface, name))
+        found: Surface = pickle.loads(self._ask("shipped_surface", name))
         return found
 
-    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
-        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
-
     def prepare(self, solver: str, entries: bool) -> RemoteBody:
-        return _known(
-            self.team, self.team.keep(self.kept.rank, resident.prepared, self.kept, solver, entries)
-        )
+        made = self._keep("resident", solver, SOLVERS.get(solver), entries)
+        return _known(self.team, made)
 
 
 def assemble_remote(
     scene: Scene, part: RemotePart, elements: int, zone: float | None
 ) -> AssembledRemote:
-    """Assemble a body on its rank.
-
-    Parameters
-    ----------
-    scene, part : The scene and one of its remote parts.
-    elements, zone : Number of elements across the contact half-width, and the half-width that the
-        mesh resolves [length].
-
-    Returns
-    -------
-    What stands for the body on this rank.
-    """
+    """What stands for a body that is assembled on its rank."""
     team = part.team
     assert team is not None
     kept = team.keep(part.rank, resident.assembled, _sent(scene, part), elements, zone)

@@ -8,14 +8,15 @@ The total contact force follows them in U, so that the forces that hold the body
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.fields import Validity
-from contactopt.bodies.protocol import Guides, Surface
+from contactopt.bodies.assembled import AssembledBody, Guides, Surface
+from contactopt.bodies.protocol import Body
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.linear.operators import Product
@@ -27,7 +28,7 @@ FLAT = 1e-3  # normals of a surface that differ by less than this are one direct
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBody:
+class RigidBody(AssembledBody, Body):
     """A rigid body of a scene with the components of its displacement; it needs no preparation, so
     it is both stages.
     """
@@ -36,34 +37,32 @@ class RigidBody:
     components: tuple[str, ...]
 
     unknowns = interface_unknowns = 0
-    meshed = parallel = iterative = False
-    complete = True
-    equilibrium = None
+    meshed = False
 
-    @property
+    @cached_property
     def name(self) -> str:
         return self.part.name
 
-    @property
+    @cached_property
     def at_rest(self) -> np.ndarray:
         values = self.part.displacement or {}
         given = [float(values.get(name, 0.0)) for name in self.components]
         return np.array([*given, *(0.0 for _ in given)])
 
-    @property
+    @cached_property
     def motions(self) -> np.ndarray:
         columns = [self.components.index(name) for name in self._force]
         return np.eye(2 * len(self.components))[:, columns]
 
-    @property
+    @cached_property
     def motion_names(self) -> tuple[str, ...]:
         return tuple(f"translation along {component}" for component in self._force)
 
-    @property
+    @cached_property
     def resultants(self) -> np.ndarray:
         return np.array(list(self._force.values()), dtype=float)
 
-    @property
+    @cached_property
     def _force(self) -> dict[str, float]:
         return dict(self.part.force or {})
 
@@ -87,21 +86,13 @@ class RigidBody:
                 other.body,
             )
         fixed = np.array([name not in self._force for name in self.components])
-        trace = [
+        traces = tuple(
             sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim))
             for c in range(dim)
-        ]
+        )
         held = np.tile(fixed[:, None], k)
-        surface = Surface(
-            self.name,
-            other.points,
-            normals,
-            other.areas,
-            other.weights,
-            other.places,
-            tuple(trace),
-            held,
-            other.cells,
+        surface = replace(
+            other, body=self.name, normals=normals, traces=traces, held=held, mesh=None, chart=None
         )
         gap = self._gap(other)
         self._check_side(other, np.sum(normals * suggested, axis=0), gap)
@@ -124,7 +115,7 @@ class RigidBody:
             )
 
     def _gap(self, other: Surface) -> np.ndarray:
-        """The initial gap at the contacts from that at the nodes, with the weights of the
+        """The initial gap at the contacts from that at the nodes, by the weights of the
         displacements.
         """
         if other.mesh is None:  # its points lie in a plane, its places on the surface
@@ -149,17 +140,11 @@ class RigidBody:
     def guides(self) -> Guides:
         return Guides(np.zeros((len(self.components), 0)))
 
-    def iterates(self, solver: str) -> bool:
-        return False
-
     def prepare(self, solver: str, entries: bool) -> RigidBody:
         return self
 
     def product(self, T: sp.csr_matrix) -> Product:
         return lambda X, accuracy: np.zeros(X.shape)
-
-    def convolution(self, T: sp.csr_matrix) -> None:
-        return None
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         return np.zeros((T.shape[0], T.shape[0]))
@@ -170,85 +155,18 @@ class RigidBody:
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
     ) -> np.ndarray:
-        return np.asarray(
-            self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components))
-        )
-
-    def material_change(
-        self, constant: str, U: np.ndarray, force: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(len(U)), np.zeros(len(self.resultants))
-
-    def material_work(
-        self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray
-    ) -> float:
-        return 0.0
-
-    def load_work(
-        self, scene: Scene, part: Rigid, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
-    ) -> float:
-        new = self.loaded(scene, part)
-        return float(
-            dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants)
-        )
-
-    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(len(U)), np.zeros(len(U))
-
-    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
-        return 0.0
-
-    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
-        return (np.zeros(0),) * len(others)
-
-    def on_elements(self, values: np.ndarray) -> np.ndarray:
-        return np.zeros(0)
-
-    def stress_map(self, region: object, by_poisson: bool = False) -> None:
-        return None
-
-    def energy(self, U: np.ndarray) -> float:
-        return 0.0
+        follows = np.roll(force, len(self.components))
+        return np.asarray(self.at_rest + self.motions @ multipliers + follows)
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """The forces that keep the body in equilibrium with the contact forces."""
         dim = len(self.components)
         return np.concatenate([-U[dim:], np.zeros(dim)])
 
-    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Nothing: what holds a rigid body is what its contacts ask for."""
-        return {}
-
-    def fields(self, U: np.ndarray) -> None:
-        return None
-
-    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
-        return np.asarray(T @ U)
-
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        return Validity()
-
-    def grounded(self, modulus: float) -> RigidBody:
-        return self
-
-    def pulled(self, U: Any) -> RigidBody:
-        return self
-
     def loaded(self, scene: Scene, part: Rigid) -> RigidBody:
         """With other values of the total force, and other free components if need be."""
-        return assemble_rigid(scene, part, 0, None)
+        return RigidBody(part, scene.components)
 
 
 def assemble_rigid(scene: Scene, part: Rigid, elements: int, zone: float | None) -> RigidBody:
-    """Make a rigid body of a scene.
-
-    Parameters
-    ----------
-    scene, part : The scene and one of its rigid parts.
-    elements, zone : Not used: a rigid body has no mesh.
-
-    Returns
-    -------
-    The body, whose unknowns are its motions.
-    """
+    """The body of a rigid part, which has no mesh."""
     return RigidBody(part, scene.components)

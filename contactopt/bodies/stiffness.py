@@ -2,56 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import weight_at
-from contactopt.material import Material, lame
+from contactopt.bodies.elements import Weight, weight_at
 
 PIECE = 2**20  # entries of element matrices that are held at the same time
 
 
-def stiffness(
-    basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]
-) -> sp.csr_matrix:
-    """Assemble the elastic stiffness of a material.
-
-    Parameters
-    ----------
-    basis : The displacement basis of N unknowns.
-    material : Young's modulus and Poisson's ratio.
-    weight : The measure of the integrals, as for contactopt.bodies.elements.weight_at.
-
-    Returns
-    -------
-    (N, N) stiffness [force / length].
-    """
-    return isotropic_stiffness(basis, lame(material), weight)
-
-
 def isotropic_stiffness(
-    basis: skfem.CellBasis, constants: tuple[float, float], weight: tuple[float, bool]
+    basis: skfem.CellBasis, constants: tuple[float, float], weight: Weight
 ) -> sp.csr_matrix:
-    """Elastic stiffness: the integral of sigma(u) : epsilon(v), with the hoop strain u_r / r if
-    axisymmetric.
+    """Elastic stiffness (N, N) [force / length]: the integral of sigma(u) : epsilon(v), with the
+    hoop strain u_r / r if axisymmetric.
 
-    It is linear in Lame's parameters, so that their derivatives give the derivative of the
-    stiffness. The pattern of the matrix is made first, from the nodes of the elements. The element
-    matrices are then added to it a piece of the mesh at a time, so that little more memory is taken
-    than the matrix needs.
+    It is linear in the constants, Lame's lambda and G [stress], so that their derivatives give the
+    derivative of the stiffness. The components of a node are numbered one after the other in the
+    basis; weight is the measure of the integrals, see contactopt.bodies.elements.weight_at.
 
-    Parameters
-    ----------
-    basis : vector-valued displacement, the components of a node numbered one after the other
-    constants : Lame's lambda and G [stress]
-    weight : measure of the integrals, see contactopt.bodies.elements.weight_at
-
-    Returns
-    -------
-    (N, N) symmetric matrix [force / length].
+    The pattern of the matrix is made first, from the nodes of the elements. The element matrices
+    are then added to it a piece of the mesh at a time, so that little more memory is taken than the
+    matrix needs.
     """
     dim = basis.mesh.p.shape[0]
     nodes = basis.element_dofs[::dim].T // dim  # (element, i)
@@ -63,7 +35,9 @@ def isotropic_stiffness(
     # Entry (a, b) of the block of two nodes stands at first + a step + b, and pairs of nodes are
     # found by bisection.
     a, b = np.arange(dim)[:, None, None], np.arange(dim)
-    for piece in _pieces(len(nodes), dim * nodes.shape[1]):
+    size = max(PIECE // (dim * nodes.shape[1]) ** 2, 1)
+    for start in range(0, len(nodes), size):
+        piece = np.arange(start, min(start + size, len(nodes)))
         own = nodes[piece].astype(np.int64)
         pair = np.searchsorted(known, own[:, :, None] * graph.shape[0] + own[:, None, :])[
             :, :, None, :, None
@@ -74,17 +48,12 @@ def isotropic_stiffness(
 
 
 def _element_matrices(
-    basis: skfem.CellBasis,
-    elements: np.ndarray,
-    constants: tuple[float, float],
-    weight: tuple[float, bool],
+    basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: Weight
 ) -> np.ndarray:
-    """Stiffness of some elements, (element, i, a, j, b) for component a of node i and component b
-    of node j.
+    """Stiffness of some elements, (element, i, a, j, b) for component a of node i and b of node j.
 
-    With g_ia the derivative of shape function i along a, the entry is the integral of
-    lambda g_ia g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all
-    elements.
+    With g_ia the derivative of shape function i along a, the entry is the integral of lambda g_ia
+    g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all elements.
     """
     lam, shear = constants
     mapping, places, shape = basis.mapping, basis.X, basis.elem.elem
@@ -112,13 +81,6 @@ def _element_matrices(
     return K
 
 
-def _pieces(count: int, unknowns: int) -> Iterator[np.ndarray]:
-    """The numbers of `count` elements, some at a time; unknowns of one element."""
-    size = max(PIECE // unknowns**2, 1)
-    for start in range(0, count, size):
-        yield np.arange(start, min(start + size, count))
-
-
 def _node_graph(nodes: np.ndarray, count: int) -> sp.csr_matrix:
     """Pattern (count, count), sorted, of the nodes that share an element; nodes (element, i)."""
     ones = np.ones(nodes.size, dtype=np.int32)
@@ -133,10 +95,8 @@ def _node_graph(nodes: np.ndarray, count: int) -> sp.csr_matrix:
 def _pattern(
     graph: sp.csr_matrix, dim: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Pattern of the matrix from that of its nodes.
-
-    Returns indices and indptr of the CSR form, and for each pair of nodes the place of its first
-    entry and the distance from one of its rows to the next.
+    """Indices and indptr of the CSR form from the pattern of its nodes, and for each pair of nodes
+    the place of its first entry and the distance from one of its rows to the next.
     """
     degree = np.diff(graph.indptr)
     indptr = np.concatenate([[0], np.cumsum(np.repeat(dim * degree, dim), dtype=np.int64)])

@@ -34,19 +34,16 @@ import scipy.sparse as sp
 import skfem
 from skfem.quadrature import get_quadrature
 
-from contactopt.bodies.body import Assembly
-from contactopt.bodies.fields import PLACES
-from contactopt.bodies.protocol import Region
+from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.element_stress import stress_of
+from contactopt.bodies.fields import PLACES, Region
 from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 from contactopt.meshes.cells import straight
 from contactopt.meshes.structured import simplices
 
-OUTSIDE = (
-    # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a
-    # coarse mesh
-    0.2
-)
+# how far beyond an element a point may lie, over its size: an arc lies beyond a coarse mesh
+OUTSIDE = 0.2
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 
 
@@ -55,13 +52,11 @@ class StressMap:
     """The recovered stress at m places of a body as a linear map of its displacement, as in the
     head of this module.
 
-    places   (dim, m) [length]
-    sources  (m,) vertices of the mesh, -1 for a place that is none
-    fit      of the stresses of the elements around each place
-    used     numbers of the elements whose stresses are fitted
-    even     (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
-    body, basis, constants  of the element stress: the quadrature points, and the constants lambda
-                            and mu of the material
+    places     (dim, m) [length];   sources  (m,) vertices of the mesh, -1 for a place that is none
+    fit        of the stresses of the elements around each place
+    used       numbers of the elements whose stresses are fitted
+    even       (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
+    basis      of the element stress at its quadrature points;   constants  lambda and mu
     """
 
     places: np.ndarray
@@ -75,7 +70,6 @@ class StressMap:
 
     @property
     def mesh(self) -> skfem.Mesh:
-        """The mesh of the body."""
         return self.body.basis.mesh
 
     def stress(self, U: np.ndarray) -> np.ndarray:
@@ -83,12 +77,11 @@ class StressMap:
 
         Parameters
         ----------
-        U : (n,) The displacement of the body [length].
+        U : (n,) displacement of the body [length].
 
         Returns
         -------
-        (m, 4 or 6) array : The stress at every place, components as in
-            contactopt.bodies.fields.STRESSES.
+        (m, 4 or 6) at every place, components as in contactopt.bodies.fields.STRESSES.
         """
         return (
             np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
@@ -103,12 +96,12 @@ class StressMap:
 
         Parameters
         ----------
-        U : (n,) The displacement of the body [length].
-        slopes : (m, 4 or 6) Derivatives of the function by the recovered stress.
+        U : (n,) displacement of the body [length].
+        slopes : (m, 4 or 6) derivatives of the function by the recovered stress.
 
         Returns
         -------
-        (m,) array : Its standard error at every place.
+        (m,) its standard error at every place.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(
@@ -120,7 +113,7 @@ class StressMap:
 
         Parameters
         ----------
-        places : Numbers of places.
+        places : Their numbers.
 
         Returns
         -------
@@ -134,11 +127,11 @@ class StressMap:
 
         Parameters
         ----------
-        slopes : (m, 4 or 6) Derivatives of a function by the recovered stress.
+        slopes : (m, 4 or 6) derivatives of a function by the recovered stress.
 
         Returns
         -------
-        (n,) array : Its derivative by the displacement U.
+        (n,) its derivative by the displacement U.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
@@ -167,7 +160,6 @@ class StressMap:
     @cached_property
     def _element_stress(self) -> tuple[sp.csr_matrix, ...]:
         """D, one matrix (points, n) per component."""
-        lam, shear = self.constants
         basis, dofs = self.basis, self.basis.element_dofs
         shape = (basis.nelems * len(basis.W), self.body.basis.N)
         radius = np.asarray(basis.global_coordinates())[0] if self.body.weight[1] else None
@@ -175,14 +167,10 @@ class StressMap:
         entries: list[list[np.ndarray]] = [[] for _ in places]
         for number in range(basis.Nbfun):
             field = basis.basis[number][0]
-            gradient = np.asarray(field.grad)
-            strain = np.zeros((3, 3, *gradient.shape[2:]))
-            strain[: len(gradient), : len(gradient)] = (gradient + gradient.swapaxes(0, 1)) / 2
-            if radius is not None:
-                strain[2, 2] = np.asarray(field)[0] / radius
-            trace = np.trace(strain)
+            hoop = None if radius is None else np.asarray(field)[0] / radius
+            stress = stress_of(self.constants, np.asarray(field.grad), hoop)
             for own, (i, j) in zip(entries, places):
-                own.append(2 * shear * strain[i, j] + (lam * trace if i == j else 0.0))
+                own.append(stress[i, j])
         row = np.tile(np.arange(shape[0]), basis.Nbfun)
         column = np.repeat(dofs[:, :, None], len(basis.W), axis=2).ravel()
         return tuple(
@@ -191,17 +179,11 @@ class StressMap:
 
 
 def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> StressMap:
-    """The recovered stress in a region of a body.
+    """The recovered stress in a region of a body, at the vertices of the mesh there; a point is a
+    place by itself.
 
-    Parameters
-    ----------
-    body : assembled, of finite elements
-    region : where. The places are the vertices of the mesh there; a point is a place by itself
-    by_poisson : the derivative of the recovered stress by Poisson's ratio instead
-
-    Raises
-    ------
-    InputError : for a boundary that the body does not have, and for a point outside the body
+    by_poisson asks for its derivative by Poisson's ratio instead. InputError for a boundary that
+    the body does not have, and for a point outside the body.
     """
     mesh = straight(body.basis.mesh)
     places, sources, seeds = _places(body.name, mesh, region)
@@ -285,7 +267,7 @@ def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarra
 
 def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
-    size it misses the point.
+    size it misses it.
     """
     cells = simplices(mesh, alike=False)
     origin = cells.p[:, cells.t[0]]
@@ -301,10 +283,8 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
 def _patches(
     mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float
 ) -> sp.csr_matrix:
-    """Mask (m, elements) of the elements that make each patch.
-
-    With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at
-    least `least` where the mesh has them.
+    """Mask (m, elements) of the elements that make each patch. With their mirror images beyond the
+    planes of symmetry of `mirrored` (dim, nodes) they are at least `least` where the mesh has them.
     """
     count = mesh.t.shape[1]
     around = sp.csr_matrix(
@@ -326,7 +306,6 @@ def _patches(
 
 
 def _replaced(rows: sp.csr_matrix, chosen: np.ndarray, others: sp.csr_matrix) -> sp.csr_matrix:
-    """The matrix with the chosen rows replaced."""
     stacked = sp.vstack([rows, others]).tocsr()
     order = np.arange(rows.shape[0])
     order[chosen] = rows.shape[0] + np.arange(others.shape[0])
@@ -346,9 +325,8 @@ def _terms(dim: int, degree: int) -> list[tuple[int, ...]]:
 class PatchFit:
     """The least-squares fits around m places.
 
-    row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among
-             all points
-    powers   (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
+    row     (p,) the place of each point of a patch;   column  (p,) its number among all points
+    powers  (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
     """
 
     row: np.ndarray
@@ -362,9 +340,7 @@ class PatchFit:
         return np.asarray(np.sum(self.inverse[self.row, 0] * self.powers, axis=1))
 
     def deviation(self, values: np.ndarray) -> np.ndarray:
-        """Standard error (m,) of the fit of values (points,) at the places, from what the fit
-        leaves.
-        """
+        """Standard error (m,) of the fit of values (points,), from what the fit leaves."""
         count, own = len(self.inverse), values[self.column]
         sums = [np.bincount(self.row, own * power, count) for power in self.powers.T]
         coefficients = np.einsum("mab,bm->ma", self.inverse, np.array(sums))
@@ -391,37 +367,3 @@ def _fit(
         for j, second in enumerate(powers[: i + 1]):
             moments[:, i, j] = moments[:, j, i] = np.bincount(row, first * second, count)
     return PatchFit(row, column, powers.T, np.linalg.pinv(moments, rcond=1e-10, hermitian=True))
-
-
-def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Compute the von Mises stress.
-
-    Parameters
-    ----------
-    stress : (m, 4 or 6) Stresses, whose first three columns are the normal ones.
-
-    Returns
-    -------
-    (m,) array : Their von Mises stress, in the unit of the stresses.
-    """
-    normal, shear = stress[:, :3], stress[:, 3:]
-    deviator = normal - normal.mean(axis=1, keepdims=True)
-    return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))
-
-
-def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
-    """Differentiate the von Mises stress.
-
-    Parameters
-    ----------
-    stress : (m, 4 or 6) Stresses, whose first three columns are the normal ones.
-
-    Returns
-    -------
-    (m, 4 or 6) array : Derivatives by the components; 0 where there is no stress.
-    """
-    normal, size = stress[:, :3], von_mises(stress)[:, None]
-    slopes = np.concatenate(
-        [1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1
-    )
-    return np.divide(slopes, size, out=np.zeros(slopes.shape), where=size > 0)

@@ -116,19 +116,9 @@ def _mean(body: HalfSpaceBody, offsets: list[np.ndarray], depth: float, points: 
 
 
 def flamant(x: np.ndarray, z: float) -> np.ndarray:
-    """Compute the stresses under unit line forces along x and into the body.
-
-    Source: Johnson (1985), sections 2.2 and 2.3.
-
-    Parameters
-    ----------
-    x : Places of any shape along the surface, from the force [length].
-    z : The depth [length].
-
-    Returns
-    -------
-    (3, 2, ...): the stresses xx, zz and xz under each of the two forces, at the places [1 /
-    length].
+    """Stresses xx, zz and xz (3, 2, ...) under unit line forces along x and into the body, at
+    places x of any shape along the surface and the depth z [1 / length]. Source: Johnson (1985),
+    sections 2.2, 2.3.
     """
     square = x**2 + z**2
     radial = [-2 / np.pi * x / square**2, -2 / np.pi * z / square**2]
@@ -138,20 +128,9 @@ def flamant(x: np.ndarray, z: float) -> np.ndarray:
 
 
 def boussinesq_cerruti(x: np.ndarray, y: np.ndarray, z: float, nu: float) -> np.ndarray:
-    """Compute the stresses under unit point forces along x, y and into the body.
-
-    Sources: Johnson (1985), sections 3.2 and 3.6.
-
-    Parameters
-    ----------
-    x, y : Places along the surface, from the force, of shapes that fit each other [length].
-    z : The depth, greater than 0 [length].
-    nu : Poisson's ratio.
-
-    Returns
-    -------
-    (6, 3, ...): the stresses xx, yy, zz, xy, xz and yz under each of the three forces, at the
-    places [1 / length^2].
+    """Stresses xx, yy, zz, xy, xz and yz (6, 3, ...) under unit point forces along x, y and into
+    the body, at places x, y along the surface and the depth z > 0 [1 / length^2]. Sources: Johnson
+    (1985), sections 3.2 and 3.6.
     """
     x, y = np.broadcast_arrays(x, y)
     rho = np.sqrt(x**2 + y**2 + z**2)

@@ -23,7 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactopt.bodies.body import Assembly
+from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import weight_at
 
 # stiffness of the ground over that of a block of the softest material on the contact surface
@@ -32,45 +32,28 @@ THIN = 20.0  # bodies softer than this many times such a ground are thin
 
 
 def volumes(body: Assembly) -> np.ndarray:
-    """Share the volume of the elements out to their unknowns.
-
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-
-    Returns
-    -------
-    (n,) with the measure of the body's integrals, all positive [length^3].
+    """The volume (n,) of the elements shared out to their unknowns, with the measure of the
+    integrals [length^3].
     """
     basis = body.basis
-    volume = np.sum(
-        basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates())), axis=1
-    )
+    measure = weight_at(body.weight, np.asarray(basis.global_coordinates()))
+    volume = np.sum(basis.dx * measure, axis=1)
     share = np.broadcast_to(volume * len(body.unknowns) / basis.Nbfun, basis.element_dofs.shape)
     return np.bincount(basis.element_dofs.ravel(), share.ravel(), len(body.load))
 
 
 def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether a body resists some displacement little more than a ground of its own material
-    would.
+    """Whether a body resists some displacement little more than a ground of its own material would.
 
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-    relieved : Function from nodal forces (n,) to the displacements (n,) that they make.
-
-    Returns
-    -------
-    Whether the least eigenvalue of A U = lambda M U, which one step of inverse iteration finds
-    within a factor where it is far below the others, is below 20 p: so it is for layers up to about
-    a thirtieth of their width.
+    relieved takes nodal forces (n,) to the displacements (n,) that they make. The least eigenvalue
+    of A U = lambda M U, which one step of inverse iteration finds within a factor where it is far
+    below the others, is below 20 p: so it is for layers up to about a thirtieth of their width.
     """
     M = volumes(body)
     forces = M * np.random.default_rng(0).standard_normal(len(body.load))
     U = relieved(forces)
-    return float(U @ (body.A @ U)) < THIN * _per_volume(body, M, body.material.E) * float(
-        U @ (M * U)
-    )
+    ground = _per_volume(body, M, body.material.E) * float(U @ (M * U))
+    return float(U @ (body.A @ U)) < THIN * ground
 
 
 def _per_volume(body: Assembly, M: np.ndarray, modulus: float) -> float:
@@ -83,17 +66,11 @@ def _per_volume(body: Assembly, M: np.ndarray, modulus: float) -> float:
 
 
 def on_ground(body: Assembly, modulus: float) -> tuple[Assembly, np.ndarray]:
-    """Put a body on a ground that is soft beside the other bodies.
+    """Put a body on a ground that is soft beside the other bodies, the softest of them of Young's
+    modulus `modulus`.
 
-    Parameters
-    ----------
-    body : The assembled body of n unknowns.
-    modulus : Young's modulus of the softest body [stress].
-
-    Returns
-    -------
-    The body, whose inertia forces are those of M, so that the ground does not resist its free
-    motions; and the stiffness p M of the ground (n,) [force / length].
+    Returns the body, whose inertia forces are those of M, so that the ground does not resist its
+    free motions, and the stiffness p M of the ground (n,) [force / length].
     """
     M, motions = volumes(body), body.rigid_motions
     forces = M[:, None] * motions.fields

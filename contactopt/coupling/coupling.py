@@ -21,7 +21,7 @@ from importlib import import_module
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import AssembledBody
+from contactopt.bodies.assembled import AssembledBody
 from contactopt.coupling.planes_of_symmetry import (
     ContactPoints,
     SymmetryPlane,

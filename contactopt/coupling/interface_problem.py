@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.protocol import Body
 from contactopt.coupling.coupling import Coupling, law_of
 from contactopt.linear.operators import Interface
 from contactopt.problem import InterfaceProblem, Pair

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.bodies.protocol import AssembledBody, Surface
+from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
+from contactopt.bodies.assembled import AssembledBody, Mesh, Surface
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of

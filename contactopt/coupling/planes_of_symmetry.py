@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.bodies.protocol import Guides
+from contactopt.bodies.assembled import Guides
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 

@@ -29,7 +29,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies import assemble
-from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
@@ -177,7 +178,7 @@ class Reduction:
         (n_b,) of each body.
         """
         q = self.problem.q
-        parts = (body.seen(B, U) for body, B, U in zip(self.bodies, self.maps, displaced))
+        parts = (B @ U for B, U in zip(self.maps, displaced))
         u = np.asarray(sum(parts, 0 * q.ravel())).reshape(q.shape)
         return u + self.gap[:, None] * np.eye(self.problem.dim)[0]
 

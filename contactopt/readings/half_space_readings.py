@@ -208,5 +208,5 @@ def _half_space(reduction: Reduction, name: str | None) -> HalfSpaceBody:
             f"scene '{reduction.scene.name}' has no half-space{named}; this is asked of half-spaces"
             " only."
         )
-    found: HalfSpaceBody = candidates[-1]  # type: ignore[assignment]
+    found: HalfSpaceBody = candidates[-1]
     return found

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from contactopt.bodies.protocol import Region
+from contactopt.bodies.fields import Region
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
@@ -213,8 +213,7 @@ def read_stress(
     ------
     InputError : For a boundary that the body does not have, and a point outside the body.
     """
-    from contactopt.bodies.fields import STRESSES
-    from contactopt.bodies.stress_recovery import von_mises, von_mises_slopes
+    from contactopt.bodies.fields import STRESSES, von_mises, von_mises_slopes
 
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = map_of(place, reduction)

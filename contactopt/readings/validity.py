@@ -72,7 +72,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
             )
         # the contacts that the body takes part in
         near = np.diff(B.indptr).reshape(moved.shape).any(axis=1)
-        size = np.linalg.norm(body.seen(B, U).reshape(moved.shape), axis=1)
+        size = np.linalg.norm((B @ U).reshape(moved.shape), axis=1)
         scale = np.maximum(scale, np.where(near, np.maximum(size, known["moved"]), 0.0))
     status, pairs = contact_status(reduction.problem, solution.reactions), {}
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.bodies import assemble
-from contactopt.bodies.body import Assembly
+from contactopt.bodies.assembly import Assembly
 from contactopt.coupling.coupling import Coupling, couple, law_of
 from contactopt.problem.certificate import Yardsticks, yardsticks
 from contactopt.scenes.contact import Contact

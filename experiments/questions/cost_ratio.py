@@ -13,7 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt import Scene, scenes, solve
-from contactopt.bodies.body import Assembly, build_body
+from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.body import build_body
 from contactopt.bodies.solvers import make_solver
 from contactopt.bodies.solvers.system import System
 from contactopt.coupling.reduction import reduce_bodies

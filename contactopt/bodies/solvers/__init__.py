@@ -1,5 +1,4 @@
-"""The linear system A x = b of one elastic body: sparse factors or multigrid, behind one protocol
-(BodySolver).
+"""The linear system A x = b of one elastic body: sparse factors or multigrid, each a BodySolver.
 
 A solver is a class in a module of its own and a line of SOLVERS. It is made from a
 contactopt.bodies.solvers.system.System.
@@ -16,41 +15,25 @@ from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 
 # name -> (module, class, what it is)
+ROOM = "contactopt.bodies.solvers"
 SOLVERS = {
-    "superlu": (
-        "contactopt.bodies.solvers.superlu",
-        "SuperLUSolver",
-        "sparse factors of SciPy's SuperLU",
-    ),
-    "pardiso": (
-        "contactopt.bodies.solvers.pardiso",
-        "PardisoSolver",
-        "sparse factors of oneMKL PARDISO (pypardiso)",
-    ),
+    "superlu": (f"{ROOM}.superlu", "SuperLUSolver", "sparse factors of SciPy's SuperLU"),
+    "pardiso": (f"{ROOM}.pardiso", "PardisoSolver", "sparse factors of oneMKL PARDISO (pypardiso)"),
     "multigrid": (
-        "contactopt.bodies.solvers.multigrid",
+        f"{ROOM}.multigrid",
         "MultigridSolver",
         "conjugate gradients with a V-cycle of smoothed aggregation (pyamg)",
-    ),
-    "petsc": (
-        "contactopt.bodies.solvers.petsc",
-        "PetscSolver",
-        "conjugate gradients with PETSc's multigrid (petsc4py)",
     ),
 }
 
 
 def make_solver(name: str, system: System) -> BodySolver:
-    """Make the solver of a body's linear system.
+    """Make the solver of a body's linear system, with its factors or its multigrid levels.
 
     Parameters
     ----------
     name : A key of SOLVERS, or 'auto' for the cheapest one (see `choose`).
     system : The linear system of the body.
-
-    Returns
-    -------
-    The solver, with its factors or its multigrid levels made.
 
     Raises
     ------
@@ -59,28 +42,14 @@ def make_solver(name: str, system: System) -> BodySolver:
     n, dim = system.A.shape[0], len(system.points)
     kind = solver_type(name, n, dim)
     logging.getLogger(__name__).info("body of %d unknowns in %dD: solver %s", n, dim, kind.name)
-    made: BodySolver = kind(system)  # type: ignore[call-arg]
-    return made
+    return kind(system)
 
 
 def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
-    """Find the class of the solver that `make_solver` would make.
+    """The class of the solver that `make_solver` would make of n unknowns in `dim` dimensions.
 
-    Its attributes `iterative` and `releases_lock` are known before there is a matrix.
-
-    Parameters
-    ----------
-    name : A key of SOLVERS, or 'auto'.
-    n : Number of unknowns of the body.
-    dim : Number of its dimensions, 2 or 3.
-
-    Returns
-    -------
-    The class.
-
-    Raises
-    ------
-    InputError : For a name that is not in SOLVERS.
+    Its attributes `iterative` and `releases_lock` are known before there is a matrix. InputError
+    for a name that is not in SOLVERS.
     """
     if isinstance(name, str) and name == "auto":
         name = choose(n, dim, find_spec("pypardiso") is not None)
@@ -109,21 +78,11 @@ def factors_of(name: str, dim: int) -> str:
 
 
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
-    """Choose the cheapest solver of a body.
+    """Choose the cheapest solver, a name in SOLVERS, of a body of n unknowns in `dim` dimensions.
 
     Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2)
     and n^2 operations. The work and the memory of multigrid grow with n. The limits stand in
     contactopt.bodies.solvers.constants.
-
-    Parameters
-    ----------
-    n : Number of unknowns of the body.
-    dim : Number of its dimensions, 2 or 3.
-    pardiso : Whether PARDISO is installed.
-
-    Returns
-    -------
-    A name in SOLVERS.
     """
     if dim == 2 or n <= PARDISO_FROM:
         return "superlu"

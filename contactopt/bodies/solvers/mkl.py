@@ -10,16 +10,12 @@ from typing import Any
 
 @cache
 def library() -> Any | None:
-    """Load oneMKL, which pypardiso installs.
+    """oneMKL, which pypardiso installs, or None.
 
     pypardiso walks through all installed packages for this library whenever one of its solvers is
     made, which takes longer than many a factorisation. It does not where its variable
     PYPARDISO_MKL_RT names the library, so that this function sets the variable, unless the user
     has.
-
-    Returns
-    -------
-    The library, or None where pypardiso is not installed.
     """
     if "PYPARDISO_MKL_RT" not in os.environ:
         try:

@@ -25,34 +25,24 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from contactopt.bodies.motions import rigid_fields
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL
 from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
-from contactopt.bodies.solvers.system import (
-    Block,
-    Iteration,
-    System,
-    asked,
-    block_product,
-    inverse_block,
-)
+from contactopt.bodies.solvers.system import Block, BodySolver, Iteration, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.concurrency import Crew
-from contactopt.linear.operators import Product
 
 SINGLE = np.float32
 PIECES = 16  # in which the rows of a matrix are brought into blocks
 
 
-class MultigridSolver:
-    """Conjugate gradients preconditioned by a V-cycle (VCycle), which needs the package pyamg.
+class MultigridSolver(BodySolver):
+    """Conjugate gradients preconditioned by a V-cycle, which needs the package pyamg.
 
-    A solve ends where (r' B r)^1/2, r the residual and B the V-cycle, has fallen by `rtol`. This
-    estimates the error in the energy norm, relative to that of the solution. It raises BackendError
-    if it does not get there.
-
-    A      products with the (n, n) matrix in double precision
-    cycle  the VCycle
+    A solve ends as `conjugate_gradients` says; that estimates the error in the energy norm,
+    relative to that of the solution. A are products with the (n, n) matrix in double precision,
+    cycle is the VCycle.
     """
 
     name = "multigrid"
@@ -60,15 +50,11 @@ class MultigridSolver:
     releases_lock = True
 
     def __init__(self, system: System):
-        self.trailing, self.n = system.trailing, system.A.shape[0]
+        super().__init__(system)
         crew = Crew()
         block = isinstance(system.A, Block)
         self.A = BlockProduct(system.A, crew) if block else SparseProduct(system.A, crew)
         self.cycle = VCycle(*system[:4], crew)
-
-    @property
-    def complete(self) -> bool:
-        return self.trailing is not None
 
     @property
     def iteration(self) -> Iteration:
@@ -81,15 +67,6 @@ class MultigridSolver:
         for b, x in zip(load.reshape(self.n, -1).T, out.reshape(self.n, -1).T):
             x[:] = conjugate_gradients(self.A, self.cycle, b, rtol).x
         return out
-
-    def trailing_inverse(self) -> np.ndarray:
-        return inverse_block(self, asked(self.trailing), self.n)
-
-    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        return block_product(self, asked(self.trailing), self.n, load, rtol)
-
-    def restricted(self, at: np.ndarray) -> Product:
-        return lambda load, rtol: block_product(self, at, self.n, load, rtol)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +109,7 @@ class VCycle:
     levels    finest first;   coarsest  the inverse of the last level's matrix
 
     Arguments as in contactopt.bodies.solvers.system.System, and the threads that share large
-    products. Raises InputError if the package pyamg is missing.
+    products.
     """
 
     def __init__(
@@ -155,17 +132,10 @@ class VCycle:
             P, modes, points = _coarsen(blocks, modes, points)
             blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
-            P = _scaled(
-                P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse
-            ).tocsr()
-            self.levels.append(
-                Level(
-                    level,
-                    SINGLE(_largest_eigenvalue(level)),
-                    SparseProduct(P, crew),
-                    SparseProduct(P.T.tocsr(), crew),
-                )
-            )
+            back = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+            P = _scaled(P, back, coarse).tocsr()
+            products = SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
+            self.levels.append(Level(level, SINGLE(_largest_eigenvalue(level)), *products))
             scale = coarse
         dense = blocks.toarray() * scale * scale[:, None]
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
@@ -211,25 +181,10 @@ class Answer(NamedTuple):
 def conjugate_gradients(
     A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float
 ) -> Answer:
-    """Solve A x = load by conjugate gradients with a V-cycle B.
+    """Solve A x = load, load (n,) [force], by conjugate gradients with a V-cycle B.
 
-    It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`.
-
-    Parameters
-    ----------
-    A : Products with the matrix (n, n).
-    cycle : The V-cycle.
-    load : (n,) right-hand side [force].
-    rtol : Relative accuracy in the energy norm.
-
-    Returns
-    -------
-    The solution (n,) [length] and the number of iterations.
-
-    Raises
-    ------
-    BackendError : If it does not get there within MOST_ITERATIONS iterations, or r' B r is negative
-        or not a number.
+    It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`; BackendError if it does
+    not get there within MOST_ITERATIONS iterations, or if r' B r is negative or not a number.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -284,18 +239,11 @@ def _coarsen(
 
 
 def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
-    """Find neighbours in the graph of A at no more than NEAR times the distance of the nearest one.
+    """Pattern (k, k) of ones of the neighbours in the graph of A at no more than NEAR times the
+    distance of the nearest one, with each node as its own neighbour.
 
-    The nearest neighbour of either node counts, so that the pattern is symmetric.
-
-    Parameters
-    ----------
-    A : Matrix in blocks of the k nodes.
-    points : (dim, k) places of the nodes [length].
-
-    Returns
-    -------
-    (k, k) pattern of ones. Each node is its own neighbour.
+    The nearest neighbour of either node counts, so that the pattern is symmetric. A is in blocks of
+    the k nodes, which are at points (dim, k).
     """
     count = points.shape[1]
     row, column = np.repeat(np.arange(count), np.diff(A.indptr)), A.indices
@@ -307,30 +255,14 @@ def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """Write the translations and rotations of points as columns, which are the near-kernel of the
-    stiffness.
+    """The translations and rotations of points (dim, k) as columns, which are the near-kernel of
+    the stiffness: (k dim, 3) in 2D, (k dim, 6) in 3D, the unknowns of a point in consecutive rows.
 
     An axisymmetric body keeps the motions of its section: its hoop strain is small across a few
     elements.
-
-    Parameters
-    ----------
-    points : (dim, k) places [length]. Rotations are scaled by their extent.
-
-    Returns
-    -------
-    (k dim, 3) in 2D, (k dim, 6) in 3D. The unknowns of a point are consecutive rows.
     """
-    dim, k = points.shape
-    x = points - points.mean(axis=1, keepdims=True)
-    x = x / (np.abs(x).max(initial=0.0) or 1.0)
-    columns = [np.repeat(np.eye(dim)[:, [i]], k, axis=1) for i in range(dim)]
-    for i in range(dim):
-        for j in range(i):
-            turn = np.zeros((dim, k))
-            turn[i], turn[j] = x[j], -x[i]
-            columns.append(turn)
-    return np.stack([c.T.ravel() for c in columns], axis=1)
+    fields = rigid_fields(points)
+    return fields.swapaxes(0, 1).reshape(-1, fields.shape[2])
 
 
 def _largest_eigenvalue(A: SparseProduct) -> float:
@@ -346,20 +278,11 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """Write a matrix in blocks of nodes.
+    """A matrix in blocks of the k nodes present, (k dim, k dim), whose held unknowns are rows of
+    their own; the place (n,) of each unknown of A in it; and the nodes present (k,).
 
-    Its rows are made some at a time, for the copies take more than the result.
-
-    Parameters
-    ----------
-    A : (n, n) sparse matrix, or a block of one.
-    node, component : (n,) node and component of each unknown.
-    dim : Number of components of a node.
-
-    Returns
-    -------
-    The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the
-    place (n,) of each unknown of A in it; and the nodes present (k,).
+    A, node and component are as in contactopt.bodies.solvers.system.System, dim is the number of
+    components. The rows are made some at a time, for the copies take more than the result.
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim
@@ -374,23 +297,18 @@ def nodal_blocks(
             (chosen.data, place[chosen.indices], chosen.indptr), (stop - first, size)
         )
         pieces.append((wide + own_rows[first:stop]).tobsr((dim, dim)))
-    indptr = np.concatenate(
-        [[0], np.cumsum(np.concatenate([np.diff(piece.indptr) for piece in pieces]))]
-    )
+    counts = np.concatenate([[0], *(np.diff(piece.indptr) for piece in pieces)])
+    indptr = np.cumsum(counts).astype(np.int32)
     indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
     data = np.concatenate([piece.data for piece in pieces])
-    return sp.bsr_matrix((data, indices, indptr.astype(np.int32)), (size, size)), place, present
+    return sp.bsr_matrix((data, indices, indptr), (size, size)), place, present
 
 
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """diagonal^-1/2; 0 for the motions that an aggregate of too few nodes does not have."""
     there = diagonal > 1e-10 * diagonal.max()
-    return np.divide(
-        1.0,
-        np.sqrt(diagonal, where=there, out=np.ones_like(diagonal)),
-        where=there,
-        out=0 * diagonal,
-    )
+    root = np.sqrt(diagonal, where=there, out=np.ones_like(diagonal))
+    return np.where(there, 1.0 / root, 0.0)
 
 
 def _scaled(A: sp.bsr_matrix, rows: np.ndarray, columns: np.ndarray) -> sp.bsr_matrix:

@@ -27,20 +27,12 @@ def elimination_order(
     trailing: np.ndarray,
     by_degree: bool | None = None,
 ) -> np.ndarray:
-    """Order of elimination with few entries in the factors and some unknowns at the end.
+    """Permutation (n,) of the unknowns with few entries in the factors and `trailing` (m,) at the
+    end, in its own order. The unknowns of a node follow each other.
 
-    Parameters
-    ----------
-    A : (n, n) symmetric sparse matrix, of which only the pattern counts
-    node, component : (n,) mesh node of each unknown, and its component of the displacement
-    points : (dim, nodes) coordinates of the mesh nodes [length]
-    trailing : (m,) unknowns to be eliminated last; may be empty
-    by_degree : minimum degree rather than nested dissection; None: in the plane
-
-    Returns
-    -------
-    (n,) permutation of the unknowns. The unknowns of a node follow each other. `trailing` is at the
-    end, in its own order.
+    Of A only the pattern counts; node, component and points are as in
+    contactopt.bodies.solvers.system.System. by_degree says whether the order is by minimum degree
+    rather than nested dissection; None: in the plane.
     """
     present, own = np.unique(node, return_inverse=True)
     graph = _node_graph(A, own, len(present))
@@ -61,43 +53,25 @@ def elimination_order(
 
 
 def minimum_degree(graph: sp.csr_matrix) -> np.ndarray:
-    """Order that eliminates a node with the fewest neighbours at each step.
+    """Permutation (n,) that eliminates a node with the fewest neighbours at each step; of the graph
+    (n, n) the symmetric pattern counts.
 
     SciPy hands out SuperLU's order only together with factors. The incomplete factors of a matrix
     that is nearly the identity cost next to nothing.
-
-    Parameters
-    ----------
-    graph : (n, n) sparse matrix with the symmetric pattern of the graph
-
-    Returns
-    -------
-    (n,) permutation of the nodes.
     """
     nearly = sp.csc_matrix((np.full(graph.nnz, 1e-9), graph.indices, graph.indptr), graph.shape)
     nearly = (nearly + sp.eye(graph.shape[0], format="csc")).tocsc()
-    settings = {
-        "drop_tol": 1.0,
-        "fill_factor": 1.0,
-        "diag_pivot_thresh": 0.0,
-        "options": {"SymmetricMode": True},
-    }
-    return np.argsort(spilu(nearly, permc_spec="MMD_AT_PLUS_A", **settings).perm_c)
+    cheap = {"drop_tol": 1.0, "fill_factor": 1.0, "diag_pivot_thresh": 0.0}
+    made = spilu(nearly, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, **cheap)
+    return np.argsort(made.perm_c)
 
 
 def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
-    """Order that eliminates both halves of a mesh before the nodes that separate them, and each
-    half likewise.
+    """Permutation (n,) that eliminates both halves of a mesh before the nodes that separate them,
+    and each half likewise.
 
-    Parameters
-    ----------
-    graph : (n, n) sparse matrix with the symmetric pattern of the graph
-    points : (dim, n) coordinates of the nodes; of the median planes across the axes the one with
-        the fewest separating nodes cuts the mesh
-
-    Returns
-    -------
-    (n,) permutation of the nodes.
+    Of the median planes across the axes the one with the fewest separating nodes cuts the nodes at
+    points (dim, n), whose graph (n, n) is a symmetric pattern.
     """
     graph = sp.csr_matrix((np.ones(graph.nnz, np.int8), graph.indices, graph.indptr), graph.shape)
     order = np.empty(graph.shape[0], dtype=np.intp)

@@ -1,9 +1,10 @@
 """Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by
 SciPy elsewhere.
 
-One oneMKL product of single precision is faster than one of SciPy (`python -m
+One oneMKL product of single precision takes half the time of one of SciPy (`python -m
 experiments.questions.solver_constants`). Neither holds Python's lock, so that the pieces of one
-product can be made in several threads.
+product can be made in several threads. The package sparse_dot_mkl calls the same functions, but
+makes a handle for each product, which doubles the time of small ones; numba is no faster.
 """
 
 from __future__ import annotations
@@ -35,12 +36,10 @@ class _Description(ctypes.Structure):
 
 class SparseProduct:
     """x -> A @ x for a matrix (n, k) in CSR or in BSR with square blocks, of single or double
-    precision.
+    precision, which is not copied and must not change.
 
     Where a crew of several threads is given, a large matrix is cut into pieces of rows with about
     as many entries, which they multiply at the same time. The result is the same to the last digit.
-
-    matrix  A in SciPy's form; it is not copied and must not change
     """
 
     def __init__(self, matrix: sp.csr_matrix | sp.bsr_matrix, crew: Crew | None = None):
@@ -94,32 +93,16 @@ class _Piece:
         letter, number = _kind(self.matrix)
         multiply = getattr(self._mkl, f"mkl_sparse_{letter}_mv")
         before = self._mkl.MKL_Set_Num_Threads_Local(1)
-        failed = multiply(
-            _PLAIN,
-            number(1.0),
-            self._handle,
-            _Description(_GENERAL, 0, 0),
-            _at(x),
-            number(0.0),
-            _at(y),
-        )
+        plain = _PLAIN, number(1.0), self._handle, _Description(_GENERAL, 0, 0)
+        failed = multiply(*plain, _at(x), number(0.0), _at(y))
         self._mkl.MKL_Set_Num_Threads_Local(before)
         return int(failed)
 
 
 def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
-    """Compute P' A P from pieces of rows of A, each in a thread of its own: A P is never there as a
-    whole.
-
-    Parameters
-    ----------
-    P : (n, m) prolongation in blocks.
-    A : (n, n) matrix in blocks.
-    crew : The threads.
-
-    Returns
-    -------
-    (m, m), the same whatever thread is done first.
+    """P' A P (m, m) of a prolongation P (n, m) and A, both in blocks, from pieces of rows of A,
+    each in a thread of its own: A P is never there as a whole. It is the same whatever thread is
+    done first.
     """
     height = P.blocksize[0]
     found: dict[int, sp.bsr_matrix] = {}
@@ -153,12 +136,9 @@ def _rows(A: sp.csr_matrix | sp.bsr_matrix, first: int, stop: int) -> sp.csr_mat
     if (first, stop) == (0, len(A.indptr) - 1):
         return A
     entries = slice(int(A.indptr[first]), int(A.indptr[stop]))
-    size = A.blocksize if A.format == "bsr" else (1, 1)
-    part = type(A)(
-        ((stop - first) * size[0], A.shape[1]),
-        **({"blocksize": size} if A.format == "bsr" else {}),
-        dtype=A.dtype,
-    )
+    size = {"blocksize": A.blocksize} if A.format == "bsr" else {}
+    height = A.blocksize[0] if size else 1
+    part = type(A)(((stop - first) * height, A.shape[1]), **size, dtype=A.dtype)
     # Given to the constructor, parts of arrays would be copied.
     part.data, part.indices = A.data[entries], A.indices[entries]
     part.indptr = A.indptr[first : stop + 1] - A.indptr[first]
@@ -185,14 +165,9 @@ def _handle(mkl: Any, A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | Non
     handle = ctypes.c_void_p()
     letter, _ = _kind(A)
     arrays = _at(A.indptr), _at(A.indptr[1:]), _at(A.indices), _at(A.data)
-    if A.format == "csr":
-        failed = getattr(mkl, f"mkl_sparse_{letter}_create_csr")(
-            ctypes.byref(handle), 0, *A.shape, *arrays
-        )
-    else:
+    shape = A.shape
+    if A.format == "bsr":
         size = A.blocksize[0]
-        shape = (A.shape[0] // size, A.shape[1] // size, size)
-        failed = getattr(mkl, f"mkl_sparse_{letter}_create_bsr")(
-            ctypes.byref(handle), 0, _ROWS, *shape, *arrays
-        )
-    return None if failed else handle
+        shape = (_ROWS, A.shape[0] // size, A.shape[1] // size, size)
+    create = getattr(mkl, f"mkl_sparse_{letter}_create_{A.format}")
+    return None if create(ctypes.byref(handle), 0, *shape, *arrays) else handle

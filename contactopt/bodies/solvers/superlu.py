@@ -14,14 +14,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from contactopt.bodies.solvers.ordering import elimination_order
-from contactopt.bodies.solvers.system import (
-    System,
-    asked,
-    block_product,
-    inverse_block,
-    triangle_inverse,
-    triangle_product,
-)
+from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.linear.operators import Product
 
 
@@ -41,16 +34,13 @@ class FactorThread:
         weakref.finalize(self, start_new_thread, _free, (self._executor, self._held)).atexit = False
 
     def factorise(self, A: sp.csc_matrix) -> int:
-        """Factorise A without a change of order and return the number under which [] finds the
-        factors.
-        """
+        """Factorise A in its own order and return the number under which [] finds the factors."""
         self._held.append(self._executor.submit(factorise, A).result())
         return len(self._held) - 1
 
     def __getitem__(self, number: int) -> Any:
-        """SciPy's SuperLU object.
-
-        Whoever keeps it longer than this thread keeps its memory for good.
+        """SciPy's SuperLU object; whoever keeps it longer than this thread keeps its memory for
+        good.
         """
         return self._held[number]
 
@@ -62,21 +52,10 @@ def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
 
 
 def factorise(A: sp.csc_matrix) -> Any:
-    """Factorise a symmetric positive definite matrix by SuperLU, eliminated in its own order,
-    without pivoting.
+    """Factors of a symmetric positive definite matrix, eliminated in its own order without
+    pivoting.
 
-    Parameters
-    ----------
-    A : (n, n) matrix in compressed columns.
-
-    Returns
-    -------
-    The factors, an object of SciPy.
-
-    Raises
-    ------
-    MemoryError : If the factors do not fit, with a sentence.
-    RuntimeError : If A is singular.
+    MemoryError, with a sentence, if they do not fit; RuntimeError if A is singular.
     """
     try:
         return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -89,26 +68,20 @@ def factorise(A: sp.csc_matrix) -> Any:
         ) from error
 
 
-class SuperLUSolver:
+class SuperLUSolver(BodySolver):
     """Factors L U = L D L' of A, with `trailing` eliminated last: their last rows and columns give
     its Schur complement.
     """
 
     name = "superlu"
-    iterative = False
-    iteration = None
-    releases_lock = False
 
     def __init__(self, system: System):
-        self.trailing, self._plane = system.trailing, len(system.points) == 2
+        super().__init__(system)
+        self._plane = len(system.points) == 2
         trailing = np.zeros(0, int) if system.trailing is None else system.trailing
         self._order = elimination_order(*system[:4], trailing)
         self._thread = FactorThread()
         self._thread.factorise(system.A[self._order][:, self._order].tocsc())
-
-    @property
-    def complete(self) -> bool:
-        return self.trailing is not None
 
     @property
     def factors(self) -> Any:
@@ -123,15 +96,11 @@ class SuperLUSolver:
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
-        complement in these places.
-
-        None where SuperLU changed the order for its pivots, and where rounding left some that are
-        not positive.
+        """None where SuperLU changed the order for its pivots, and where rounding left some that
+        are not positive.
         """
-        factors, m = self.factors, len(asked(self.trailing))
-        n = factors.shape[0]
-        head = n - m
+        factors, n = self.factors, self.n
+        head = n - len(self._asked())
         symmetric = np.array_equal(factors.perm_c, factors.perm_r)
         if not symmetric or not np.array_equal(np.sort(factors.perm_c[head:]), np.arange(head, n)):
             return None
@@ -141,29 +110,18 @@ class SuperLUSolver:
         # L U = L D L' with D > 0 the pivots
         return L * np.sqrt(pivots), factors.perm_c[head:] - head
 
-    def trailing_inverse(self) -> np.ndarray:
-        if self.trailing_triangle is None:
-            return inverse_block(self, asked(self.trailing), len(self._order))
-        return triangle_inverse(*self.trailing_triangle)
-
-    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        """Two triangular solves with the trailing triangle: nothing of the interior is touched."""
-        if self.trailing_triangle is None:
-            return block_product(self, asked(self.trailing), len(self._order), load, rtol)
-        return triangle_product(*self.trailing_triangle, load)
-
     def restricted(self, at: np.ndarray) -> Product:
-        """Products that use only the rows and columns of L and D that a load on `at` reaches.
+        """Products that use only the rows and columns of L and D that a load on `at` reaches: the
+        unknowns of `at` and their ancestors in the elimination tree.
 
-        These are the unknowns of `at` and their ancestors in the elimination tree. In the plane
-        they are few. In space they hold most of the entries of L, and a copy of them costs more
-        than it saves, so that whole solves are used.
+        In the plane they are few. In space they hold most of the entries of L, and a copy of them
+        costs more than it saves, so that whole solves are used.
         """
-        factors, n = self.factors, len(self._order)
+        factors = self.factors
         if not self._plane or not np.array_equal(factors.perm_c, factors.perm_r):
-            return lambda load, rtol: block_product(self, at, n, load, rtol)
-        place = np.empty(n, int)
-        place[self._order] = np.arange(n)
+            return super().restricted(at)
+        place = np.empty(self.n, int)
+        place[self._order] = np.arange(self.n)
         first, L = factors.perm_c[place[at]], factors.L
         reached = _ancestors(L, first)
         inside, pivots = np.searchsorted(reached, first), factors.U.diagonal()[reached]

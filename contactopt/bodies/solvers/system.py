@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
@@ -12,6 +13,8 @@ import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.linear.operators import Product
+
+COLUMNS = 64  # unit loads that are solved for at a time, which bounds the memory that they take
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +39,7 @@ class Block:
 
 
 class System(NamedTuple):
-    """What the solvers of one body are made from.
-
-    The matrix is not copied and must not change afterwards.
+    """What the solvers of one body are made from; the matrix must not change afterwards.
 
     A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite
                [force / length]; a Block is for iterative solvers, which then share the entries with
@@ -66,50 +67,92 @@ class Iteration(NamedTuple):
     cycle: Callable[[np.ndarray], np.ndarray]
 
 
-class BodySolver(Protocol):
+class BodySolver(ABC):
     """Solves A x = b. Several solvers may work at the same time in different threads.
+
+    A solver needs a name and `solve`; all else is made from these, and may be done with less work.
 
     name           its name in contactopt.bodies.solvers.SOLVERS, for messages and records only
     iterative      whether a lower accuracy costs less; the others ignore `rtol` and solve to
                    rounding
     releases_lock  whether a solve leaves Python's lock to other threads, so that two solvers at
                    once are faster than one after the other
-    complete       whether the block of the inverse on System.trailing was provided for
-    iteration      what it repeats, for those who iterate on several bodies at once; None for a
-                   solver with factors
+    trailing, n    the unknowns System.trailing, and the number of all unknowns
     """
 
     name: str
-    iterative: bool
-    releases_lock: bool
+    iterative = False
+    releases_lock = False
 
-    @property
-    def complete(self) -> bool: ...
+    def __init__(self, system: System):
+        self.trailing, self.n = system.trailing, system.A.shape[0]
 
-    @property
-    def iteration(self) -> Iteration | None: ...
-
+    @abstractmethod
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        """Solution of A x = load.
+        """Solve A x = load.
 
         Parameters
         ----------
-        load : (n,) or (n, j) forces
-        rtol : error in the energy norm, relative to that of the solution, at which an iterative
-            solver may stop; None stands for contactopt.bodies.solvers.constants.RTOL
+        load : (n,) or (n, j) forces.
+        rtol : Error in the energy norm, relative to that of the solution, at which an iterative
+            solver may stop; None stands for contactopt.bodies.solvers.constants.RTOL.
 
         Returns
         -------
         Displacements of the shape of `load`.
         """
 
-    def trailing_inverse(self) -> np.ndarray:
-        """(m, m) symmetric block of the inverse of A on the unknowns `trailing`; InputError if it
-        is not complete.
+    @property
+    def iteration(self) -> Iteration | None:
+        """What it repeats, for those who iterate on several bodies at once; None for factors."""
+        return None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the block of the inverse on the unknowns `trailing` was provided for."""
+        return self.trailing is not None
+
+    @property
+    def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
+        complement of the others in these places. None where there is none without a solve.
         """
+        return None
+
+    def _asked(self) -> np.ndarray:
+        if self.trailing is None:
+            raise InputError(
+                "no unknowns were named whose block of the inverse is asked for; give `trailing`."
+            )
+        return self.trailing
+
+    def trailing_inverse(self) -> np.ndarray:
+        """(m, m) block of the inverse of A on the unknowns `trailing`, symmetric to the last digit
+        [length / force]; InputError if it is not complete.
+        """
+        at, triangle = self._asked(), self.trailing_triangle
+        if triangle is not None:
+            R, place = triangle
+            X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
+            C = X.T @ X  # NumPy keeps it symmetric
+            return np.asarray(C[np.ix_(place, place)])
+        C = np.empty((len(at), len(at)))
+        for start in range(0, len(at), COLUMNS):
+            chosen = at[start : start + COLUMNS]
+            unit = np.zeros((self.n, len(chosen)))
+            unit[chosen, np.arange(len(chosen))] = 1.0
+            C[:, start : start + COLUMNS] = self.solve(unit)[at]
+        return np.asarray((C + C.T) / 2)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """That block times `load`, which is (m,) or (m, j)."""
+        at, triangle = self._asked(), self.trailing_triangle
+        if triangle is None:
+            return BodySolver.restricted(self, at)(load, rtol)
+        R, place = triangle
+        x = np.empty(load.shape)
+        x[place] = load
+        return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
     def restricted(self, at: np.ndarray) -> Product:
         """Prepare products with the block of the inverse of A on some unknowns.
@@ -123,103 +166,9 @@ class BodySolver(Protocol):
         A function (load, rtol) of loads (m,) or (m, j) to the product of that shape.
         """
 
+        def product(load: np.ndarray, rtol: float | None) -> np.ndarray:
+            full = np.zeros((self.n, *load.shape[1:]))
+            full[at] = load
+            return np.asarray(self.solve(full, rtol)[at])
 
-def asked(trailing: np.ndarray | None) -> np.ndarray:
-    """Check that unknowns were named whose block of the inverse is asked for.
-
-    Parameters
-    ----------
-    trailing : (m,) unknowns, or None.
-
-    Returns
-    -------
-    The unknowns.
-
-    Raises
-    ------
-    InputError : If there are none.
-    """
-    if trailing is None:
-        raise InputError(
-            "no unknowns were named whose block of the inverse is asked for; give `trailing`."
-        )
-    return trailing
-
-
-def triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Invert R R' from its triangular factor, in another order of the unknowns.
-
-    Parameters
-    ----------
-    R : (m, m) lower triangular factor.
-    place : (m,) a permutation: row and column place[i] of the inverse become row and column i.
-
-    Returns
-    -------
-    (m, m) inverse, symmetric to the last digit.
-    """
-    X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
-    C = X.T @ X  # NumPy keeps it symmetric
-    return np.asarray(C[np.ix_(place, place)])
-
-
-def triangle_product(R: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Multiply with the matrix of `triangle_inverse`, by two substitutions.
-
-    Parameters
-    ----------
-    R, place : As for `triangle_inverse`.
-    load : (m,) or (m, j).
-
-    Returns
-    -------
-    The product, of the shape of `load`.
-    """
-    x = np.empty(load.shape)
-    x[place] = load
-    return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
-
-
-def inverse_block(solver: Any, at: np.ndarray, n: int, columns: int = 64) -> np.ndarray:
-    """Compute a block of the inverse by solves with unit loads, some columns at a time.
-
-    Parameters
-    ----------
-    solver : A BodySolver of n unknowns.
-    at : (m,) the unknowns of the block.
-    n : Number of unknowns.
-    columns : How many loads are solved for at a time.
-
-    Returns
-    -------
-    (m, m) block, symmetric to the last digit [length / force].
-    """
-    C = np.empty((len(at), len(at)))
-    for start in range(0, len(at), columns):
-        chosen = at[start : start + columns]
-        unit = np.zeros((n, len(chosen)))
-        unit[chosen, np.arange(len(chosen))] = 1.0
-        C[:, start : start + columns] = solver.solve(unit)[at]
-    return np.asarray((C + C.T) / 2)
-
-
-def block_product(
-    solver: Any, at: np.ndarray, n: int, load: np.ndarray, rtol: float | None
-) -> np.ndarray:
-    """Multiply with a block of the inverse, by one solve.
-
-    Parameters
-    ----------
-    solver : A BodySolver of n unknowns.
-    at : (m,) the unknowns of the block.
-    n : Number of unknowns.
-    load : (m,) or (m, j) [force].
-    rtol : Relative accuracy that is asked of an iterative solver; None: its own.
-
-    Returns
-    -------
-    The product, of the shape of `load` [length].
-    """
-    full = np.zeros((n, *load.shape[1:]))
-    full[at] = load
-    return np.asarray(solver.solve(full, rtol)[at])
+        return product

@@ -1,0 +1,192 @@
+"""A body before its linear system is made solvable: its contact surfaces, its size, its guides."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.protocol import Body
+from contactopt.errors import InputError
+
+if TYPE_CHECKING:
+    from contactopt.problem.chart import Chart
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The finite elements behind a contact surface, for couplings that integrate over it.
+
+    kind       name of the reference element, a key of contactopt.bodies.elements.FACES;  degree  of
+               the displacement, 1 or 2
+    faces      (f, j) nodes of the faces that make up the surface: corners in cyclic order, then
+               those on edges, then the centre
+    outward    (dim, f) their mean outward normals
+    measure    factor of all integrals (thickness, mirror images), and whether they also carry the
+               radius r
+    locations  (dim, nodes) positions of the nodes [length];  unknowns (dim, nodes) their
+               displacement unknowns
+    held       (n,) mask of the unknowns that are not free
+    curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the
+               mesh stands for; None: the facets are this surface
+    """
+
+    kind: str
+    degree: int
+    faces: np.ndarray
+    outward: np.ndarray
+    measure: tuple[float, bool]
+    locations: np.ndarray
+    unknowns: np.ndarray
+    held: np.ndarray
+    curve: Callable[[np.ndarray], np.ndarray] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A candidate contact surface of one body: k contacts and m nodes.
+
+    The contacts are the points that may carry a contact force. The nodes are those whose
+    displacements move them. Both are the same for linear elements; quadratic triangles and
+    tetrahedra have more nodes.
+
+    body      name of the body, for messages
+    points    (dim, k) positions of the contacts on the mesh [length]
+    normals   (dim, k) outward unit normals
+    areas     (k,) nodal areas [length^2]
+    weights   (k, m) displacement of the contacts in terms of the displacements of the nodes
+    places    (dim, m) positions of the nodes on the surface that the mesh stands for: the initial
+              gap comes from these
+    traces    for each of the dim components the sparse matrix (k, n) that takes the body's unknowns
+              to the displacement of its contacts in that component
+    held      (dim, k) whether that component of the contact's displacement is prescribed
+    cells     (v, c) contacts at the corners of the c linear cells that cover the surface
+    mesh      the finite elements behind it; None for a body that has none
+    chart     places of the contacts on the surface, where the body knows them and its normals are
+              all the same
+    """
+
+    body: str
+    points: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+    weights: sp.csr_matrix
+    places: np.ndarray
+    traces: tuple[sp.csr_matrix, ...]
+    held: np.ndarray
+    cells: np.ndarray
+    mesh: Mesh | None = None
+    chart: Chart | None = None
+
+
+class Guides(NamedTuple):
+    """Where a body is, and which planes guide it.
+
+    extent  (dim, 2) least and largest coordinates [length]; (dim, 0) for a body without nodes
+    planes  axis, place [length] and the side (1 or -1) on which the body lies, of each plane across
+            a coordinate axis on which a support holds the displacement along this axis alone, at
+            zero
+    """
+
+    extent: np.ndarray
+    planes: tuple[tuple[int, float, float], ...] = ()
+
+
+class AssembledBody(ABC):
+    """A body whose surface and size are known, before its linear system is made solvable.
+
+    name                its name in the scene
+    unknowns            number of its free displacement unknowns
+    interface_unknowns  number of those on its contact surface
+    meshed              whether it has contacts of its own; if not, it follows the contacts of the
+                        other body
+    """
+
+    if TYPE_CHECKING:  # for classes whose fields they are, and for those that compute them
+
+        @property
+        def name(self) -> str: ...
+
+        @property
+        def unknowns(self) -> int: ...
+
+        @property
+        def interface_unknowns(self) -> int: ...
+
+        @property
+        def meshed(self) -> bool: ...
+
+    else:
+        meshed = True
+
+    @abstractmethod
+    def surface(self, name: str | None = None) -> Surface:
+        """Find a contact surface of the body.
+
+        Parameters
+        ----------
+        name : The name of a boundary; by default the one that its part of the scene names.
+
+        Returns
+        -------
+        The surface with its contacts.
+
+        Raises
+        ------
+        InputError : If there is no such surface.
+        """
+
+    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
+        """Make the surface of a body without a mesh at the contacts of another body.
+
+        Parameters
+        ----------
+        other : The surface of the other body, with k contacts.
+        normals : (dim, k) contact normals that the other body suggests.
+
+        Returns
+        -------
+        The surface, which holds the contact normals to be used (they may be the body's own), and
+        the initial gap (k,) [length].
+        """
+        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
+
+    @abstractmethod
+    def guides(self) -> Guides:
+        """Find where the body is and which planes guide it.
+
+        Returns
+        -------
+        Its extent, and planes that may be planes of symmetry.
+        """
+
+    def iterates(self, solver: str) -> bool:
+        """Say whether a solver of linear systems works by iteration on this body.
+
+        Parameters
+        ----------
+        solver : A name in contactopt.bodies.solvers.SOLVERS, or 'auto'.
+
+        Returns
+        -------
+        True for multigrid, False for factors.
+        """
+        return False
+
+    @abstractmethod
+    def prepare(self, solver: str, entries: bool) -> Body:
+        """Make the linear system of the body solvable.
+
+        Parameters
+        ----------
+        solver : A name in contactopt.bodies.solvers.SOLVERS, or 'auto'.
+        entries : Whether the entries of the compliance shall be cheap.
+
+        Returns
+        -------
+        The body, which moves under contact forces.
+        """

@@ -1,0 +1,138 @@
+"""An elastic body whose surfaces are known, before it is condensed (contactopt.bodies.elastic)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface
+from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.body import build_body
+from contactopt.bodies.elastic import ElasticBody, condense
+from contactopt.bodies.elements import face_nodes
+from contactopt.bodies.solvers import solver_type
+from contactopt.errors import InputError
+from contactopt.meshes.given_curves import check_curve
+from contactopt.scenes.scene import Part, Scene
+
+PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledElastic(AssembledBody):
+    """An Assembly with its part of the scene."""
+
+    body: Assembly
+    part: Part
+
+    @cached_property
+    def name(self) -> str:
+        return self.body.name
+
+    @cached_property
+    def unknowns(self) -> int:
+        return len(self.body.free)
+
+    @cached_property
+    def interface_unknowns(self) -> int:
+        return self.body.contact_dofs.size
+
+    def iterates(self, solver: str) -> bool:
+        return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
+
+    def surface(self, name: str | None = None) -> Surface:
+        """The contact surface, with the places of its nodes on the curve that the part gives."""
+        name = name or self.part.contact
+        if name not in self.body.traces:
+            raise InputError(
+                f"body '{self.name}' has no contact surface {name!r}; it has"
+                f" {', '.join(sorted(self.body.traces))}."
+            )
+        return self._surfaces[name]
+
+    @cached_property
+    def _surfaces(self) -> dict[str, Surface]:
+        """All of them, made once: a surface may take part in several pairs."""
+        return {name: self._surface(name) for name in self.body.traces}
+
+    def _surface(self, name: str) -> Surface:
+        body = self.body
+        trace, unknowns = body.traces[name], body.unknowns
+        nodes = np.unique(trace.weights.indices)
+        places = body.locations[:, nodes]
+        curve = self.part.curve_of(name)
+        if curve is not None:
+            check_curve(curve, body.basis.mesh, name)
+            places = curve(places)
+        held = np.ones(len(body.load), dtype=bool)
+        held[body.free] = False
+        kind, facets = body.basis.mesh.refdom.__name__, np.asarray(body.basis.mesh.boundaries[name])
+        faces, outward = face_nodes(body.basis, body.degree, facets)
+        where = body.locations, unknowns, held
+        mesh = Mesh(kind, body.degree, faces, outward, body.weight, *where, curve)
+        return Surface(
+            body.name,
+            body.locations[:, trace.nodes],
+            trace.normals,
+            trace.areas,
+            trace.weights[:, nodes],
+            places,
+            tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
+            held[unknowns[:, trace.nodes]],
+            trace.cells,
+            mesh,
+        )
+
+    def guides(self) -> Guides:
+        """The planes lie across a coordinate axis and have the whole body on one side; supports
+        hold it along this axis alone, at zero.
+        """
+        body, mesh = self.body, self.body.basis.mesh
+        x = body.locations
+        extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
+        near = PLANE * float(np.ptp(extent, axis=1).max())
+        planes = []
+        names = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[body.kind]
+        for support in self.part.supports:
+            given = support.displacement or {}
+            if list(given.values()) != [0.0]:
+                continue
+            axis = names.index(next(iter(given)))
+            nodes = mesh.facets[:, np.asarray(mesh.boundaries[support.boundary])]
+            low, high = extent[axis]
+            for place, sign in ((low, 1.0), (high, -1.0)):
+                if np.all(np.abs(mesh.p[axis, nodes] - place) <= near):
+                    planes.append((axis, float(place), sign))
+        return Guides(extent, tuple(planes))
+
+    def prepare(self, solver: str, entries: bool) -> ElasticBody:
+        return condense(self.body, solver, entries)
+
+
+def _trace(
+    weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
+) -> sp.csr_matrix:
+    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,).
+
+    In general the neighbours of a contact node take part, by its row of the weights. Where the
+    component is prescribed at the contact node itself, as on a plane of symmetry, its displacement
+    is that of the node alone: the weights of a neighbour and of its mirror image, which the model
+    leaves out, cancel each other there.
+    """
+    k = len(nodes)
+    alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
+    prescribed = sp.diags(held[unknowns[nodes]].astype(float))
+    part = sp.coo_matrix(weights - prescribed @ (weights - alone))
+    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k, len(held)))
+    trace.eliminate_zeros()
+    return trace
+
+
+def assemble_elastic(
+    scene: Scene, part: Part, elements: int, zone: float | None
+) -> AssembledElastic:
+    """The body of an elastic part, as contactopt.bodies.assemble says."""
+    return AssembledElastic(build_body(scene, part, elements, zone), part)

@@ -1,0 +1,143 @@
+"""One elastic body as matrices: stiffness, loads, held and driven unknowns, contact nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+
+from contactopt.bodies.elements import Trace, Weight, node_unknowns
+from contactopt.bodies.motions import Motions
+from contactopt.bodies.stiffness import isotropic_stiffness
+from contactopt.linear.saddle_point import LocalTerm
+from contactopt.material import Material, lame_by_poisson
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """A discretised Part with n displacement unknowns, of which those in `free` are not prescribed.
+
+    A              (n, n) sparse stiffness; singular on the free unknowns if there are free motions
+    load           (n,) nodal forces of tractions and body forces
+    prescribed     (n,) prescribed displacements of the supports, 0 elsewhere
+    motion         (n, p) unit motions of the p plate components that may move, zero on free
+                   unknowns
+    plate_forces   (p,) total forces on them;   driven  what each column of `motion` is
+    traces         name of each candidate contact boundary -> trace of the displacement there
+    rigid_motions  rigid motions that no support and no plate holds
+    holders        name of each support and plate -> the unknowns that it holds or drives, each
+                   unknown with one of them
+    mirrored       (dim, n / dim) nodes in planes across an axis beyond which the body goes on as
+                   its mirror image
+    """
+
+    name: str
+    kind: str
+    material: Material
+    basis: skfem.CellBasis
+    weight: Weight
+    A: sp.csr_matrix
+    load: np.ndarray
+    prescribed: np.ndarray
+    free: np.ndarray
+    motion: np.ndarray
+    plate_forces: np.ndarray
+    traces: Mapping[str, Trace]
+    rigid_motions: Motions
+    driven: tuple[str, ...]
+    holders: Mapping[str, np.ndarray]
+    mirrored: np.ndarray
+
+    @property
+    def trace(self) -> Trace:
+        """That of the first contact boundary, which in a scene of two bodies is the only one."""
+        return next(iter(self.traces.values()))
+
+    @property
+    def nodes(self) -> np.ndarray:
+        return self.trace.nodes
+
+    @property
+    def areas(self) -> np.ndarray:
+        return self.trace.areas
+
+    @property
+    def normals(self) -> np.ndarray:
+        return self.trace.normals
+
+    @property
+    def weights(self) -> sp.csr_matrix:
+        return self.trace.weights
+
+    @property
+    def degree(self) -> int:
+        """Of the displacement in every element, 1 or 2."""
+        return 1 if self.unknowns.shape[1] == self.basis.mesh.nvertices else 2
+
+    @cached_property
+    def unknowns(self) -> np.ndarray:
+        """Displacement unknowns of every node, (dim, n / dim); the mesh's vertices come first."""
+        return node_unknowns(self.basis)
+
+    @cached_property
+    def by_poisson(self) -> sp.csr_matrix:
+        """(n, n) derivative of the stiffness A by Poisson's ratio."""
+        return isotropic_stiffness(self.basis, lame_by_poisson(self.material), self.weight)
+
+    def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
+        """The derivative (n,) of the elastic forces by the material's constant 'E' or 'nu' at fixed
+        U.
+        """
+        return np.asarray(self.A @ U / self.material.E if constant == "E" else self.by_poisson @ U)
+
+    @property
+    def locations(self) -> np.ndarray:
+        """Coordinates of every node, (dim, n / dim)."""
+        return np.asarray(self.basis.doflocs[:, self.unknowns[0]])
+
+    @property
+    def points(self) -> np.ndarray:
+        """Coordinates of the contact nodes, (dim, k)."""
+        return self.locations[:, self.nodes]
+
+    @cached_property
+    def surface_nodes(self) -> np.ndarray:
+        """All nodes of the contact boundaries, (m,)."""
+        return np.unique(np.concatenate([trace.weights.indices for trace in self.traces.values()]))
+
+    @property
+    def contact_dofs(self) -> np.ndarray:
+        """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
+        return np.asarray(self.unknowns[:, self.surface_nodes].T)
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The linear system of a body that is solved by iteration, by what each iteration needs.
+
+    With E (n, j) the columns of the identity for the unknowns `free`, the compliance is C = E A^-1
+    E' + L R', whose second term is symmetric as well.
+
+    stiffness  x (j,) -> A x [force]
+    cycle      f (j,) -> B f, symmetric positive definite and close to A^-1 f [length]
+    diagonal   (j,) diagonal of A
+    free       (j,) numbers of the displacement unknowns that A has
+    low_rank   L and R (n, i): plates that supports resist, free motions of a body that floats
+    """
+
+    stiffness: Callable[[np.ndarray], np.ndarray]
+    cycle: Callable[[np.ndarray], np.ndarray]
+    diagonal: np.ndarray
+    free: np.ndarray
+    low_rank: tuple[np.ndarray, np.ndarray]
+
+    def term(self, T: sp.csr_matrix) -> LocalTerm:
+        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
+        left, right = self.low_rank
+        return LocalTerm(
+            T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right)
+        )

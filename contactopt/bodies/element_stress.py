@@ -1,0 +1,147 @@
+"""Displacement and stress inside a body of finite elements, computed element by element."""
+
+from __future__ import annotations
+
+import numpy as np
+import skfem
+
+from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.elements import weight_at
+from contactopt.bodies.fields import PLACES, STRESSES, Fields, Validity, von_mises
+from contactopt.material import lame
+from contactopt.meshes.cells import SHAPES, second_order, straight
+
+# elements whose shape functions are evaluated at a time, which bounds the memory that they take
+BLOCK = 2000
+
+
+def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
+    """How far a body is from equilibrium under the contact forces (n,), strained and turned.
+
+    The imbalance counts the free unknowns and, for each plate that moves, the sum over its
+    unknowns.
+    """
+    internal = body.A @ U
+    missing = internal - body.load - force
+    plates = body.motion.T @ missing - body.plate_forces
+    sizes = (
+        np.abs(part).sum()
+        for part in (force, body.load, body.plate_forces, np.delete(internal, body.free))
+    )
+    size = max(sizes)
+    unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
+    gradient = np.asarray(body.basis.interpolate(U).grad)
+    mean = (
+        np.einsum("abeq,eq->eab", gradient, body.basis.dx)
+        / body.basis.dx.sum(axis=1)[:, None, None]
+    )
+    turned = mean.swapaxes(1, 2)
+    strain = np.abs(np.linalg.eigvalsh((mean + turned) / 2)).max(initial=0.0)
+    rotation = np.linalg.norm(mean - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
+    moved = float(np.abs(U).max(initial=0.0))
+    return Validity(
+        unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved
+    )
+
+
+def fields_of(body: Assembly, U: np.ndarray) -> Fields:
+    basis = body.basis
+    stress = nodal_stress(body, U)
+    full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
+    mesh = straight(basis.mesh) if body.degree == 1 else second_order(basis.mesh, body.locations)
+    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises(full))
+
+
+def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
+    """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their
+    volumes.
+
+    An element counts with its mean stress where the displacement is linear, with its stress at the
+    node where it is quadratic; at planes of symmetry its mirror image counts as well, so that no
+    shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta. Not
+    `everywhere` asks for the vertices of the mesh alone.
+    """
+    basis, mesh = body.basis, body.basis.mesh
+    volume = basis.dx.sum(axis=1)
+    shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
+    if body.degree == 1:
+        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
+        values = np.repeat(element[..., None], len(mesh.t), axis=3)
+    else:
+        places = shape.doflocs.T
+        blocks = np.array_split(np.arange(mesh.nelements), -(-mesh.nelements // BLOCK))
+        rule = places, np.ones(places.shape[1])
+        bases = (skfem.Basis(mesh, basis.elem, elements=block, quadrature=rule) for block in blocks)
+        values = np.concatenate([stress_in(body, at, U) for at in bases], axis=2)
+    nodes = skfem.Dofs(mesh, shape).element_dofs  # numbered as the nodes are
+    where, count = nodes.T.ravel(), int(nodes.max()) + 1
+    weight = np.bincount(where, np.repeat(volume, len(nodes)), count)
+    total = np.zeros((3, 3, count))
+    for i in range(3):
+        for j in range(3):
+            total[i, j] = np.bincount(where, (values[i, j] * volume[:, None]).ravel(), count)
+    for axis, there in enumerate(body.mirrored[:, :count]):
+        total[axis, :axis, there] = total[axis, axis + 1 :, there] = 0.0
+        total[:axis, axis, there] = total[axis + 1 :, axis, there] = 0.0
+    return total / weight
+
+
+def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+    """For every element (elements,) how much it adds to the error of the energy, or of other
+    functionals.
+
+    This is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)) [force length] for each W of the
+    others. s is the stress of a displacement and s* the continuous stress with its averages at the
+    vertices, which is more accurate where the solution is smooth. With W = U it is twice the energy
+    of the estimated error in each element; with W the displacement of an adjoint problem it is what
+    the element adds to the error of that problem's functional.
+
+    Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical
+    engineering analysis.
+    """
+    basis, mesh = body.basis, straight(body.basis.mesh)
+    vertices = skfem.Basis(
+        mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W)
+    )
+
+    def missing(field: np.ndarray) -> np.ndarray:
+        nodal = nodal_stress(body, field, everywhere=False)
+        smooth = sum(
+            nodal[:, :, own][..., None] * np.asarray(shape[0])
+            for own, shape in zip(mesh.t, vertices.basis)
+        )
+        return np.asarray(smooth - stress_in(body, basis, field))
+
+    E, nu = body.material.E, body.material.nu
+    measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
+    first, found = missing(U), []
+    for W in others:
+        second = first if W is U else missing(W)
+        traces = np.trace(first) * np.trace(second)
+        density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
+        found.append(np.asarray(np.sum(density * measure, axis=1)))
+    return tuple(found)
+
+
+def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
+    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
+    field = basis.interpolate(U)
+    gradient, hoop = np.asarray(field.grad), None
+    if body.weight[1]:  # u_r / r, on the axis its limit
+        r = np.asarray(basis.global_coordinates())[0]
+        away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
+        hoop = np.divide(np.asarray(field)[0], r, where=away, out=limit)
+    return stress_of(lame(body.material), gradient, hoop)
+
+
+def stress_of(
+    constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
+) -> np.ndarray:
+    """Stress (3, 3, e, q) of a gradient (dim, dim, e, q) and of a hoop strain, if there is one."""
+    lam, shear = constants
+    dim = len(gradient)
+    strain = np.zeros((3, 3, *gradient.shape[2:]))
+    strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
+    if hoop is not None:
+        strain[2, 2] = hoop
+    return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])

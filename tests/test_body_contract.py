@@ -1,0 +1,166 @@
+"""What every body offers, whatever it is made of and wherever it is."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from contactopt import reduce, scenes
+from contactopt.bodies import ranks
+from contactopt.bodies.fields import Fields, Region, Validity
+from contactopt.bodies.protocol import Body
+from contactopt.bodies.remote import RemoteBody
+from contactopt.bodies.solvers import SOLVERS
+from contactopt.bodies.solvers.system import BodySolver
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.scenes.scene import Rigid
+from contactopt.scenes.slices import sliced
+
+
+class Here(ranks.Team):
+    """Ranks that are this process: orders and replies travel as bytes, but not far."""
+
+    size = 2
+
+    def __init__(self):
+        self.kept = {}
+
+    def start(self, rank, function, *arguments):
+        reply = pickle.dumps(self._done(function, arguments))
+
+        def end():
+            answer = pickle.loads(reply)
+            if isinstance(answer, ranks.Raised):
+                raise answer.error
+            return answer
+
+        return end
+
+    def keep(self, rank, function, *arguments):
+        made = ranks.Kept(rank, len(self.kept))
+        self.kept[made.number] = self._done(function, arguments)
+        return made
+
+    def _done(self, function, arguments):
+        return ranks._result(self.kept, *pickle.loads(pickle.dumps((function, arguments))))
+
+
+class Dense(BodySolver):
+    """The least solver: a name and `solve`."""
+
+    name = "dense"
+
+    def __init__(self, system):
+        super().__init__(system)
+        self.factors = la.cho_factor(system.A.toarray())
+
+    def solve(self, load, rtol=None):
+        return la.cho_solve(self.factors, load)
+
+
+def punch():
+    return scenes.flat_punch(2, elements=4)
+
+
+SCENES = {
+    "finite elements": punch,
+    "solid": lambda: scenes.flat_punch(3, elements=2),
+    "rigid and half-space": lambda: scenes.hertz_half_space(elements=4),
+    "sliced": lambda: sliced(punch(), "foundation", 2),
+    "remote": lambda: ranks.spread(punch(), Here()),
+    "rigid": lambda: replace(punch(), upper=Rigid("punch", force={"y": -1.0})),
+}
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def reduction(request):
+    return reduce_bodies(SCENES[request.param](), Q="explicit")
+
+
+@pytest.fixture
+def sides(reduction):
+    """Each body with its map, and random contact forces."""
+    rng = np.random.default_rng(0)
+    return [
+        (body, B, rng.standard_normal(B.shape[0]))
+        for body, B in zip(reduction.bodies, reduction.maps)
+    ]
+
+
+def test_the_compliance_is_one_matrix_however_it_is_asked_for(sides):
+    for body, B, r in sides:
+        C = body.compliance(B)
+        size = np.abs(C).max(initial=0.0)
+        assert np.array_equal(C, C.T) and np.linalg.eigvalsh(C).min() >= -1e-12 * size
+        assert np.allclose(body.product(B)(r[:, None], None)[:, 0], C @ r, atol=1e-10 * size)
+        assert np.array_equal(body.moved(B), np.abs(C).sum(axis=1) > 1e-14 * size)
+
+
+def test_a_body_moves_by_rest_compliance_and_free_motions(sides):
+    for body, B, r in sides:
+        V, rest = B @ body.motions, B @ body.at_rest
+        multipliers = np.arange(1.0, 1 + V.shape[1])
+        assert len(body.motion_names) == len(body.resultants) == V.shape[1]
+        expected = rest + body.compliance(B) @ r + V @ multipliers
+        U = body.displacement(B.T @ r, multipliers)
+        assert np.allclose(B @ U, expected, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("constant", ["E", "nu"])
+def test_work_is_the_weighted_change(sides, constant):
+    for body, B, r in sides:
+        force, weights = B.T @ r, np.ones(len(body.resultants))
+        U, dual = body.displacement(force, weights), B.T @ r[::-1]
+        W = body.displacement(dual, weights) - body.at_rest
+        change, balance = body.material_change(constant, U, force)
+        expected = dual @ change + weights @ balance
+        found = body.material_work(constant, U, force, dual, W)
+        assert found == pytest.approx(expected, rel=1e-8, abs=1e-12)
+
+
+def test_readings_of_a_body_are_of_its_kind(sides, reduction):
+    for (body, B, r), part in zip(sides, reduction.scene.parts):
+        force, weights = B.T @ r, np.ones(len(body.resultants))
+        U = body.displacement(force, weights)
+        assert body.energy(U) >= 0 and np.isfinite(body.energy_change("E", U, force))
+        assert len(body.energy_gradient(U, force)) == 2
+        assert np.isfinite((body.external_forces(U) + force).sum())
+        assert all(len(pair) == 2 for pair in body.held_by(U, force).values())
+        elements = len(body.on_elements(U))
+        assert [len(found) for found in body.recovery_errors(U, U)] == [elements]
+        assert (body.stress_map(Region()) is None) == (elements == 0)
+        fields = body.fields(U)
+        assert fields is None if elements == 0 else isinstance(fields, Fields)
+        assert isinstance(body.limits(U, force), Validity)
+        same = body.loaded(reduction.scene, part)
+        assert np.allclose(B @ same.at_rest, B @ body.at_rest, atol=1e-12)
+        assert body.load_work(reduction.scene, part, force, weights, U) == pytest.approx(
+            0, abs=1e-9
+        )
+        assert body.grounded(1.0) is body and body.pulled(U) is body
+
+
+def test_a_body_elsewhere_has_every_member_of_a_body():
+    members = [name for name, member in vars(Body).items() if callable(member) and name[0] != "_"]
+    assert len(members) > 20 and not set(members) - set(vars(RemoteBody))
+
+
+@pytest.mark.parametrize("options", [{}, {"solver": "dense"}], ids=["auto", "dense"])
+def test_the_problem_is_the_same_wherever_its_bodies_are(options, monkeypatch):
+    monkeypatch.setitem(SOLVERS, "dense", (__name__, "Dense", "dense factors"))
+    here, there = (reduce(scene, **options) for scene in (punch(), SCENES["remote"]()))
+    assert np.allclose(here.Q, there.Q, rtol=0, atol=1e-14 * np.abs(here.Q).max())
+    assert np.allclose(here.q, there.q, rtol=0, atol=1e-12)
+
+
+def test_a_solver_of_rank_0_is_known_on_every_rank(monkeypatch):
+    """A rank is told the row of the table that rank 0 has, and may not have itself."""
+    scene = SCENES["remote"]()
+    monkeypatch.setitem(SOLVERS, "dense", (__name__, "Dense", "dense factors"))
+    order = []
+    keep = Here.keep
+    monkeypatch.setattr(Here, "keep", lambda *made: order.append(made) or keep(*made))
+    reduce(scene, solver="dense")
+    assert any((__name__, "Dense", "dense factors") in made for made in order)
