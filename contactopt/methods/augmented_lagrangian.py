@@ -29,12 +29,12 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.methods.constants import EIGENVALUE_MARGIN
-from contactopt.methods.kernels.alart_curnier import cold_start
+from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.kernels.mprgp import largest_eigenvalue
 from contactopt.methods.kernels.sparse_blocks import block_matrix
+from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import NATIVE, Iterate
-from contactopt.methods.proximal import proximal_equations
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws.law import Law
@@ -71,10 +71,11 @@ class AugmentedLagrangian:
 
     def _exact(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         point = start or cold_start(problem)
-        equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
+        matrix = block_matrix(problem.Q, problem.dim)
         solved = True
         while solved:
-            point, solved, _ = equations.at(point[0], 1 / self.rho).solve(*point)
+            equations = coulomb_equations(problem, point[0], 1 / self.rho)
+            point, solved, _ = solve_subproblem(equations, matrix, point)
             yield point
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:

@@ -67,7 +67,7 @@ from contactopt.methods.method import NATIVE, Iterate, Known
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
-from contactopt.methods.proximal import Proximal, proximal_equations, proximal_iterates
+from contactopt.methods.proximal import Proximal, proximal_iterates
 from contactopt.problem import InterfaceProblem, infeasibility
 
 logger = logging.getLogger(__name__)
@@ -174,7 +174,7 @@ class Auto:
         """
         from contactopt.methods.cone import AcaryCadoux
 
-        random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
+        random, evaluate = np.random.default_rng(0), coulomb_equations(problem).evaluate
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         for restarts in count():
             if interior and restarts:
@@ -279,7 +279,7 @@ class Auto:
         if best < CLOSE:
             alpha = max(LEAST_ALPHA, 100 * best)
             reached = yield from Auto._proximal(problem, matrix, reached, POLISH, alpha)
-        evaluate = proximal_equations(problem, matrix).evaluate
+        evaluate = coulomb_equations(problem).evaluate
         return min(start, reached, key=lambda point: evaluate(*point)[0])
 
     @staticmethod
@@ -297,9 +297,10 @@ class Auto:
 
         aim  residual that the first of these rounds must reach
         """
-        equations = proximal_equations(problem, matrix)
+        equations = coulomb_equations(problem)
         best, target, point = np.inf, aim, start
-        for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
+        iterates = proximal_iterates(problem, matrix, start, alpha, gentle)
+        for done, point in enumerate(iterates, start=1):
             try:
                 yield point
             except Repeated:

@@ -20,7 +20,6 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.checks import check_number
-from contactopt.linear.operators import diagonal
 from contactopt.methods.constants import (
     EASY,
     FALL,
@@ -29,9 +28,9 @@ from contactopt.methods.constants import (
     RISE,
     SUBPROBLEM_STEPS,
 )
-from contactopt.methods.kernels.alart_curnier import cold_start
+from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.methods.kernels.sparse_newton import ProximalEquations
+from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 
@@ -59,39 +58,22 @@ class Proximal:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
+        matrix = block_matrix(problem.Q, problem.dim)
         bonded = isinstance(problem.Q, np.ndarray)
         zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
         point = start or (cold_start(problem) if bonded else zero)
-        yield from proximal_iterates(equations, point, self.alpha)
+        yield from proximal_iterates(problem, matrix, point, self.alpha)
 
 
-def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEquations:
-    """Write Alart and Curnier's equations of a dimensionless problem, without a proximal term.
+def proximal_iterates(
+    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, gentle: bool = False
+) -> Iterator[Iterate]:
+    """Solve one proximal subproblem of a dimensionless problem after another, from a point on.
 
     Parameters
     ----------
     problem : The dimensionless interface problem.
     matrix : Its Q, ready for block systems.
-
-    Returns
-    -------
-    The equations, which `at` gives a centre and a weight.
-    """
-    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
-    return ProximalEquations(
-        matrix, problem.q, problem.V, problem.s, problem.law.project, compliance
-    )
-
-
-def proximal_iterates(
-    equations: ProximalEquations, point: Iterate, alpha: float, gentle: bool = False
-) -> Iterator[Iterate]:
-    """Solve one proximal subproblem after another.
-
-    Parameters
-    ----------
-    equations : The equations of the problem.
     point : Forces (k, dim) and multipliers (p,) to start from.
     alpha : The first weight of the proximal term.
     gentle : Whether alpha changes slowly, so that few subproblems fail: for problems on which every
@@ -105,7 +87,8 @@ def proximal_iterates(
         ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
     )
     while alpha < LARGEST_WEIGHT:
-        new, solved, steps = equations.at(point[0], alpha).solve(*point)
+        equations = coulomb_equations(problem, point[0], alpha)
+        new, solved, steps = solve_subproblem(equations, matrix, point)
         yield new
         point = new if solved else point
         if not solved:

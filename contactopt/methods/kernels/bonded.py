@@ -49,16 +49,7 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """Compute columns of G, the inverse of Q under the balance. Each is computed once and kept.
-
-        Parameters
-        ----------
-        unknowns : (m,) numbers of the columns.
-
-        Returns
-        -------
-        (n, m).
-        """
+        """Columns (n, m) of G, the inverse of Q under the balance. Each is computed once and kept."""
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -71,26 +62,9 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the Newton step that `Equations.step` takes.
-
-        Parameters
-        ----------
-        rho : (k,) steps of the map.
-        error : (k, d) right-hand side of the contact equations.
-        balance : (p,) error of the balance.
-        D : (k, d, d) derivatives of the law's map.
-
-        Returns
-        -------
-        dr (k, d) and dlambda (p,).
-
-        Raises
-        ------
-        LinAlgError : If the system is singular.
-        """
+        """Solve for the Newton step that `Equations.step` takes; LinAlgError if it is singular."""
         k, d = error.shape
-        # N, the unknowns of the contacts that are open or slip. The right-hand side of those that
-        # stick is error / rho.
+        # N: the unknowns of contacts that are open or slip. The right side of others is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()
