@@ -21,6 +21,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -127,9 +128,8 @@ class Newton:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
             sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            change = settled(
-                sharp, problem.law, r, D, lambda: sharp.displacements(r, multipliers)
-            )
+            displacements = partial(sharp.displacements, r, multipliers)
+            change = settled(sharp, problem.law, r, D, displacements)
             if change is not None:
                 multipliers = multipliers + change
                 residual, error, balance, D = sharp.evaluate(r, multipliers)

@@ -77,9 +77,7 @@ def coulomb_equations(
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) / stiffer + weight
     rho = 1 / np.maximum(compliance, 1e-3)
     law = problem.law
-    return Equations(
-        problem.Q, problem.q, problem.V, problem.s, law.project, rho, center, weight
-    )
+    return Equations(problem.Q, problem.q, problem.V, problem.s, law.project, rho, center, weight)
 
 
 def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """Columns (n, m) of G, the inverse of Q under the balance. Each is computed once and kept."""
+        """Columns (n, m) of G, the inverse of Q under the balance; each is computed once."""
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -64,7 +64,7 @@ class Bonded:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Solve for the Newton step that `Equations.step` takes; LinAlgError if it is singular."""
         k, d = error.shape
-        # N: the unknowns of contacts that are open or slip. The right side of others is error / rho.
+        # N are unknowns of contacts that are open or slip; the right side of others is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()
