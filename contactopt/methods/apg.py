@@ -23,9 +23,9 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.methods.constants import EIGENVALUE_MARGIN, SHARPER, SHARPEST
+from contactopt.methods.constants import SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import largest_eigenvalue
+from contactopt.methods.kernels.mprgp import eigenvalue_bound
 from contactopt.methods.method import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
@@ -49,7 +49,7 @@ class APG:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0)
+        step = 1 / eigenvalue_bound(problem.Q)
         law, target = problem.law, 1e-3
         while True:
             q, r_n = problem.q.copy(), r[:, 0]
@@ -121,7 +121,7 @@ def disc_qp(
     t (k, d), and whether it meets the tolerance.
     """
     single, none = Q.astype(np.float32), np.zeros(0)
-    step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(single) or 1.0)
+    step = 1 / eigenvalue_bound(single)
     t = disc(np.zeros_like(c) if start is None else start, radius)
     before = np.inf
     for _ in range(ROUNDS):

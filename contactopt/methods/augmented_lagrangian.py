@@ -28,10 +28,9 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.checks import check_number
-from contactopt.methods.constants import EIGENVALUE_MARGIN
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import largest_eigenvalue
+from contactopt.methods.kernels.mprgp import eigenvalue_bound
 from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import NATIVE, Iterate
@@ -80,10 +79,7 @@ class AugmentedLagrangian:
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        rho, low = (
-            1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0),
-            problem.law.lowest,
-        )
+        rho, low = 1 / eigenvalue_bound(problem.Q), problem.law.lowest
         while True:
             y = r - rho * ((problem.Q @ r.ravel()).reshape(r.shape) + problem.q)
             height = y[:, 0] - rho * (problem.V @ lam).reshape(r.shape)[:, 0]

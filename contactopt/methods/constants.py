@@ -118,16 +118,9 @@ LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product
 # where the shifts of slipping contacts begin to grow, and by how much
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0
 
-# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp). What single precision is worth
-# shows
-# `python -m experiments.questions.dense_speed`.
+# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).
 # on the estimate of the largest eigenvalue, which power steps approach from below
 EIGENVALUE_MARGIN = 1.1
-SINGLE_ACCURACY = 1e-4  # relative accuracy asked of one round in single precision
-SINGLE_STEPS = 300  # of one round
-# a round that leaves more than this of the residual is the last one in single precision
-SINGLE_PROGRESS = 0.1
-ROUND_SHARE = 0.3  # residual after the last round, over what is asked for
 ROWS_FALL = 0.3  # factor by which the error of the rows should fall in one step of the multipliers
 ROWS_SHARE = 0.1  # accuracy of an inner solve, over the penalty times the error of the rows
 FINEST_SHARE = 1e-3  # and the finest, over the accuracy that is asked for

@@ -24,10 +24,11 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
-from contactopt.methods.constants import EIGENVALUE_MARGIN, ROUGH_NORMAL, SHARPER, SHARPEST
+from contactopt.methods.constants import ROUGH_NORMAL, SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import largest_eigenvalue, smalbe
+from contactopt.methods.kernels.mprgp import eigenvalue_bound, smalbe
 from contactopt.methods.kernels.semismooth import Projection, crossover
+from contactopt.methods.kernels.splitting import Components
 from contactopt.methods.method import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
@@ -61,7 +62,7 @@ class Lagrangian:
         r_n, r_t, lam = r[:, 0], r[:, 1:], lam.copy()
         # columns with normal entries
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)
-        normal, tangential = Part(problem, pushes, 0), Part(problem, ~pushes, 1)
+        normal, tangential = Part(problem, pushes, True), Part(problem, ~pushes, False)
         change = 1.0
         while True:
             r_n, lam[pushes] = normal.exact(r_n, r_t, lam)
@@ -71,49 +72,35 @@ class Lagrangian:
             yield np.concatenate([r_n[:, None], r_t], axis=1), lam.copy()
 
 
-class Part:
-    """Normal (first = 0) or tangential (first = 1) components of a problem, with the plates that
-    belong to them.
-    """
+class Part(Components):
+    """Normal or tangential components, and how each of them is solved for."""
 
-    def __init__(self, problem: InterfaceProblem, own: np.ndarray, first: int):
-        blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-        here, there = (
-            (blocks[:, :1], blocks[:, 1:]) if first == 0 else (blocks[:, 1:], blocks[:, :1])
-        )
-        rows, others = here.ravel(), there.ravel()
-        self.problem, self.own, self.shape = problem, own, here.shape
-        self.q, self.V, self.V_there = problem.q.ravel()[rows], problem.V[rows], problem.V[others]
-        self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
-        self.step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(self.Q) or 1.0)
-
-    def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Linear term, own rigid motions and their resultants, given the other components' forces."""
-        c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
-        return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
+    def __init__(self, problem: InterfaceProblem, own: np.ndarray, normal: bool):
+        super().__init__(problem, own, normal)
+        self.step = 1 / eigenvalue_bound(self.Q)
 
     def exact(
         self, r_n: np.ndarray, r_t: np.ndarray, lam: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The normal QP."""
         low = self.problem.law.lowest
-        c, V, s = self.data(r_t, lam)
-        rough = smalbe(self.Q, c, low, V.T, -s, r_n, lam[self.own], ROUGH_NORMAL)
+        c, s = self.given(r_t, lam)
+        rough = smalbe(self.Q, c, low, self.V.T, -s, r_n, lam[self.own], ROUGH_NORMAL)
         project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
-        r, new = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
+        r, new = crossover(self.Q, c, self.V, s, project, rough.x[:, None], rough.multipliers)
         return r[:, 0], new
 
     def uzawa(
         self, r_t: np.ndarray, r_n: np.ndarray, lam: np.ndarray, accuracy: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """The tangential program, until a step moves r_t by at most accuracy times the first step."""
-        c, V, s = self.data(r_n, lam)
+        c, s = self.given(r_n, lam)
         radius, own, first = self.problem.law.bound(r_n), lam[self.own], 0.0
         for _ in range(INNER):
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
             new, own = project_balanced(
-                lambda y: disc_derivative(y, radius), y, V, s, self.step, own
+                lambda y: disc_derivative(y, radius), y, self.V, s, self.step, own
             )
             move = float(np.linalg.norm(new - r_t))
             r_t, first = new, max(first, move)
