@@ -78,7 +78,7 @@ CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
 CENTRAL_KEPT = 0.5  # share of this eigenvalue that a step keeps where it is less
 BACKTRACK = 0.8  # factor by which a step is shortened until it is so
 
-# Newton's steps from products with Q (contactopt.methods.kernels.alart_curnier, .krylov,
+# Newton's steps from products with Q (contactopt.methods.newton, contactopt.methods.kernels.krylov,
 # .linearised).
 KRYLOV_FIRST = 1e-2  # accuracy of the first step
 KRYLOV_LOOSEST, KRYLOV_TIGHTEST = 0.1, 1e-4  # bounds of the accuracy of the others
@@ -102,7 +102,7 @@ SCHUR_STEP = 1e-2  # accuracy of the solve with the Schur complement of the mode
 SCHUR_MARGIN = 1.5  # the model's Schur complement over that of a mean fit
 GIVEN_BALANCE = 1e-3  # accuracy of the equilibrium under forces to start from
 
-# Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels).
+# Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels, .level_steps).
 COARSEST = 12  # contacts along a side of a grid that is not halved
 # accuracy of a step while contacts still open or close, and at last
 NESTED_LOOSEST, NESTED_TIGHTEST = 0.1, 1e-4

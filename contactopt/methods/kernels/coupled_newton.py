@@ -162,7 +162,7 @@ def coupled_steps(
         at = (
             _bonded(problem, coupled)
             if start is None
-            else State(in_equilibrium(form, start[0]), *start)
+            else State(in_equilibrium(form, start[0], GIVEN_BALANCE), *start)
         )
     last = np.inf
     while at is not None:
@@ -224,7 +224,7 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
     """Compute displacements X of the bodies close to A^-1 T' r for contact forces r (k, dim), by
     conjugate gradients with one V-cycle B as preconditioner, to a relative accuracy in the energy
     norm; `size` is the energy residual' B residual.
