@@ -52,14 +52,16 @@ if TYPE_CHECKING:
     )
     from contactopt.simplification.findings import Simplification, Simplified
     from contactopt.simplification.search import simplify
-    from contactopt.solving.paths import PathResult, follow
+    from contactopt.solving.follow import follow
+    from contactopt.solving.paths import PathResult
 
 # name -> the module that it stands in
 _HOMES = {
     "analytic": ("Reference",),
     "methods.diagnosis": ("Diagnosis", "diagnose"),
     "methods.enumeration": ("all_solutions",),
-    "solving.paths": ("PathResult", "follow"),
+    "solving.follow": ("follow",),
+    "solving.paths": ("PathResult",),
     "simplification.findings": ("Simplification", "Simplified"),
     "simplification.search": ("simplify",),
     "derivatives.design": ("Design", "design"),

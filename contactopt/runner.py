@@ -29,8 +29,9 @@ from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Part, Scene
+from contactopt.solving import solve_states
 from contactopt.solving.limits import Limits
-from contactopt.solving.paths import PathResult, solve_states
+from contactopt.solving.paths import PathResult
 from contactopt.solving.progress import resident_memory
 from contactopt.solving.solve_scene import Options, Solved
 

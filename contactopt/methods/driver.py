@@ -30,6 +30,7 @@ from contactopt.problem import (
 from contactopt.problem.certificate import Moved
 from contactopt.problem.unbalanced_loads import escape, sentence
 
+TOL = 1e-8  # largest certificate of an answer that counts as solved, unless another is asked for
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
@@ -47,7 +48,7 @@ CONFIRM = 8
 def solve(
     problem: InterfaceProblem,
     method: str | Method | None = None,
-    tol: float = 1e-8,
+    tol: float = TOL,
     *,
     max_iterations: int = 500,
     time_limit: float = np.inf,

@@ -49,7 +49,16 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """Columns (n, m) of G, the inverse of Q under the balance; each is computed once."""
+        """Compute columns of G, the inverse of Q under the balance. Each is computed once and kept.
+
+        Parameters
+        ----------
+        unknowns : (m,) numbers of the columns.
+
+        Returns
+        -------
+        (n, m).
+        """
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -62,7 +71,16 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the Newton step that `Equations.step` takes; LinAlgError if it is singular."""
+        """Solve for the Newton step that `Equations.step` takes; LinAlgError if it is singular.
+
+        Parameters
+        ----------
+        rho, error, balance, D : (k,), (k, d), (p,) and (k, d, d), as there.
+
+        Returns
+        -------
+        dr (k, d) and dlambda (p,).
+        """
         k, d = error.shape
         # N are unknowns of contacts that are open or slip; the right side of others is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
