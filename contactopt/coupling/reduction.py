@@ -40,7 +40,7 @@ from contactopt.coupling.coupling import Coupling, couple
 from contactopt.coupling.equilibrium import coupled_form
 from contactopt.coupling.planes_of_symmetry import mirror_planes
 from contactopt.errors import InputError
-from contactopt.linear.concurrency import each
+from contactopt.linear.concurrency import each, one_blas_thread
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import (
     FORMS,
@@ -53,7 +53,6 @@ from contactopt.linear.operators import (
     diagonal,
     estimate_diagonal,
 )
-from contactopt.linear.threads import one_blas_thread
 from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.chart import nodal_weights
 from contactopt.problem.laws import make_law

@@ -25,11 +25,11 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from contactopt.linear.concurrency import one_blas_thread
 from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
 from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, norm
-from contactopt.linear.threads import one_blas_thread
 from contactopt.methods.constants import (
     COUPLED_FIRST,
     COUPLED_LOOSEST,

@@ -114,7 +114,7 @@ class Level:
         """Q r (c, k)."""
         check_time()
         if self.counter is not None:
-            self.counter.add()
+            self.counter.total += 1
         x = r.reshape(-1, *self.kernel.grid)
         return self.kernel.act(x, self.components, self.components, single).reshape(r.shape)
 
