@@ -45,10 +45,20 @@ class _Numbers:
 
 
 def read_text(path: Path) -> InterfaceProblem:
-    """Read the problem in a text file of Siconos, without a balance, in the units of the file.
+    """Read the problem in a text file of Siconos.
 
-    InputError if the sizes or the storage that the file names do not exist or do not fit;
-    ValueError if what should be a number is none.
+    Parameters
+    ----------
+    path : The file.
+
+    Returns
+    -------
+    The problem in the units of the file, without a balance.
+
+    Raises
+    ------
+    InputError : If the sizes or the storage that the file names do not exist or do not fit.
+    ValueError : If what should be a number is none.
     """
     text = path.read_text(encoding="ascii", errors="replace")
     head = text.split(maxsplit=5)
@@ -118,7 +128,7 @@ def _blocks(numbers: _Numbers, n: int) -> sp.csr_array:
 
 
 def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
-    """The listing that CSparse prints, by columns or as triplets, and the numbers that follow it."""
+    """The listing that CSparse prints, by columns or as triplets, and the numbers after it."""
     lines = iter(text.splitlines())
     for line in lines:
         found = re.search(r"(\d+)-by-(\d+), nzmax: *(-?\d+),? nnz: *(-?\d+)", line)
