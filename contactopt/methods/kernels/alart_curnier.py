@@ -52,7 +52,7 @@ def forcing(residual: float, last: float, first: float, loosest: float, tightest
 
 def coulomb_equations(
     problem: InterfaceProblem,
-    center: np.ndarray | None = None,
+    center: np.ndarray | float = 0.0,
     weight: float = 0.0,
     stiffer: np.ndarray | float = 1.0,
 ) -> Equations:
@@ -65,7 +65,7 @@ def coulomb_equations(
     Parameters
     ----------
     problem : A dimensionless interface problem.
-    center : (k, dim) forces of a proximal term, if there is one.
+    center : (k, dim) forces from which a proximal term counts.
     weight : The weight of the proximal term, a compliance.
     stiffer : By what the compliance that Newton's steps should see is smaller than the diagonal of
         Q, (k,) or one number.

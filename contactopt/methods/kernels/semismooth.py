@@ -55,7 +55,7 @@ class Equations:
     s: np.ndarray
     project: Projection
     rho: np.ndarray = 1.0  # type: ignore[assignment]
-    center: np.ndarray | None = None
+    center: np.ndarray | float = 0.0
     weight: float = 0.0
 
     def __post_init__(self) -> None:
@@ -65,7 +65,7 @@ class Equations:
     def displacements(self, r: np.ndarray, lam: np.ndarray) -> np.ndarray:
         """u (k, d)."""
         u = (self.Q @ r.ravel() + self.V @ lam).reshape(r.shape) + self.q
-        return np.asarray(u if self.center is None else u + self.weight * (r - self.center))
+        return np.asarray(u + self.weight * (r - self.center) if self.weight else u)
 
     def evaluate(
         self, r: np.ndarray, lam: np.ndarray

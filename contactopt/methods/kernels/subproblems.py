@@ -47,7 +47,7 @@ class KrylovSubproblem:
         the proximal loop (contactopt.methods.proximal), each step a problem whose active sets are
         easier to find. Raises BackendError if that does not come near a solution either.
         """
-        equations = self._equations(r, multipliers, None, 0.0)
+        equations = self._equations(r, multipliers, 0.0, 0.0)
         point = r, multipliers[self.columns]
         if not r[:, self.own].any():
             point = self._glued(*point, equations)
@@ -68,7 +68,7 @@ class KrylovSubproblem:
         return point
 
     def _equations(
-        self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | None, weight: float
+        self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | float, weight: float
     ) -> Equations:
         problem, own = self.problem, self.columns
         q = problem.q + (problem.V[:, ~own] @ multipliers[~own]).reshape(r.shape)
