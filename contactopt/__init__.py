@@ -52,7 +52,8 @@ if TYPE_CHECKING:
     )
     from contactopt.simplification.findings import Simplification, Simplified
     from contactopt.simplification.search import simplify
-    from contactopt.solving.paths import PathResult, follow
+    from contactopt.solving.follow import follow
+    from contactopt.solving.paths import PathResult
 
 # module -> the names that stand in it
 _HOMES = {
@@ -76,7 +77,8 @@ _HOMES = {
     "scenes.scene": "BodyForce HalfSpace Part Plate Rigid Scene Support Traction",
     "simplification.findings": "Simplification Simplified",
     "simplification.search": "simplify",
-    "solving.paths": "PathResult follow",
+    "solving.follow": "follow",
+    "solving.paths": "PathResult",
 }
 _MODULES = {
     "analytic": "analytic",

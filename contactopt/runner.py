@@ -28,8 +28,8 @@ from contactopt.readings.validity import validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
+from contactopt.solving import solve_states
 from contactopt.solving.limits import Limits
-from contactopt.solving.paths import solve_states
 from contactopt.solving.progress import resident_memory
 from contactopt.solving.solve_scene import Options, Solved
 

@@ -30,7 +30,7 @@ from contactopt.coupling.coupling import COUPLINGS, Coupling
 from contactopt.linear.concurrency import each
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.readings.quantities import elastic_energy
-from contactopt.solving.paths import follow
+from contactopt.solving.follow import follow
 
 
 def renumbered(mesh, seed: int):

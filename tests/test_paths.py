@@ -19,7 +19,7 @@ from contactopt import (
     scenes,
     solve,
 )  # fmt: skip
-from contactopt.solving.paths import follow
+from contactopt.solving.follow import follow
 
 
 def dragged(shift: float, force: float = 3.0, mu: float = 0.4) -> Scene:

@@ -22,7 +22,7 @@ from contactopt import (
 )
 from contactopt.cards import card
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.paths import follow
+from contactopt.solving.follow import follow
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ from contactopt.readings.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, 
 from contactopt.readings.quantities import Reading
 from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Part, Scene
-from contactopt.solving.paths import solve_states
+from contactopt.solving import solve_states
 from contactopt.solving.solve_scene import Options, Solved
 
 

@@ -26,7 +26,7 @@ from contactopt.accuracy.marking import (
 from contactopt.derivatives.outputs import Quantity
 from contactopt.readings.quantities import Peak, Reading, nodal_pressure
 from contactopt.scenes.scene import Scene
-from contactopt.solving.paths import solve_states
+from contactopt.solving import solve_states
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 # of the estimated error that the marked elements make; Doerfler's marking allows anything between 0

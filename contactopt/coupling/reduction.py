@@ -41,7 +41,7 @@ from contactopt.coupling.interface_problem import problem_of, signed_map
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
-from contactopt.linear.concurrency import each
+from contactopt.linear.concurrency import each, one_blas_thread
 from contactopt.linear.operators import (
     FORMS,
     NOISE,
@@ -50,7 +50,6 @@ from contactopt.linear.operators import (
     check_dense,
     diagonal,
 )
-from contactopt.linear.threads import one_blas_thread
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import MOST_ACROSS, Scene
 

@@ -16,6 +16,9 @@ from contactopt.problem import InterfaceProblem
 
 __all__ = ["read", "write"]
 
+# what h5py and NumPy raise on malformed files, InputError among the ValueErrors
+FAULTS = OSError, LookupError, ValueError, TypeError, RuntimeError, MemoryError, OverflowError
+
 
 def read(path: str | Path) -> InterfaceProblem:
     """Read a problem from a file: FCLib's HDF5, local or global form, or Siconos' text format with
@@ -47,16 +50,7 @@ def read(path: str | Path) -> InterfaceProblem:
         with open(path, "rb") as file:
             binary = file.read(len(MAGIC)) == MAGIC
         return read_hdf5(path) if binary else read_text(path)
-    except (
-        OSError,
-        KeyError,
-        ValueError,
-        IndexError,
-        TypeError,
-        RuntimeError,
-        MemoryError,
-        OverflowError,
-    ) as error:
+    except FAULTS as error:
         raise InputError(
             f"'{path}' is not a usable FCLib file: {error or type(error).__name__}"
         ) from error

@@ -39,9 +39,6 @@ def _h5py() -> Any:
 def read_hdf5(path: Path) -> InterfaceProblem:
     """Read the problem in an HDF5 file, in local or in global form.
 
-    Exceptions of h5py on a malformed file are not caught here; `contactopt.fclib.read` makes an
-    InputError of them.
-
     Parameters
     ----------
     path : The file.
@@ -53,7 +50,7 @@ def read_hdf5(path: Path) -> InterfaceProblem:
     Raises
     ------
     InputError : If the file holds neither form, if its data lie in other files or are malformed, or
-        if h5py is not installed.
+        if h5py is not installed. Exceptions of h5py are not caught here.
     """
     h5py = _h5py()
     with h5py.File(path, "r") as file:
@@ -136,9 +133,8 @@ def _read_local(group: Any) -> InterfaceProblem:
         s = _array(group, "vectors/s")
         if _read_matrix(_item(group, "R"), (len(s), len(s))).nnz:
             raise InputError("its equality block R is not zero, which is not supported")
-        return InterfaceProblem(
-            W, q, mu, _read_matrix(_item(group, "V"), (q.size, len(s))).toarray(), s
-        )
+        V = _read_matrix(_item(group, "V"), (q.size, len(s))).toarray()
+        return InterfaceProblem(W, q, mu, V, s)
     return InterfaceProblem(W, q, mu)
 
 
@@ -154,11 +150,8 @@ def _read_global(group: Any) -> InterfaceProblem:
 
 
 def _inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
-    """X -> M^-1 X for sparse X.
-
-    Blocks of rigid bodies are inverted one by one, other matrices are factorised.
-
-    RuntimeError or LinAlgError if M is singular.
+    """X -> M^-1 X for sparse X. Blocks of rigid bodies are inverted one by one, other matrices are
+    factorised. RuntimeError or LinAlgError if M is singular.
     """
     count, body = connected_components(M, directed=False)
     sizes = np.bincount(body, minlength=count)
@@ -187,25 +180,19 @@ def _block_inverse(M: sp.csr_array, body: np.ndarray, sizes: np.ndarray) -> sp.c
     place[order] = np.arange(len(body)) - first[body[order]]
     entries = sp.coo_array(M)
     rows, columns = entries.coords
-    i, j, x = [], [], []
+    parts = [sp.coo_array(M.shape)]
     for size in np.unique(sizes):
         bodies = np.flatnonzero(sizes == size)
         number = np.full(len(sizes), -1)
         number[bodies] = np.arange(len(bodies))
         mine = number[body[rows]] >= 0
         blocks = np.zeros((len(bodies), size, size))
-        np.add.at(
-            blocks,
-            (number[body[rows[mine]]], place[rows[mine]], place[columns[mine]]),
-            entries.data[mine],
-        )
+        where = number[body[rows[mine]]], place[rows[mine]], place[columns[mine]]
+        np.add.at(blocks, where, entries.data[mine])
         members = order[first[bodies][:, None] + np.arange(size)]
-        i.append(np.repeat(members, size, axis=1).ravel())
-        j.append(np.tile(members, (1, size)).ravel())
-        x.append(np.linalg.inv(blocks).ravel())
-    none = [np.zeros(0, dtype=int)]
-    where = np.concatenate(i or none), np.concatenate(j or none)
-    return sp.csr_array(sp.coo_array((np.concatenate(x or [np.zeros(0)]), where), shape=M.shape))
+        i, j = np.repeat(members, size, axis=1).ravel(), np.tile(members, (1, size)).ravel()
+        parts.append(sp.coo_array((np.linalg.inv(blocks).ravel(), (i, j)), shape=M.shape))
+    return sum(sp.csr_array(part) for part in parts)
 
 
 def _vectors(group: Any, name: str) -> tuple[int, np.ndarray, np.ndarray]:
@@ -234,12 +221,8 @@ def _read_matrix(group: Any, shape: tuple[int, int]) -> sp.csr_array:
 
 
 def _write_matrix(group: Any, matrix: sp.csc_matrix) -> None:
-    for key, value in (
-        ("m", matrix.shape[0]),
-        ("n", matrix.shape[1]),
-        ("nz", -1),
-        ("nzmax", matrix.nnz),
-    ):
+    m, n = matrix.shape
+    for key, value in {"m": m, "n": n, "nz": -1, "nzmax": matrix.nnz}.items():
         group[key] = np.array([value], dtype=np.int32)
     group["p"], group["i"] = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
     group["x"] = matrix.data.astype(float)

@@ -7,7 +7,6 @@ All numbers are separated by white space: dim, contacts, storage, rows, columns,
 from __future__ import annotations
 
 import re
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -59,8 +58,7 @@ def read_text(path: Path) -> InterfaceProblem:
     Raises
     ------
     InputError : If the sizes or the storage that the file names do not exist or do not fit.
-    ValueError : If what should be a number is none. `contactopt.fclib.read` makes an InputError of
-        it.
+    ValueError : If what should be a number is none.
     """
     text = path.read_text(encoding="ascii", errors="replace")
     head = text.split(maxsplit=5)
@@ -85,17 +83,7 @@ def read_text(path: Path) -> InterfaceProblem:
 
 
 def compact(W: Interface) -> Interface:
-    """Choose the storage of a matrix: an array if more than a third of its entries are there, else
-    sparse.
-
-    Parameters
-    ----------
-    W : The (k dim, k dim) matrix, an array or sparse.
-
-    Returns
-    -------
-    The matrix as an array, or as it was given.
-    """
+    """An array for a matrix of which more than a third of the entries are there; else as given."""
     full = sp.issparse(W) and W.nnz >= MOSTLY * W.shape[0] * W.shape[1]
     return np.asarray(W.toarray()) if full else W
 
@@ -127,11 +115,7 @@ def _blocks(numbers: _Numbers, n: int) -> sp.csr_array:
     tops, lefts = (np.concatenate([[0], end[:-1]]) for end in ends)
     heights, widths = np.diff(ends[0], prepend=0)[rows], np.diff(ends[1], prepend=0)[columns]
     sizes = heights * widths
-    starts = (
-        np.arange(count) + np.concatenate([[0], np.cumsum(sizes)[:-1]])
-        if count
-        else np.zeros(0, dtype=int)
-    )
+    starts = np.arange(count) + np.cumsum(sizes) - sizes
     words = numbers.floats(int(sizes.sum()) + count)
     if not np.array_equal(words[starts], np.arange(count)):
         raise InputError("its blocks are not numbered in turn")
@@ -144,7 +128,7 @@ def _blocks(numbers: _Numbers, n: int) -> sp.csr_array:
 
 
 def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
-    """The listing that CSparse prints, by columns or as triplets, and the numbers that follow it."""
+    """The listing that CSparse prints, by columns or as triplets, and the numbers after it."""
     lines = iter(text.splitlines())
     for line in lines:
         found = re.search(r"(\d+)-by-(\d+), nzmax: *(-?\d+),? nnz: *(-?\d+)", line)
@@ -173,7 +157,7 @@ def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
             raise InputError(
                 "its sparse matrix has fewer entries than it announces, or a line that is none"
             )
-    rest = [line for line in islice(lines, None)]
+    rest = list(lines)
     # empty columns at the end
     while rest and (rest[0].lstrip().startswith("col") or not rest[0].strip()):
         rest.pop(0)

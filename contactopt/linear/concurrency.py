@@ -1,19 +1,47 @@
-"""The one place where threads share work: bodies beside each other, and the pieces of one large
-product.
+"""Cores, the threads of BLAS, and the one place where threads share work: bodies beside each other,
+and the pieces of one large product.
 """
 
 from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
-from contactopt.linear.threads import cores
+from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+def cores() -> int:
+    """Count the cores that this process may use.
+
+    OMP_NUM_THREADS does not bound it: that is for the threads of BLAS.
+
+    Returns
+    -------
+    The number of cores, at least 1.
+    """
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let BLAS use one thread inside the block.
+
+    It is for work with many small dense products, between which further threads would only spin.
+    The limit holds for the whole process, so that one thread alone may set it at a time.
+
+    Yields
+    ------
+    Nothing; the block runs under the limit.
+    """
+    with threadpool_limits(1, user_api="blas"):
+        yield
 
 
 def each(
@@ -50,9 +78,8 @@ def each(
 class Crew:
     """Threads that help with pieces of one caller's work, one for each core but the caller's own.
 
-    They sleep in between.
-
-    The threads start with the first piece and end with the object. A forked process makes its own.
+    They sleep in between. They start with the first piece and end with the object. A forked process
+    makes its own.
     """
 
     def __init__(self, size: int | None = None):
@@ -80,10 +107,8 @@ class Crew:
                 act()
 
         if self._pool is None or self._process != os.getpid():
-            self._process, self._pool = (
-                os.getpid(),
-                ThreadPoolExecutor(max(self.size - 1, 1), "crew"),
-            )
+            self._process = os.getpid()
+            self._pool = ThreadPoolExecutor(max(self.size - 1, 1), "crew")
         helping = [self._pool.submit(work) for _ in range(min(self.size, len(acts)) - 1)]
         work()
         for future in helping:

@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.linear.concurrency import cores
 from contactopt.linear.counter import Counter
 from contactopt.linear.operators import InterfaceOperator, check_dense
-from contactopt.linear.threads import cores
 
 SINGLE = 2e-6  # accuracy of products from which on single precision serves
 LEVELS = 4  # halvings of the grid that its padding allows for
@@ -55,6 +55,11 @@ def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
 def _odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
     """Along which axes of the grid K_ab is odd."""
     return tuple((a == c + 1) != (b == c + 1) for c in range(axes))
+
+
+def _unit(a: int, b: int, axes: int) -> complex:
+    """What the real symbol of K_ab is multiplied with."""
+    return (1j if a < b else -1j) if sum(_odd_axes(a, b, axes)) == 1 else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,21 +122,14 @@ class Kernel:
         symbols = dict(self.symbols)
         for pair, symbol in other.symbols.items():
             symbols[pair] = symbols[pair] + symbol if pair in symbols else symbol
-        largest = max(
-            float(np.abs(symbol).max())
-            for symbol in (*self.symbols.values(), *other.symbols.values())
-        )
-        kept = {
-            pair: symbol
-            for pair, symbol in symbols.items()
-            if np.abs(symbol).max() > 1e-14 * largest
-        }
+        every = (*self.symbols.values(), *other.symbols.values())
+        least = 1e-14 * max(float(np.abs(symbol).max()) for symbol in every)
+        kept = {pair: own for pair, own in symbols.items() if np.abs(own).max() > least}
         return Kernel(self.grid, self.padded, kept)
 
     def scaled(self, factor: float) -> Kernel:
-        return Kernel(
-            self.grid, self.padded, {pair: factor * symbol for pair, symbol in self.symbols.items()}
-        )
+        symbols = {pair: factor * symbol for pair, symbol in self.symbols.items()}
+        return Kernel(self.grid, self.padded, symbols)
 
     @cached_property
     def diagonal(self) -> np.ndarray:
@@ -180,7 +178,7 @@ class Kernel:
                 low = np.take(weighted, range(size // 4 + 1 if final else size // 2), axis)
                 if final:  # the frequency k + M / 2 is minus the frequency M / 2 - k
                     high = np.take(weighted, range(size // 2, size // 4 - 1, -1), axis)
-                    high = _negated(high, axis, odd)
+                    high = -high if odd[axis] else high
                 else:
                     high = np.take(weighted, range(size // 2, size), axis)
                 symbol = (low + high) / 2
@@ -203,23 +201,22 @@ class Kernel:
         -------
         (rows, n0[, n1]) displacements [length].
         """
-        symbols = self.single if single else self.symbols
-        spectra = {}
-        for b, part in zip(columns, x):
-            if np.any(part):
-                spectra[b] = forward(
-                    part.astype(np.float32 if single else np.float64, copy=False), self.padded
-                )
-        out = np.zeros((len(rows), *self.grid), np.float32 if single else np.float64)
+        symbols, kind = (self.single, np.float32) if single else (self.symbols, np.float64)
+        spectra = {
+            b: forward(part.astype(kind, copy=False), self.padded)
+            for b, part in zip(columns, x)
+            if np.any(part)
+        }
+        out = np.zeros((len(rows), *self.grid), kind)
         for place, a in enumerate(rows):
             total: Any = None
             for b, spectrum in spectra.items():
                 pair = (min(a, b), max(a, b))
                 if pair not in symbols:
                     continue
-                term = symbols[pair] * spectrum
-                if sum(_odd_axes(a, b, len(self.grid))) == 1:
-                    term *= np.array(1j if a < b else -1j, term.dtype)
+                term, unit = symbols[pair] * spectrum, _unit(a, b, len(self.grid))
+                if unit != 1.0:
+                    term *= np.array(unit, term.dtype)
                 total = term if total is None else np.add(total, term, out=total)
             if total is not None:
                 out[place] = backward(total, self.padded, self.grid)
@@ -242,16 +239,11 @@ class Kernel:
         apart = places[:, :, None] - places[:, None, :]
         Q = np.zeros((k, dim, k, dim))
         for (a, b), symbol in self.symbols.items():
-            factor = 1j if sum(_odd_axes(a, b, len(self.grid))) == 1 else 1.0
-            values = backward(factor * symbol, self.padded, self.padded)[tuple(apart)]
+            transform = _unit(a, b, len(self.grid)) * symbol
+            values = backward(transform, self.padded, self.padded)[tuple(apart)]
             Q[:, a, :, b] = values
             Q[:, b, :, a] = values.T
         return Q.reshape(k * dim, k * dim)
-
-
-def _negated(high: np.ndarray, axis: int, odd: tuple[bool, ...]) -> np.ndarray:
-    """The symbol at the frequency -k along an axis, from that at k."""
-    return -high if odd[axis] else high
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
@@ -333,6 +325,3 @@ class Convolution(InterfaceOperator):
         if np.any(added):
             return super().scaled(factor, added, counter)
         return Convolution(self.kernel.scaled(factor), self.accuracy, counter)
-
-    def loosened(self, accuracy: float) -> InterfaceOperator:
-        return Convolution(self.kernel, accuracy, self.counter)

@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 
+
+@dataclass(eq=False)
 class Counter:
-    """Counts products with Q, or applications of a preconditioner.
+    """Products with Q, or applications of a preconditioner, so far.
 
     An operator and the operators made from it, such as its normal block or one with less accurate
     products, are handed the same counter. The work that a solve costs is then known wherever it was
     asked for.
     """
 
-    def __init__(self) -> None:
-        self._total = 0
-
-    @property
-    def total(self) -> int:
-        """The number counted so far."""
-        return self._total
-
-    def add(self, number: int = 1) -> None:
-        """Count some more.
-
-        Parameters
-        ----------
-        number : How many.
-        """
-        self._total += number
+    total: int = 0

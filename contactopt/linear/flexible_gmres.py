@@ -27,8 +27,7 @@ Act = Callable[[Any], Any]
 
 def flexible_gmres(product: Act, inverse: Act, right: Vector, weights: Vector, rtol: float) -> Any:
     """Solve A x = b by GMRES with a preconditioner that may change, to |W (b - A x)| <= rtol |W b|
-    with W =
-    diag(weights).
+    with W = diag(weights).
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from copy import copy
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -75,7 +76,7 @@ class InterfaceOperator(LinearOperator):
         return self.counter.total
 
     def _matmat(self, X: np.ndarray) -> np.ndarray:
-        self.counter.add(X.shape[1])
+        self.counter.total += X.shape[1]
         return np.asarray(self.product(X, self.accuracy))
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
@@ -112,12 +113,11 @@ class InterfaceOperator(LinearOperator):
     def scaled(
         self, factor: float, added: np.ndarray, counter: Counter | None = None
     ) -> InterfaceOperator:
-        """Make the operator factor Q + diag(added).
+        """Make the operator factor Q + diag(added), with added (n,).
 
         Parameters
         ----------
-        factor : What Q is multiplied with.
-        added : (n,) what is added to its diagonal.
+        factor, added : As above.
         counter : Counts its products; by default one of its own.
 
         Returns
@@ -137,7 +137,7 @@ class InterfaceOperator(LinearOperator):
         )
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
-        """Make the same operator with less accurate products. Both count together.
+        """Make the same operator with less accurate products, counted together with its own.
 
         Parameters
         ----------
@@ -147,25 +147,17 @@ class InterfaceOperator(LinearOperator):
         -------
         The operator.
         """
-        return InterfaceOperator(
-            self.product,
-            self.diagonal,
-            self.entries,
-            accuracy,
-            self.inexact,
-            self.coupled,
-            self.counter,
-            self.held,
-        )
+        loose = copy(self)
+        loose.accuracy = accuracy
+        return loose
 
     def block(self, unknowns: np.ndarray) -> InterfaceOperator:
-        """Take Q on some unknowns alone, e.g.
-
-        its normal block (every dim-th) or an active set. Both count together.
+        """Take Q on some unknowns (m,) alone, such as its normal block (every dim-th) or an active
+        set. Both count together.
 
         Parameters
         ----------
-        unknowns : (m,) their numbers.
+        unknowns : Their numbers.
 
         Returns
         -------
@@ -208,8 +200,7 @@ def sparse(Q: object) -> sp.csr_array:
 
 def check_dense(n: int) -> None:
     """Before Q is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse
-    it beyond
-    MOST_BYTES.
+    it beyond MOST_BYTES.
 
     Parameters
     ----------
@@ -235,7 +226,7 @@ def dense(Q: Interface) -> np.ndarray:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
 
     Returns
     -------
@@ -258,7 +249,7 @@ def diagonal(Q: Interface) -> np.ndarray:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
 
     Returns
     -------
@@ -290,7 +281,7 @@ def asymmetry(Q: Interface) -> float:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
 
     Returns
     -------
@@ -298,11 +289,9 @@ def asymmetry(Q: Interface) -> float:
     """
     if isinstance(Q, InterfaceOperator):
         return 0.0
-    if sp.issparse(Q):
-        size = float(np.abs(Q.data).max(initial=0.0))
-        return float(np.abs((Q - Q.T).data).max(initial=0.0)) / size if size > 0 else 0.0
-    size = float(np.abs(Q).max(initial=0.0))
-    return float(np.abs(Q - Q.T).max(initial=0.0)) / size if size > 0 else 0.0
+    whole, skew = (Q.data, (Q - Q.T).data) if sp.issparse(Q) else (Q, Q - Q.T)
+    size = float(np.abs(whole).max(initial=0.0))
+    return float(np.abs(skew).max(initial=0.0)) / size if size > 0 else 0.0
 
 
 def held(Q: Interface) -> np.ndarray:
@@ -310,7 +299,7 @@ def held(Q: Interface) -> np.ndarray:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
 
     Returns
     -------
@@ -328,7 +317,7 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
     added : (n,) what is added to the diagonal [length / force].
 
     Returns
@@ -373,7 +362,7 @@ def block(Q: Interface, unknowns: np.ndarray) -> Interface:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
     unknowns : (m,) their numbers.
 
     Returns
@@ -390,7 +379,7 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
 
     Parameters
     ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    Q : Interface operator (n, n), of any form.
     accuracy : Relative error of a product that is good enough.
 
     Returns

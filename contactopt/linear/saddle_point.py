@@ -59,9 +59,8 @@ class BodyTerm(Protocol):
         """
 
     def cycle(self, F: Any) -> Any:
-        """Multiply with B, which is symmetric positive definite and close to A^-1, e.g.
-
-        one V-cycle of multigrid.
+        """Multiply with B, which is symmetric positive definite and close to A^-1, such as one
+        V-cycle of multigrid.
 
         Parameters
         ----------
@@ -149,19 +148,21 @@ class CoupledForm:
         """Number of applications of B so far."""
         return self.counter.total
 
+    def _each(self, act: Callable[..., Any], *columns: Stacked) -> Stacked:
+        """A vector in parts, of a function of each term and its parts."""
+        return Stacked(tuple(in_turn(act, self.terms, *(column.parts for column in columns))))
+
     def diagonal(self) -> Stacked:
         """Give the diagonal of A in all bodies, as a vector in parts."""
-        return Stacked(tuple(in_turn(lambda term: term.diagonal() / self.factor, self.terms)))
+        return self._each(lambda term: term.diagonal() / self.factor)
 
     def pulled(self, r: np.ndarray) -> Stacked:
         """Take contact forces r (n,) to the bodies: T' r, as a vector in parts."""
-        return Stacked(tuple(in_turn(lambda term: term.pulled(r), self.terms)))
+        return self._each(lambda term: term.pulled(r))
 
     def stiffness(self, X: Stacked) -> Stacked:
         """Multiply displacements X of the bodies with A."""
-        return Stacked(
-            tuple(in_turn(lambda term, own: term.stiffness(own) / self.factor, self.terms, X.parts))
-        )
+        return self._each(lambda term, own: term.stiffness(own) / self.factor, X)
 
     def approximate(self, F: Stacked) -> Stacked:
         """Multiply forces on the bodies with B, and count it.
@@ -174,10 +175,8 @@ class CoupledForm:
         -------
         B F [length].
         """
-        self.counter.add()
-        return Stacked(
-            tuple(in_turn(lambda term, own: term.cycle(own) * self.factor, self.terms, F.parts))
-        )
+        self.counter.total += 1
+        return self._each(lambda term, own: term.cycle(own) * self.factor, F)
 
     def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:
         """Compute the displacement at the contacts from displacements of the bodies and contact
@@ -185,26 +184,21 @@ class CoupledForm:
 
         Parameters
         ----------
-        X : Displacements of the bodies in parts [length].
-        r : (n,) contact forces [force].
+        X, r : Displacements of the bodies in parts [length], and (n,) contact forces [force].
 
         Returns
         -------
         T X + rest r (n,) [length], which is Q r in equilibrium.
         """
         started = in_turn(lambda term, own: term.started_trace(own), self.terms, X.parts)
-        total = self.rest(r)
-        for own in started:
-            total = total + own()
-        return total
+        return np.asarray(sum((own() for own in started), self.rest(r)))
 
     def unbalanced(self, X: Stacked, r: np.ndarray) -> Stacked:
         """Compute the forces that are missing to equilibrium.
 
         Parameters
         ----------
-        X : Displacements of the bodies in parts [length].
-        r : (n,) contact forces [force].
+        X, r : Displacements of the bodies in parts [length], and (n,) contact forces [force].
 
         Returns
         -------
@@ -213,16 +207,8 @@ class CoupledForm:
         return self.pulled(r) - self.stiffness(X)
 
     def scaled(self, factor: float, added: np.ndarray) -> CoupledForm:
-        """Make the form of factor Q + diag(added).
-
-        Parameters
-        ----------
-        factor : What Q is multiplied with.
-        added : (n,) what is added to its diagonal.
-
-        Returns
-        -------
-        The form, whose displacements X are in units in which A is A / factor.
+        """Make the form of factor Q + diag(added), with added (n,), whose displacements X are in
+        units in which A is A / factor.
         """
         rest = self.rest
         return replace(

@@ -101,15 +101,14 @@ class Stacked:
         -------
         The sum over all parts.
         """
-        sums = in_turn(_started_dot, self.parts, other.parts)
-        return sum(own() for own in sums)
+        return sum(own() for own in in_turn(_started_dot, self.parts, other.parts))
 
 
 Vector: TypeAlias = Any  # an array (n,) or a Stacked
 
 
 def _started_dot(x: Any, y: Any) -> Callable[[], float]:
-    """The scalar product of two parts; without BLAS, whose threads would spin until the next call."""
+    """The scalar product of two parts without BLAS, whose threads would spin till the next call."""
     if not _here(x):
         started: Callable[[], float] = x.started_dot(y)
         return started

@@ -22,9 +22,9 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.methods.constants import EIGENVALUE_MARGIN, SHARPER, SHARPEST
+from contactopt.methods.constants import SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import largest_eigenvalue
+from contactopt.methods.kernels.mprgp import eigenvalue_bound
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Projected
@@ -43,7 +43,7 @@ class APG(Method):
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = start or at_rest(problem)
-        step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0)
+        step = 1 / eigenvalue_bound(problem.Q)
         law, target = problem.law, 1e-3
         while True:
             q, r_n = problem.q.copy(), r[:, 0]

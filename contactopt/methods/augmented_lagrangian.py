@@ -21,13 +21,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from contactopt.checks import check_number
-from contactopt.methods.constants import EIGENVALUE_MARGIN
-from contactopt.methods.kernels.alart_curnier import cold_start
+from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import largest_eigenvalue
+from contactopt.methods.kernels.mprgp import eigenvalue_bound
 from contactopt.methods.kernels.sparse_blocks import block_matrix
+from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import Iterate, Method, at_rest
-from contactopt.methods.proximal import proximal_equations
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws.law import Law
@@ -61,18 +60,16 @@ class AugmentedLagrangian(Method):
 
     def _exact(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         point = start or cold_start(problem)
-        equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
+        matrix = block_matrix(problem.Q, problem.dim)
         solved = True
         while solved:
-            point, solved, _ = equations.at(point[0], 1 / self.rho).solve(*point)
+            equations = coulomb_equations(problem, point[0], 1 / self.rho)
+            point, solved, _ = solve_subproblem(equations, matrix, point)
             yield point
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         r, lam = start or at_rest(problem)
-        rho, low = (
-            1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0),
-            problem.law.lowest,
-        )
+        rho, low = 1 / eigenvalue_bound(problem.Q), problem.law.lowest
         while True:
             y = r - rho * ((problem.Q @ r.ravel()).reshape(r.shape) + problem.q)
             height = y[:, 0] - rho * (problem.V @ lam).reshape(r.shape)[:, 0]

@@ -65,7 +65,7 @@ from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
-from contactopt.methods.proximal import Proximal, proximal_equations, proximal_iterates
+from contactopt.methods.proximal import Proximal, proximal_iterates
 from contactopt.problem import InterfaceProblem, infeasibility
 
 logger = logging.getLogger(__name__)
@@ -137,7 +137,7 @@ class _Robust:
         self.problem, self.matrix = problem, block_matrix(problem.Q, problem.dim)
         self.sparse = sp.issparse(problem.Q)
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
-        self.evaluate = proximal_equations(problem, self.matrix).evaluate
+        self.evaluate = coulomb_equations(problem).evaluate
 
     def better(self, *points: Iterate) -> Iterate:
         """The point with the least residual, the first of equal ones."""
@@ -226,9 +226,10 @@ class _Robust:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns
         the last. `aim` is the residual that the first of these rounds must reach.
         """
-        equations = proximal_equations(self.problem, self.matrix)
+        equations = coulomb_equations(self.problem)
         best, target, point = np.inf, aim, start
-        for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
+        iterates = proximal_iterates(self.problem, self.matrix, start, alpha, gentle)
+        for done, point in enumerate(iterates, start=1):
             try:
                 yield point
             except Repeated:

@@ -66,7 +66,7 @@ CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
 CENTRAL_KEPT = 0.5  # share of this eigenvalue that a step keeps where it is less
 BACKTRACK = 0.8  # factor by which a step is shortened until it is so
 
-# Newton's steps from products with Q (contactopt.methods.kernels.alart_curnier, .krylov,
+# Newton's steps from products with Q (contactopt.methods.newton, contactopt.methods.kernels.krylov,
 # .linearised).
 KRYLOV_FIRST = 1e-2  # accuracy of the first step
 KRYLOV_LOOSEST, KRYLOV_TIGHTEST = 0.1, 1e-4  # bounds of the accuracy of the others
@@ -87,7 +87,7 @@ SCHUR_STEP = 1e-2  # accuracy of the solve with the Schur complement of the mode
 SCHUR_MARGIN = 1.5  # the model's Schur complement over that of a mean fit
 GIVEN_BALANCE = 1e-3  # accuracy of the equilibrium under forces to start from
 
-# Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels).
+# Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels, .level_steps).
 COARSEST = 12  # contacts along a side of a grid that is not halved
 NESTED_LOOSEST, NESTED_TIGHTEST = 0.1, 1e-4  # accuracy of the first steps, and of the last ones
 COARSE_ENOUGH = 3e-2  # residual at which a coarse grid has done its work, over the forces
@@ -99,13 +99,9 @@ LEAST_SYMBOL = 1e-3  # value of the symbol that is inverted, over its median
 LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where shifts of slipping contacts begin to grow, how much
 
-# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp). What single precision is worth
-# shows `python -m experiments.questions.dense_speed`.
-EIGENVALUE_MARGIN = 1.1  # on the largest eigenvalue, which power steps approach from below
-SINGLE_ACCURACY = 1e-4  # relative accuracy asked of one round in single precision
-SINGLE_STEPS = 300  # of one round
-SINGLE_PROGRESS = 0.1  # residual that the last round in single precision leaves, at least
-ROUND_SHARE = 0.3  # residual after the last round, over what is asked for
+# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).
+# on the estimate of the largest eigenvalue, which power steps approach from below
+EIGENVALUE_MARGIN = 1.1
 ROWS_FALL = 0.3  # factor by which the error of the rows should fall in one step of the multipliers
 ROWS_SHARE = 0.1  # accuracy of an inner solve, over the penalty times the error of the rows
 FINEST_SHARE = 1e-3  # and the finest, over the accuracy that is asked for

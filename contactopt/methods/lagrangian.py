@@ -22,10 +22,11 @@ import numpy as np
 
 from contactopt.linear.deadline import check_time
 from contactopt.methods.alternating import TwoStage
-from contactopt.methods.constants import EIGENVALUE_MARGIN, ROUGH_NORMAL, SHARPER, SHARPEST
+from contactopt.methods.constants import ROUGH_NORMAL, SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import largest_eigenvalue, smalbe
+from contactopt.methods.kernels.mprgp import eigenvalue_bound, smalbe
 from contactopt.methods.kernels.semismooth import Projection, crossover
+from contactopt.methods.kernels.splitting import Components
 from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
@@ -45,29 +46,15 @@ class Lagrangian(TwoStage):
     relaxation: float = 1.0
 
     def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
-        return Normal(problem, pushes, 0), Tangential(problem, ~pushes, 1)
+        return Normal(problem, pushes, True), Tangential(problem, ~pushes, False)
 
 
-class Part:
-    """Normal (first = 0) or tangential (first = 1) components of a problem, with the plates that
-    belong to them.
-    """
+class Part(Components):
+    """Normal or tangential components, and how each of them is solved for."""
 
-    def __init__(self, problem: InterfaceProblem, own: np.ndarray, first: int):
-        blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-        here, there = blocks[:, :1], blocks[:, 1:]
-        if first:
-            here, there = there, here
-        rows, others = here.ravel(), there.ravel()
-        self.problem, self.own, self.shape = problem, own, here.shape
-        self.q, self.V, self.V_there = problem.q.ravel()[rows], problem.V[rows], problem.V[others]
-        self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
-        self.step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(self.Q) or 1.0)
-
-    def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Linear term, own rigid motions and resultants, given the other components' forces."""
-        c = self.q + self.coupling @ fixed.ravel() + self.V[:, ~self.own] @ lam[~self.own]
-        return c, self.V[:, self.own], (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
+    def __init__(self, problem: InterfaceProblem, own: np.ndarray, normal: bool):
+        super().__init__(problem, own, normal)
+        self.step = 1 / eigenvalue_bound(self.Q)
 
 
 class Normal(Part):
@@ -75,10 +62,10 @@ class Normal(Part):
 
     def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
         low = self.problem.law.lowest
-        c, V, s = self.data(r[:, 1:], lam)
-        rough = smalbe(self.Q, c, low, V.T, -s, r[:, 0], lam[self.own], ROUGH_NORMAL)
+        c, s = self.given(r[:, 1:], lam)
+        rough = smalbe(self.Q, c, low, self.V.T, -s, r[:, 0], lam[self.own], ROUGH_NORMAL)
         project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
-        r_n, own = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
+        r_n, own = crossover(self.Q, c, self.V, s, project, rough.x[:, None], rough.multipliers)
         return np.concatenate([r_n, r[:, 1:]], axis=1), own
 
 
@@ -90,13 +77,13 @@ class Tangential(Part):
     accuracy = SHARPER
 
     def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
-        c, V, s = self.data(r[:, 0], lam)
+        c, s = self.given(r[:, 0], lam)
         r_t, radius, own = r[:, 1:], self.problem.law.bound(r[:, 0]), lam[self.own]
         project: Projection = lambda y: disc_derivative(y, radius)  # noqa: E731
         for _ in range(INNER):
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
-            new, own = project_balanced(project, y, V, s, self.step, own)
+            new, own = project_balanced(project, y, self.V, s, self.step, own)
             move, r_t = _over(new, r_t), new
             if move <= self.accuracy:
                 break

@@ -34,7 +34,9 @@ from contactopt.methods.constants import (
     NESTED_LOOSEST,
     NESTED_TIGHTEST,
 )
-from contactopt.methods.kernels.levels import Evaluation, Level, Point, step
+from contactopt.methods.kernels.alart_curnier import forcing
+from contactopt.methods.kernels.level_steps import step
+from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
@@ -171,12 +173,8 @@ def _solve_level(
 
 
 def _worth(residual: float, last: float) -> float:
-    """Relative accuracy of a step: little while the residual does not fall, because the contacts
-    still change.
-    """
-    if last in (0.0, np.inf):
-        return NESTED_LOOSEST
-    return min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2))
+    """Accuracy of a step: low while the residual does not fall, because contacts still change."""
+    return forcing(residual, last, NESTED_LOOSEST, NESTED_LOOSEST, NESTED_TIGHTEST)
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:

@@ -19,24 +19,22 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.linear.operators import InterfaceOperator, loosened
+from contactopt.methods.constants import KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST
 from contactopt.methods.kernels.alart_curnier import (
-    FIRST,
     admissible,
     cold_start,
     coulomb_equations,
-    dense,
     forcing,
-    krylov,
-    sparse,
+    newton_steps,
 )
-from contactopt.methods.kernels.balance import loose_motions, settled
+from contactopt.methods.kernels.balance import settled
 from contactopt.methods.kernels.coupled_newton import coupled_steps
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.method import Iterate, Known, Method
@@ -105,28 +103,23 @@ class Newton(Method):
         if self.linear == "dense" or (isinstance(problem.Q, InterfaceOperator) and not implicit):
             problem = problem.explicit()
         equations = coulomb_equations(problem)
-        if implicit:
-            P = model_of(problem, self.preconditioner)
-            if len(problem.pairs) > 1:
-                equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
-            step, first = krylov(P)
-        else:
-            step, first = sparse(problem) if sp.issparse(problem.Q) else dense(problem)
-        r, multipliers = cold_start(problem, first) if start is None else start
-        last, rtol = np.inf, FIRST
+        P = model_of(problem, self.preconditioner) if implicit else None
+        if P is not None and len(problem.pairs) > 1:
+            equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
+        step, first = newton_steps(problem, P)
+        r, multipliers = start or cold_start(problem, first, KRYLOV_FIRST)
+        last, rtol = np.inf, KRYLOV_FIRST
         while True:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
             sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            loose = loose_motions(problem.V, D)
-            if loose.size:
-                u = (sharp.Q @ r.ravel() + problem.V @ multipliers).reshape(r.shape) + problem.q
-                change = settled(sharp, problem.law, r, u, loose)
-                if change is not None:
-                    multipliers = multipliers + change
-                    residual, error, balance, D = sharp.evaluate(r, multipliers)
+            displacements = partial(sharp.displacements, r, multipliers)
+            change = settled(sharp, problem.law, r, D, displacements)
+            if change is not None:
+                multipliers = multipliers + change
+                residual, error, balance, D = sharp.evaluate(r, multipliers)
             yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
-            rtol = forcing(residual, last)
+            rtol = forcing(residual, last, KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST)
             moved = step(sharp, error, balance, D, rtol)
             if moved is None:
                 note(logger, UNSOLVED)

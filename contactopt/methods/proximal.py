@@ -19,7 +19,6 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.checks import check_number
-from contactopt.linear.operators import diagonal
 from contactopt.methods.constants import (
     EASY,
     FALL,
@@ -28,9 +27,9 @@ from contactopt.methods.constants import (
     RISE,
     SUBPROBLEM_STEPS,
 )
-from contactopt.methods.kernels.alart_curnier import cold_start
+from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.methods.kernels.sparse_newton import ProximalEquations
+from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 
@@ -55,27 +54,17 @@ class Proximal(Method):
         check_number("alpha", self.alpha, low=0.0)
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
+        matrix = block_matrix(problem.Q, problem.dim)
         bonded = isinstance(problem.Q, np.ndarray)
         point = start or (cold_start(problem) if bonded else at_rest(problem))
-        yield from proximal_iterates(equations, point, self.alpha)
-
-
-def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEquations:
-    """Alart and Curnier's equations of a dimensionless problem, without a proximal term: `at` gives
-    them a centre and a weight. `matrix` is the problem's Q, ready for block systems.
-    """
-    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
-    return ProximalEquations(
-        matrix, problem.q, problem.V, problem.s, problem.law.project, compliance
-    )
+        yield from proximal_iterates(problem, matrix, point, self.alpha)
 
 
 def proximal_iterates(
-    equations: ProximalEquations, point: Iterate, alpha: float, gentle: bool = False
+    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, gentle: bool = False
 ) -> Iterator[Iterate]:
     """The solution of one proximal subproblem after another, or of a failed one the point that
-    Newton's method left it at.
+    Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
 
     `alpha` is the first weight of the proximal term. It changes slowly if the loop is gentle, so
     that few subproblems fail: for problems on which every smaller alpha soon fails.
@@ -84,7 +73,8 @@ def proximal_iterates(
     if gentle:
         fall, rise, easy = GENTLE_FALL, GENTLE_RISE, EASY
     while alpha < LARGEST_WEIGHT:
-        new, solved, steps = equations.at(point[0], alpha).solve(*point)
+        equations = coulomb_equations(problem, point[0], alpha)
+        new, solved, steps = solve_subproblem(equations, matrix, point)
         yield new
         point = new if solved else point
         if not solved:

@@ -1,1 +1,43 @@
-"""One place solves a scene; the contact zone, the load path and several meshes are loops around it."""
+"""One place solves a scene (solve_scene); the contact zone, the load path and several meshes are
+loops around it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from contactopt.scenes.scene import Scene
+from contactopt.solving.follow import follow
+from contactopt.solving.solve_scene import Options, Solved
+from contactopt.solving.zone import solve_zone
+
+
+def solve_states(
+    states: Sequence[Scene],
+    elements: int | None = None,
+    options: Options | None = None,
+    start: Solved | None = None,
+) -> Solved:
+    """Solve a scene on meshes fitted to its contact zone, or follow the load path of several states
+    on one mesh.
+
+    Parameters
+    ----------
+    states : The scene, or the states of its load path.
+    elements : Across the contact half-width; the scene's own number by default.
+    options : How each state is solved.
+    start : The scene solved on another mesh, to start from; a path starts from the unloaded bodies.
+
+    Returns
+    -------
+    The scene, or the last state of the path with the whole path.
+
+    Raises
+    ------
+    InputError : As solve_zone() and follow().
+    """
+    if len(states) == 1:
+        return solve_zone(states[0], elements, options, start)
+    own = options or Options()
+    path = follow(states, elements, None, own.note, own.Q, own.solver, **own.of_solve)
+    return Solved(path.reduction, path.solution, path=path)

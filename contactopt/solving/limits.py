@@ -35,18 +35,16 @@ class Limits:
         check_number("max_memory", self.memory, low=0.0)
 
     def refusal(self, unknowns: float, usual: int, seconds: float, memory: float) -> str:
-        """Say which bound the next mesh would pass.
+        """Say in a sentence which bound the next mesh would pass; nothing if it passes none.
 
         Parameters
         ----------
-        unknowns : Unknowns that it would have.
-        usual : The bound on them where none was given.
-        seconds : Time that the search would have taken at its end [s].
-        memory : Memory that would be held at its end [bytes].
+        unknowns, usual : Unknowns that it would have, and the bound on them where none was given.
+        seconds, memory : What the search would have taken at its end [s], and hold [bytes].
 
         Returns
         -------
-        One sentence; an empty text if the mesh passes no bound.
+        The sentence, or an empty text.
         """
         most = usual if self.unknowns is None else self.unknowns
         if unknowns > most:

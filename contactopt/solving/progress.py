@@ -20,23 +20,13 @@ PATIENCE = 5.0  # seconds of a solve about which nothing is said
 def progress_lines(
     say: Callable[[str], None], problem: InterfaceProblem, tol: float
 ) -> Callable[[int, float], None]:
-    """Make a function for the `progress` of contactopt.solve that says a line for each outer
-    iteration.
+    """Make a function (iteration, residual) for the `progress` of contactopt.solve that says a line
+    for each outer iteration of a solve that ends at the residual tol.
 
     It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the
     V-cycles where the method works on the bodies themselves, the time, the largest memory of the
     process so far, and the time that is left if the residual goes on falling as it fell in the last
     iteration.
-
-    Parameters
-    ----------
-    say : A function that receives each line.
-    problem : The interface problem that is solved.
-    tol : The residual at which the solve will end.
-
-    Returns
-    -------
-    A function of the number of the iteration and of its residual.
     """
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
@@ -58,16 +48,8 @@ def progress_lines(
 
 
 def remaining(steps: list[tuple[float, float]], tol: float) -> str:
-    """Say how much time is left, from the last two steps of a solve.
-
-    Parameters
-    ----------
-    steps : The seconds spent [s] and the residual after each step.
-    tol : The residual at which the solve will end.
-
-    Returns
-    -------
-    ", about T s left"; nothing where the residual did not fall or is small enough.
+    """ ", about T s left", from the seconds spent and the residual after each of the last two steps
+    of a solve that ends at tol; nothing where the residual did not fall or is small enough.
     """
     if len(steps) < 2:
         return ""

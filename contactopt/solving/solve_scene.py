@@ -2,7 +2,7 @@
 
 Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with
 a scene. solve_loaded() goes on with the same bodies under other loads. contactopt.solving.zone
-remeshes to the contact zone, contactopt.solving.paths follows a load path, and contactopt.accuracy
+remeshes to the contact zone, contactopt.solving.follow follows a load path, and contactopt.accuracy
 refines meshes around both.
 """
 
@@ -13,7 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,10 +28,8 @@ from contactopt.problem.transfer import transfer
 from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
 from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
+from contactopt.solving.paths import PathResult
 from contactopt.solving.progress import progress_lines
-
-if TYPE_CHECKING:
-    from contactopt.solving.paths import PathResult
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
@@ -122,21 +120,18 @@ def solve_scene(
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
     coarse: dict[str, float] = {}
-    operator = reduction.problem.Q
-    products = isinstance(operator, InterfaceOperator) and operator.coupled is None
+    Q = reduction.problem.Q
     # half-spaces have coarse grids of their own
-    products = products and not isinstance(operator, Convolution)
+    products = isinstance(Q, InterfaceOperator) and not isinstance(Q, Convolution) and not Q.coupled
     coarser = elements // FACTOR[scene.dim]
     if start is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         coarse = {"coarse": time.perf_counter() - begin}
     options.note(f"solving {reduction.problem.contacts} contacts")
-    first = (
-        None
-        if start is None
-        else transfer(start.reduction.problem, start.solution, reduction.problem)
-    )
+    first = None
+    if start is not None:
+        first = transfer(start.reduction.problem, start.solution, reduction.problem)
     solved = _solved(reduction, first, options, coarse)
     log.info("%s: %d elements, %s", scene.name, elements, solved.solution.status)
     return solved
@@ -145,21 +140,10 @@ def solve_scene(
 def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Options) -> Solved:
     """Solve the next state of a load path: the same bodies, coupling and Q under other loads.
 
-    Parameters
-    ----------
-    scene : the state, which differs from the one before in its loads only
-    before : the state before, whose solution is the start
-    slipped : (k, dim - 1) tangential displacements of the contacts in the state before, from which
-        slip is measured [length]
-    options : how to solve it; the form of Q and the bodies' solvers stay those of `before`
-
-    Returns
-    -------
-    Solved : whose problem is that of this step alone
-
-    Raises
-    ------
-    InputError : if more than loads and friction differ
+    The solution of the state before is the start, and slip is measured from its tangential
+    displacements (k, dim - 1) [length]. The form of Q and the bodies' solvers stay as they are. The
+    problem that comes back is that of this step alone. InputError if more than loads and friction
+    differ.
     """
     reduction = before.reduction.loaded(scene)
     q = reduction.problem.q.copy()

@@ -18,7 +18,8 @@ from contactopt.analytic import (
 )
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.scenes.scene import Part, Scene
-from contactopt.solving.paths import PathResult, follow
+from contactopt.solving.follow import follow
+from contactopt.solving.paths import PathResult
 from experiments.report import write
 
 FORCE, MU, DEPTH, RADIUS = 100.0, 0.5, 400.0, 10000.0  # the scenes' defaults; RADIUS in 3D

@@ -15,7 +15,8 @@ from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline, pieces, triangles
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.meshes.cells import elements_of
-from contactopt.solving.paths import PathResult, follow
+from contactopt.solving.follow import follow
+from contactopt.solving.paths import PathResult
 from experiments.report import REPORTS
 
 SHEAR = 40.0  # N of the 50 N at which the cylinder would slide

@@ -25,8 +25,7 @@ from contactopt.bodies import assemble
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.linear.concurrency import each
-from contactopt.linear.threads import one_blas_thread
+from contactopt.linear.concurrency import each, one_blas_thread
 from contactopt.problem.laws.coulomb import Coulomb
 from experiments.report import REPORTS, markdown, merged, write
 

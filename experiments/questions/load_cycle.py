@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from contactopt import scenes
 from contactopt.figures.animation import animate, energies, loop
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.solving.paths import PathResult, follow
+from contactopt.solving.follow import follow
+from contactopt.solving.paths import PathResult
 from experiments.questions.cattaneo import exact_loss, loop_area
 from experiments.report import REPORTS, write
 

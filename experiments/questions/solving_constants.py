@@ -29,7 +29,7 @@ from experiments.report import write  # noqa: E402
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
 USERS = {
-    "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
+    "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
         "auto",
         "auto",
         ("elastic", "rigid", "packing"),
@@ -48,21 +48,18 @@ USERS = {
         "auto",
         ("rigid", "packing"),
     ),
-    "KRYLOV_LOOSEST KRYLOV_TIGHTEST": ("kernels.alart_curnier", "newton", ("products",)),
+    "KRYLOV_FIRST KRYLOV_LOOSEST KRYLOV_TIGHTEST": ("newton", "newton", ("products",)),
     "PRODUCT_SHARE MODEL_STEP MODEL_PRODUCTS": ("kernels.krylov", "newton", ("products",)),
     "SLIPPING": ("kernels.linearised", "newton", ("products",)),
     "ACTIVE_SETS SUCCESS WEIGHT_FALL WEIGHT_RISE": ("kernels.subproblems", "pcg", ("products",)),
-    "COUPLED_FIRST COUPLED_LOOSEST COUPLED_TIGHTEST SCHUR_STEP SCHUR_MARGIN": (
+    "COUPLED_FIRST COUPLED_LOOSEST COUPLED_TIGHTEST SCHUR_STEP SCHUR_MARGIN GIVEN_BALANCE": (
         "kernels.coupled_newton",
         "newton",
         ("bodies",),
     ),
-    "COARSEST LEAST_SYMBOL LEAST_DETERMINANT FIRST_SHIFT SHIFT_RATIO": (
-        "kernels.levels",
-        "nested",
-        ("half-spaces",),
-    ),
-    "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS": (
+    "COARSEST LEAST_SYMBOL LEAST_DETERMINANT": ("kernels.levels", "nested", ("half-spaces",)),
+    "FIRST_SHIFT SHIFT_RATIO": ("kernels.level_steps", "nested", ("half-spaces",)),
+    "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS COARSE_TRIES CLOSER": (
         "nested",
         "nested",
         ("half-spaces",),

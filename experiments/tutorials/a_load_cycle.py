@@ -15,7 +15,7 @@ import numpy as np
 
 from contactopt import scenes
 from contactopt.analytic import cycle_loss_line
-from contactopt.solving.paths import follow
+from contactopt.solving.follow import follow
 
 # %% [markdown]
 # ## From one step to a path

@@ -41,22 +41,15 @@ def project_balanced(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve r = P(y - rho V lambda), V' r + s = 0 for r and lambda.
+    """Solve r = P(y - rho V lambda), V' r + s = 0 for r (k, d) and lambda (p,).
 
     If no r in the set keeps the balance, the r of the last lambda comes back.
 
-    Parameters
-    ----------
-    project : P and its derivative; P is a projection on a closed convex set that holds zero
-    y : (k, d) the point that is projected
-    V, s : (k d, p) rigid motions and (p,) resultants
-    step : rho, greater than 0: one number or one per contact (k,)
-    multipliers : (p,) where lambda starts
-    steps : of Newton's method at most
-
-    Returns
-    -------
-    r (k, d) and lambda (p,)
+    project      P and its derivative; P is a projection on a closed convex set that holds zero
+    y            (k, d) the point that is projected
+    V, s         (k d, p) rigid motions and (p,) resultants
+    step         rho, greater than 0: one number or one per contact (k,)
+    multipliers  (p,) where lambda starts;  steps  of Newton's method at most
     """
     lam = multipliers
     if len(s) == 0:
@@ -118,14 +111,8 @@ def _least(slope: Callable[[float], float], first: float) -> float:
 def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
     """Find the motions that no closed contact holds along its normal and no sticking one at all.
 
-    Parameters
-    ----------
-    V : (k d, p) rigid motions.
-    D : (k, d, d) derivative of the law's map.
-
-    Returns
-    -------
-    (p, j) orthonormal columns, combinations of the multipliers.
+    V (k d, p) are the rigid motions, D (k, d, d) the derivative of the law's map. The columns (p,
+    j) that come back are orthonormal combinations of the multipliers.
     """
     d = D.shape[1]
     firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
@@ -136,41 +123,36 @@ def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
 
 
 def settled(
-    equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose: np.ndarray
+    equations: Equations,
+    law: Law,
+    r: np.ndarray,
+    D: np.ndarray,
+    displacements: Callable[[], np.ndarray],
 ) -> np.ndarray | None:
-    """Find the change of the multipliers with which friction balances motions that no contact
-    holds.
+    """Find the change (p,) of the multipliers with which friction balances motions that no contact
+    holds; None where there are no such motions, or no friction balances the loads.
 
     Newton's method linearises the contacts. Where all of them slip, their forces do not change with
     such a motion, and its system says nothing about it: it is singular, or its steps jump to and
     fro over the contact that should stick. Here the normal forces are bounds of the friction, and
     the motion follows from a convex problem.
 
-    Parameters
-    ----------
-    equations : The equations of contact and friction.
-    law : Their law.
-    r, u : (k, d) forces and displacements.
-    loose : (p, j) the motions, as `loose_motions` finds them.
-
-    Returns
-    -------
-    The change (p,); None if no friction balances the loads.
+    r are the forces (k, d), D is the derivative of the law's map there, and `displacements` gives u
+    (k, d).
     """
+    loose = loose_motions(equations.V, D)
+    if not loose.size:
+        return None
     k, d = r.shape
-    y = r - equations.rho[:, None] * u
+    y = r - equations.rho[:, None] * displacements()
     normal = np.maximum(y[:, 0], law.lowest)
     bound, W = law.bound(normal), (equations.V @ loose).reshape(k, d, -1)
     s = loose.T @ equations.s + normal @ W[:, 0]
     slide = bound > 0
     if not slide.any():
         return None
-    t, bound, rho, W = (
-        y[slide, 1:],
-        bound[slide],
-        equations.rho[slide],
-        W[slide, 1:].reshape(-1, W.shape[2]),
-    )
+    t, bound, rho = y[slide, 1:], bound[slide], equations.rho[slide]
+    W = W[slide, 1:].reshape(-1, W.shape[2])
 
     def balanced(moved: np.ndarray, share: float, steps: int = STEPS) -> tuple[np.ndarray, bool]:
         P, moved = project_balanced(_softened(bound, share), t, W, s, rho, moved, steps)

@@ -71,26 +71,18 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the Newton step that `Equations.step` takes.
+        """Solve for the Newton step that `Equations.step` takes; LinAlgError if it is singular.
 
         Parameters
         ----------
-        rho : (k,) steps of the map.
-        error : (k, d) right-hand side of the contact equations.
-        balance : (p,) error of the balance.
-        D : (k, d, d) derivatives of the law's map.
+        rho, error, balance, D : (k,), (k, d), (p,) and (k, d, d), as there.
 
         Returns
         -------
         dr (k, d) and dlambda (p,).
-
-        Raises
-        ------
-        LinAlgError : If the system is singular.
         """
         k, d = error.shape
-        # N, the unknowns of the contacts that are open or slip. The right-hand side of those that
-        # stick is error / rho.
+        # N are unknowns of contacts that are open or slip; the right side of others is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()

@@ -21,15 +21,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
+from contactopt.linear.concurrency import one_blas_thread
 from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
 from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, norm
-from contactopt.linear.threads import one_blas_thread
 from contactopt.methods.constants import (
     COUPLED_FIRST,
     COUPLED_LOOSEST,
@@ -41,20 +41,20 @@ from contactopt.methods.constants import (
 from contactopt.methods.kernels.alart_curnier import (
     admissible,
     coulomb_equations,
+    forcing,
     glued_contacts,
     glued_projection,
 )
-from contactopt.methods.kernels.balance import loose_motions, settled
+from contactopt.methods.kernels.balance import settled
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
 from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.method import Iterate, Known
 from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
 MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
-
-Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,21 +146,13 @@ def coupled_steps(
     problem: InterfaceProblem,
     form: CoupledForm,
     preconditioner: str | None,
-    start: tuple[np.ndarray, np.ndarray] | None,
+    start: Iterate | None,
 ) -> Iterator[tuple[Known, float]]:
     """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
 
-    Parameters
-    ----------
-    problem : A dimensionless interface problem.
-    form : Its Q before condensation.
-    preconditioner : A name, as for `model_of`.
-    start : Forces (k, dim) and multipliers (p,) to start from; None: the bonded solution.
-
-    Yields
-    ------
-    An iterate, and the residual of the equations that its step began with. The iteration ends where
-    a step fails.
+    `form` is the dimensionless problem's Q before condensation; `start` None stands for the bonded
+    solution. Yields an iterate, and the residual of the equations that its step began with. The
+    iteration ends where a step fails.
     """
     with one_blas_thread():
         several = len(problem.pairs) > 1
@@ -170,18 +162,14 @@ def coupled_steps(
         at = (
             _bonded(problem, coupled)
             if start is None
-            else State(in_equilibrium(form, start[0]), *start)
+            else State(in_equilibrium(form, start[0], GIVEN_BALANCE), *start)
         )
     last = np.inf
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
-            loose = loose_motions(problem.V, linearised.D)
-            change = (
-                settled(equations, problem.law, at.r, coupled.moved(at), loose)
-                if loose.size
-                else None
-            )
+            displacements = partial(coupled.moved, at)
+            change = settled(equations, problem.law, at.r, linearised.D, displacements)
             if change is not None:
                 at = replace(at, multipliers=at.multipliers + change)
                 right, linearised = coupled.linearised(at)
@@ -189,11 +177,7 @@ def coupled_steps(
             error = _parted(right)[1].reshape(at.r.shape)
             known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
         yield known, residual
-        rtol = (
-            min(COUPLED_LOOSEST, max(COUPLED_TIGHTEST, 0.5 * (residual / last) ** 2))
-            if np.isfinite(last)
-            else COUPLED_FIRST
-        )
+        rtol = forcing(residual, last, COUPLED_FIRST, COUPLED_LOOSEST, COUPLED_TIGHTEST)
         with one_blas_thread():
             at, last = coupled.step(at, right, linearised, rtol), residual
 
@@ -217,8 +201,7 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
 
 def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
     """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a
-    random force does most of
-    its work.
+    random force does most of its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur
     complement that is rather too large than too small.
@@ -241,22 +224,11 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
-    """Compute displacements close to A^-1 T' r, by conjugate gradients with V-cycles.
-
-    Parameters
-    ----------
-    form : Q before condensation.
-    r : (k, dim) contact forces.
-    rtol : Relative accuracy in the energy norm.
-
-    Returns
-    -------
-    Displacements X of the bodies.
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
+    """Compute displacements X of the bodies close to A^-1 T' r for contact forces r (k, dim), by
+    conjugate gradients with one V-cycle B as preconditioner, to a relative accuracy in the energy
+    norm; `size` is the energy residual' B residual.
     """
-    # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy
-    # residual' B
-    # residual.
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X
@@ -276,11 +248,9 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE
 
 
 def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
-    """One vector of the parts of X, of r (k d,) and of multipliers (p,)."""
     return Stacked((*X.parts, r, multipliers))
 
 
 def _parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
-    """X, r and the multipliers of a joined vector."""
     *X, r, multipliers = x.parts
     return Stacked(tuple(X)), r, multipliers

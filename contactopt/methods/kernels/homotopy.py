@@ -33,18 +33,10 @@ from typing import NamedTuple
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.methods.kernels.interior import (
-    RIDGE,
-    Iterate,
-    Scaling,
-    det,
-    direction,
-    lorentz,
-    times,
-)
-from contactopt.methods.kernels.sparse_blocks import Blocks, Solver
+from contactopt.methods.kernels.interior import Lorentz, System, det, times
+from contactopt.methods.kernels.sparse_blocks import Blocks
+from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import coulomb_cone
 
 BEND = 0.5  # between 0, where slip has a kink at z_t = 0, and 1, where nothing is left of friction
 # Newton steps, over the point: on the path, and beyond which a step along it was too long
@@ -97,26 +89,21 @@ class Along:
     point     at which the equations were linearised
     back      Newton's step to the path, across the tangent
     tangent   in the direction in which t grows
-    scaling   of the point
+    system    the factorised system of the point
     mean      complementarity t m
-    solve     the factorised system
     """
 
     point: Point
     back: Point
     tangent: Point
-    scaling: Scaling
+    system: System
     mean: float
-    solve: Solver
 
     def relative(self, change: Point) -> Relative:
         """A change over the point, in Nesterov and Todd's scaling."""
-        root = np.sqrt(self.mean)
-        x, z = (
-            times(self.scaling.M, change.x) / root,
-            times(self.scaling.M_inverse, change.z) / root,
-        )
-        return x, z, change.t / self.point.t
+        root, scaling = np.sqrt(self.mean), self.system.scaling
+        x, z = times(scaling.M, change.x), times(scaling.M_inverse, change.z)
+        return x / root, z / root, change.t / self.point.t
 
     def size(self, change: Point) -> float:
         """The largest relative change of a contact."""
@@ -128,10 +115,14 @@ class Along:
         a, b = self.relative(self.tangent), self.relative(other)
         return _inner(a, b) / np.sqrt(_inner(a, a) * _inner(b, b))
 
-    def sign(self, V: np.ndarray) -> float:
-        """Of the determinant of the equations by x, z and lambda, but for a constant factor."""
-        plates = np.sign(np.linalg.det(V.T @ self.solve(V))) if V.shape[1] else 1.0
-        return self.solve.sign() * float(plates)
+    def sign(self) -> float:
+        """Of the determinant of the equations by x, z and lambda, but for a constant factor: 1
+        where t falls going forward, -1 where it rises.
+        """
+        cones, solve = self.system.cones, self.system.solve
+        V = cones.problem.V[cones.kept.ravel()]
+        plates = np.sign(np.linalg.det(V.T @ solve(V))) if V.shape[1] else 1.0
+        return solve.sign() * float(plates)
 
 
 def _inner(a: Relative, b: Relative) -> float:
@@ -139,9 +130,8 @@ def _inner(a: Relative, b: Relative) -> float:
 
 
 def _slip(z: np.ndarray) -> np.ndarray:
-    return np.asarray(
-        np.sqrt((1 - BEND**2) * np.sum(z[:, 1:] ** 2, axis=1) + BEND**2 * z[:, 0] ** 2)
-    )
+    square = (1 - BEND**2) * np.sum(z[:, 1:] ** 2, axis=1) + BEND**2 * z[:, 0] ** 2
+    return np.asarray(np.sqrt(square))
 
 
 class Homotopy:
@@ -150,68 +140,39 @@ class Homotopy:
     """
 
     def __init__(self, problem: InterfaceProblem, matrix: Blocks, sizes: np.ndarray):
-        self.problem, self.matrix, self.m = problem, matrix, START**2
-        self.scale, self.kept = lorentz(problem)
-        self.acts = self.kept[:, 1].astype(float)  # friction
-        x, z = np.zeros(problem.q.shape), np.zeros(problem.q.shape)
+        self.cones, self.m = Lorentz(problem, matrix), START**2
+        x, z, lam = np.zeros(problem.q.shape), np.zeros(problem.q.shape), np.zeros(len(problem.s))
         x[:, 0], z[:, 0] = sizes, self.m / sizes
-        self.first = Point(x, z, np.zeros(len(problem.s)), 1.0)
-        self.c = np.where(self.kept, z - self.moved(self.first), 0.0)
-        self.b = problem.V.T @ (self.scale * x).ravel() + problem.s
-
-    def moved(self, point: Point) -> np.ndarray:
-        """u of the forces and multipliers of a point, in the units of z."""
-        r = (self.scale * point.x).ravel()
-        u = (self.matrix.Q @ r + self.problem.V @ point.lam).reshape(point.x.shape)
-        return np.asarray(self.scale * (u + self.problem.q))
+        self.first = Point(x, z, lam, 1.0)
+        self.c = -self.cones.gap(x, z, lam, np.zeros(len(x)))
+        self.b = self.cones.unbalanced(x)
 
     def along(self, point: Point) -> Along | None:
         """The path near a point; None where the linear system is singular."""
-        x, z, _, t = point
-        (k, d), V, scale = x.shape, self.problem.V, self.scale
-        scaling, mean = Scaling(x, z), t * self.m
-        slip = _slip(z)
-        gap = self.moved(point) - z + t * self.c
-        gap[:, 0] += self.acts * (1 - t) * slip
-        gap[~self.kept] = 0.0
+        x, z, lam, t = point
+        slip, mean, cones = _slip(z), t * self.m, self.cones
+        gap = cones.gap(x, z, lam, (1 - t) * slip) + t * self.c
         ahead = self.c.copy()  # derivative of gap by t
-        ahead[:, 0] -= self.acts * slip
-        unbalanced = V.T @ (scale * x).ravel() + self.problem.s - t * self.b
-        shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
-        friction = (self.acts * (1 - t) / slip)[:, None]
-        shear[:, 0, 1:] -= (1 - BEND**2) * friction * z[:, 1:]
-        shear[:, 0, :1] -= BEND**2 * friction * z[:, :1]
-        added = (shear @ scaling.F) / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(d)
-        solve = self.matrix.factor(None, added, self.kept.ravel())
-        if solve is None:
+        ahead[cones.rough, 0] -= slip[cones.rough]
+        slopes = np.concatenate([BEND**2 * z[:, :1], (1 - BEND**2) * z[:, 1:]], axis=1)
+        slopes *= (np.where(cones.rough, 1 - t, 0.0) / slip)[:, None]
+        system = cones.linearised(x, z, slopes)
+        if system is None:
             return None
-        newton = direction(
-            solve, scaling, shear, gap, scale, self.kept, V, unbalanced, mean * scaling.inverse - z
-        )
-        tangent = direction(
-            solve, scaling, shear, ahead, scale, self.kept, V, -self.b, self.m * scaling.inverse
-        )
+        inverse = system.scaling.inverse
+        newton = system.direction(gap, cones.unbalanced(x) - t * self.b, mean * inverse - z)
+        tangent = system.direction(ahead, -self.b, self.m * inverse)
         if newton is None or tangent is None:
             return None
         step, way = Point(*newton, 0.0), Point(*tangent, 1.0)
-        found = Along(point, step, way, scaling, mean, solve)
+        found = Along(point, step, way, system, mean)
         a, b = found.relative(step), found.relative(way)
         return replace(found, back=step.plus(way.times(-_inner(a, b) / _inner(b, b))))
 
-    def sign(self, found: Along) -> float:
-        """1 where t falls going forward, -1 where it rises, but for a constant factor."""
-        return found.sign(self.problem.V[self.kept.ravel()])
-
     def answer(self, point: Point) -> tuple[Iterate, float]:
         """The forces and multipliers of a point, and how far they are from a solution."""
-        u = self.moved(point)
-        u[:, 0] += self.acts * _slip(point.z)
-        mean = float(np.sum(point.x * point.z)) / len(u)
-        miss = float(np.linalg.norm((u - point.z)[self.kept])) / np.sqrt(len(u))
-        r = self.scale * point.x
-        balance = self.problem.V.T @ r.ravel() + self.problem.s
-        error = max(mean, miss, float(np.abs(balance).max(initial=0.0)))
-        return (coulomb_cone(r, self.problem.mu), point.lam), error
+        x, z, lam, _ = point
+        return self.cones.answer(x, z, lam, self.cones.gap(x, z, lam, _slip(z)))
 
 
 def homotopy_iterates(
@@ -221,9 +182,7 @@ def homotopy_iterates(
     solution: one at each new half of t.
 
     It ends near a solution, where the path cannot be followed further, or after that many
-    factorisations.
-
-    random  draws another first point, of another path
+    factorisations. `random` draws another first point, of another path.
     """
     spread = np.zeros(problem.contacts) if random is None else random.normal(size=problem.contacts)
     path = Homotopy(problem, matrix, START * np.exp(spread))
@@ -232,7 +191,7 @@ def homotopy_iterates(
     here = path.along(path.first)
     if here is None:
         return
-    start, forward = path.sign(here), -1.0
+    start, forward = here.sign(), -1.0
     while True:
         if here.point.t <= best / 2:
             best = here.point.t
@@ -248,7 +207,7 @@ def homotopy_iterates(
             if left <= 0:
                 return
             if found is not None:
-                forward = -1.0 if path.sign(found) == start else 1.0
+                forward = -1.0 if found.sign() == start else 1.0
                 if forward * found.cosine(way) > TURN or length < SHARP:
                     break
             length, failed = CUT * length, True
@@ -287,6 +246,6 @@ def _corrected(path: Homotopy, point: Point, left: int) -> tuple[Along | None, i
             return None, used, first
         if size <= NEAR:
             return found, used, first
-        fraction = min(1.0, 0.9 * found.scaling.longest(found.back.x, found.back.z))
+        fraction = min(1.0, 0.9 * found.system.scaling.longest(found.back.x, found.back.z))
         point, last = point.plus(found.back.times(fraction)), size
     return None, MOST, first

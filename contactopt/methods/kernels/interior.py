@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
@@ -45,6 +44,7 @@ from contactopt.methods.constants import (
     STUCK_CENTERING,
 )
 from contactopt.methods.kernels.sparse_blocks import Blocks, Solver, bordered
+from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone
 
@@ -52,8 +52,6 @@ NEAR = 1e-9  # complementarity and residual at which it ends
 RIDGE = 1e-10  # added to the diagonal of the dimensionless Q, for directions without compliance
 TINY = 1e-20  # added to |u_t|^2, whose root has no derivative at zero
 BACKTRACKS = 30  # shortenings of a step, which leave a thousandth of it
-
-Iterate = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,145 +76,166 @@ class Path:
     def random(cls, rng: np.random.Generator, contacts: int) -> Path:
         """A path drawn at random."""
         size = START ** rng.uniform() * np.exp(rng.normal(size=(2, contacts)))
-        return cls(
-            smooth=float(np.exp(rng.uniform(*np.log((LEAST_SMOOTHING, MOST_SMOOTHING))))),
-            first=size,
+        smooth = np.exp(rng.uniform(*np.log((LEAST_SMOOTHING, MOST_SMOOTHING))))
+        return cls(smooth=float(smooth), first=size)
+
+
+class Lorentz:
+    """A dimensionless problem in Lorentz's cones: r = scale x and z = scale (u + mu |u_t| n).
+
+    matrix  its Q, ready for block systems
+    scale   (k, d);  kept  mask (k, d) of what friction leaves free;  rough  (k,) contacts with
+            friction
+    """
+
+    def __init__(self, problem: InterfaceProblem, matrix: Blocks):
+        self.problem, self.matrix = problem, matrix
+        self.scale, self.kept = np.ones(problem.q.shape), np.ones(problem.q.shape, dtype=bool)
+        self.rough = problem.mu >= FRICTIONLESS
+        self.scale[:, 0] = 1 / np.where(self.rough, np.minimum(problem.mu, ROUGHEST), 1.0)
+        self.kept[~self.rough, 1:] = False
+
+    def gap(self, x: np.ndarray, z: np.ndarray, lam: np.ndarray, slip: np.ndarray) -> np.ndarray:
+        """By how much z misses u (k, d) of the forces x and the multipliers, with slip (k,) added
+        where there is friction.
+        """
+        r = (self.scale * x).ravel()
+        u = (self.matrix.Q @ r + self.problem.V @ lam).reshape(x.shape) + self.problem.q
+        gap = self.scale * u - z
+        gap[self.rough, 0] += slip[self.rough]
+        return np.where(self.kept, gap, 0.0)
+
+    def unbalanced(self, x: np.ndarray) -> np.ndarray:
+        """V' r + s (p,)."""
+        return np.asarray(self.problem.V.T @ (self.scale * x).ravel() + self.problem.s)
+
+    def answer(
+        self, x: np.ndarray, z: np.ndarray, lam: np.ndarray, gap: np.ndarray
+    ) -> tuple[Iterate, float]:
+        """Forces in the cone and multipliers, and how far they are from a solution: the largest of
+        the mean complementarity, the error of the law and that of the balance.
+        """
+        error = max(
+            float(np.sum(x * z)) / len(x),
+            float(np.linalg.norm(gap)) / np.sqrt(len(x)),
+            float(np.abs(self.unbalanced(x)).max(initial=0.0)),
         )
+        return (coulomb_cone(self.scale * x, self.problem.mu), lam), error
+
+    def linearised(self, x: np.ndarray, z: np.ndarray, slopes: np.ndarray) -> System | None:
+        """The factorised linear system at a point, where the slip falls with z by slopes (k, d);
+        None if it is singular.
+        """
+        k, d = x.shape
+        scale, scaling = self.scale, Scaling(x, z)
+        shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
+        shear[:, 0] -= slopes
+        # The scaling gives dz = target - F dx. Put into the linearised z the system for dr is
+        # (Q + shear F / scale^2) dr + V dlambda = right, with one block added per contact.
+        added = (shear @ scaling.F) / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(d)
+        solve = self.matrix.factor(None, added, self.kept.ravel())
+        return None if solve is None else System(self, scaling, shear, solve)
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The linear system of one point: its scaling, the derivative `shear` (k, d, d) of z - slip n
+    by z, and the factors.
+    """
+
+    cones: Lorentz
+    scaling: Scaling
+    shear: np.ndarray
+    solve: Solver
+
+    def direction(
+        self, gap: np.ndarray, unbalanced: np.ndarray, target: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None
+        if there are none.
+        """
+        scale, kept = self.cones.scale, self.cones.kept
+        V = self.cones.problem.V[kept.ravel()]
+        right = ((times(self.shear, target) - gap) / scale).ravel()[kept.ravel()]
+        answer = bordered(self.solve, right, V, V, -unbalanced)
+        if answer is None:
+            return None
+        dr = np.zeros(kept.size)
+        dr[kept.ravel()] = answer[0]
+        dx = dr.reshape(kept.shape) / scale
+        return dx, np.where(kept, target - times(self.scaling.F, dx), 0.0), answer[1]
 
 
 def interior_iterates(
     problem: InterfaceProblem, matrix: Blocks, path: Path | None = None
 ) -> Iterator[tuple[Iterate, float]]:
-    """Iterate the interior-point method on a dimensionless problem.
+    """Iterate the interior-point method on a dimensionless problem whose Q is `matrix`.
 
-    Parameters
-    ----------
-    problem : The dimensionless interface problem of k contacts.
-    matrix : Its Q, ready for block systems.
-    path : How the path to the solution is taken; by default as Path() says.
-
-    Yields
-    ------
-    A point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the largest
-    of the mean complementarity, the error of the law and that of the balance [-].
+    Yields a point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the
+    largest of the mean complementarity, the error of the law and that of the balance [-].
     """
-    path = path or Path()
-    full = path.full
-    k, d = problem.q.shape
-    scale, kept = lorentz(problem)
-    smooth = ~kept[:, 1]
-    flat, V, p = kept.ravel(), problem.V, len(problem.s)
+    path, cones = path or Path(), Lorentz(problem, matrix)
     # The first point lies on the axes of both cones, so that it is in their middle.
-    x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
+    x, z, lam = np.zeros(problem.q.shape), np.zeros(problem.q.shape), np.zeros(len(problem.s))
     x[:, 0], z[:, 0] = path.first
-    best, since, last = np.inf, 0, 1.0
+    best, since, length = np.inf, 0, 1.0
     for _ in range(INTERIOR_STEPS):
-        # The residuals of the three conditions: z = scale (u + mu |u_t| n), the balance, and x'z =
-        # 0 per contact.
         slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + (path.smooth * z[:, 0]) ** 2 + TINY)
-        r = scale * x
-        gap = scale * ((matrix.Q @ r.ravel() + V @ lam).reshape(k, d) + problem.q) - z
-        gap[:, 0] += np.where(smooth, 0.0, slip)
-        gap[~kept] = 0.0
-        unbalanced = V.T @ r.ravel() + problem.s
-        mean = float(np.sum(x * z)) / k
-        error = max(
-            mean,
-            float(np.linalg.norm(gap)) / np.sqrt(k),
-            float(np.abs(unbalanced).max(initial=0.0)),
-        )
-        yield (coulomb_cone(r, problem.mu), lam), error
+        gap = cones.gap(x, z, lam, slip)
+        point, error = cones.answer(x, z, lam, gap)
+        yield point, error
         since = 0 if error < INTERIOR_PROGRESS * best else since + 1
         best = min(best, error)
         if error < NEAR or since >= STALLED or not np.isfinite(error):
             return
-        # Linearise |u_t| = |z_t|: `shear` is the derivative of z - |z_t| n by z. The scaling gives
-        # dz = target - F dx.
-        # Put in, the system for dr is (Q + shear F / scale^2) dr + V dlambda = right, with one
-        # block added per contact.
-        scaling = Scaling(x, z)
-        bend = 1.0 if full or last > STUCK else 0.0
-        shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
-        shear[:, 0, 1:] = np.where(smooth[:, None], 0.0, -bend * z[:, 1:] / slip[:, None])
-        added = (shear @ scaling.F) / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(d)
-        solve = matrix.factor(None, added, flat)
-        if solve is None:
+        bent, slopes = path.full or length > STUCK, np.zeros_like(z)
+        if bent:  # linearise |u_t| = |z_t|
+            slopes[cones.rough, 1:] = (z[:, 1:] / slip[:, None])[cones.rough]
+        system = cones.linearised(x, z, slopes)
+        step = None if system is None else _centred_step(system, gap, bent)
+        if system is None or step is None:
             return
-
-        towards = partial(direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
-        # Predictor: the step towards complementarity zero, as far as it stays in the cones.
-        first = towards(-z)
-        if first is None:
-            return
-        length = min(1.0, PREDICTED * scaling.longest(first[0], first[1]))
-        # The better the predictor, the less the next step is centred (Mehrotra).
-        ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
-        centering = float(
-            np.clip(
-                np.clip(ahead / mean, 0.0, 1.0) ** 3,
-                LEAST_CENTERING if bend else STUCK_CENTERING,
-                MOST_CENTERING,
-            )
-        )
-        # Corrector: the same system with the centring and the second-order term of the predictor.
-        second = scaling.corrector(first[0], first[1]) if length > CORRECTED else 0.0
-        step = towards(centering * mean * scaling.inverse - z - second)
-        if step is None:
-            return
-        length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
-        # Shorten the step until no contact comes near the boundary of its cones long before the
-        # others.
-        least = np.minimum(CENTRAL, CENTRAL_KEPT * scaling.centrality / mean)
-        for _ in range(BACKTRACKS):
-            new = x + length * step[0], z + length * step[1]
-            if np.all(
-                np.sqrt(np.maximum(det(new[0]) * det(new[1]), 0.0))
-                >= least * np.sum(new[0] * new[1]) / k
-            ):
-                break
-            length *= BACKTRACK
-        last = length
-        x, z, lam = new[0], new[1], lam + length * step[2]
+        boundary = SHORT if path.full else BOUNDARY
+        length = _way(system.scaling, step[0], step[1], boundary)
+        x, z, lam = x + length * step[0], z + length * step[1], lam + length * step[2]
 
 
-def lorentz(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """scale (k, d) with r = scale x and z = scale (u + mu |u_t| n), and the mask kept (k, d) of
-    what friction leaves free.
-    """
-    scale, kept = np.ones(problem.q.shape), np.ones(problem.q.shape, dtype=bool)
-    smooth = problem.mu < FRICTIONLESS
-    scale[:, 0] = 1 / np.where(smooth, 1.0, np.minimum(problem.mu, ROUGHEST))
-    kept[smooth, 1:] = False
-    return scale, kept
-
-
-def direction(
-    solve: Solver,
-    scaling: Scaling,
-    shear: np.ndarray,
-    gap: np.ndarray,
-    scale: np.ndarray,
-    kept: np.ndarray,
-    V: np.ndarray,
-    unbalanced: np.ndarray,
-    target: np.ndarray,
+def _centred_step(
+    system: System, gap: np.ndarray, bent: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None if
-    there are none.
-    """
-    flat = kept.ravel()
-    # Put dz = target - F dx into the linearised z = scale (u + mu |u_t| n); what remains are
-    # equations for dr and
-    # dlambda.
-    right = ((times(shear, target) - gap) / scale).ravel()[flat]
-    answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
-    if answer is None:
+    """Mehrotra's predictor and corrector with one factorisation."""
+    scaling = system.scaling
+    x, z, k = scaling.x, scaling.z, len(scaling.x)
+    mean, unbalanced = float(np.sum(x * z)) / k, system.cones.unbalanced(x)
+    # Predictor: the step towards complementarity zero, as far as it stays in the cones.
+    first = system.direction(gap, unbalanced, -z)
+    if first is None:
         return None
-    # Back to the scaled variables; the complementarity gives dz.
-    dr = np.zeros(kept.size)
-    dr[flat] = answer[0]
-    dx = dr.reshape(kept.shape) / scale
-    return dx, np.where(kept, target - times(scaling.F, dx), 0.0), answer[1]
+    length = min(1.0, PREDICTED * scaling.longest(first[0], first[1]))
+    # The better the predictor, the less the next step is centred.
+    ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
+    least = LEAST_CENTERING if bent else STUCK_CENTERING
+    centering = float(np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, least, MOST_CENTERING))
+    # Corrector: the same system with the centring and the second-order term of the predictor.
+    second = scaling.corrector(first[0], first[1]) if length > CORRECTED else 0.0
+    return system.direction(gap, unbalanced, centering * mean * scaling.inverse - z - second)
+
+
+def _way(scaling: Scaling, dx: np.ndarray, dz: np.ndarray, boundary: float) -> float:
+    """The length of a step: that share of the way to the boundary of the cones, shortened until no
+    contact comes near it long before the others.
+    """
+    x, z, k = scaling.x, scaling.z, len(scaling.x)
+    mean = float(np.sum(x * z)) / k
+    length = min(1.0, boundary * scaling.longest(dx, dz))
+    least = np.minimum(CENTRAL, CENTRAL_KEPT * scaling.centrality / mean)
+    for _ in range(BACKTRACKS):
+        ahead = x + length * dx, z + length * dz
+        centrality = np.sqrt(np.maximum(det(ahead[0]) * det(ahead[1]), 0.0))
+        if np.all(centrality >= least * np.sum(ahead[0] * ahead[1]) / k):
+            break
+        length *= BACKTRACK
+    return length
 
 
 class Scaling:
@@ -231,8 +250,7 @@ class Scaling:
         det_x, det_z = det(x), det(z)
         unit_x, unit_z = x / np.sqrt(det_x)[:, None], z / np.sqrt(det_z)[:, None]
         # The scaling point w lies half-way between z and the inverse of x; F is the quadratic map
-        # of w, times the ratio
-        # of sizes.
+        # of w, times the ratio of sizes.
         w = unit_z + self.sign * unit_x
         w /= np.sqrt(2 * (1 + np.sum(unit_x * unit_z, axis=1)))[:, None]
         size = np.sqrt(det_z / det_x)[:, None, None]
@@ -252,8 +270,7 @@ class Scaling:
     def corrector(self, dx: np.ndarray, dz: np.ndarray) -> np.ndarray:
         """Mehrotra's second-order term of the predictor (dx, dz), in the units of z."""
         # In scaled variables x and z are one point c. With the product o of Jordan's algebra the
-        # term y solves c o y =
-        # dx o dz.
+        # term y solves c o y = dx o dz.
         a, b, c = times(self.M, dx), times(self.M_inverse, dz), times(self.M, self.x)
         product = np.concatenate(
             [np.sum(a * b, axis=1)[:, None], a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1

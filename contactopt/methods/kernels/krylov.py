@@ -27,8 +27,9 @@ from scipy.sparse.linalg import LinearOperator, cg
 from contactopt.errors import InputError
 from contactopt.linear.operators import loosened
 from contactopt.methods.constants import MODEL_PRODUCTS, MODEL_STEP, PRODUCT_SHARE
-from contactopt.methods.kernels.linearised import CYCLES, RESTART, Linearised
+from contactopt.methods.kernels.linearised import CYCLES, RESTART, Border, Linearised
 from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.method import Iterate
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import (
     Preconditioner,
@@ -42,8 +43,6 @@ from contactopt.problem import InterfaceProblem
 logger = logging.getLogger(__name__)
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
-
-Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 
 
 def model_of(
@@ -72,15 +71,14 @@ def model_of(
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
         try:
             P = preconditioner(problem, choice)
-            return (
-                deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem))
-                if deflate
-                else P
-            )
         except InputError as error:
             if name is not None:
                 raise
             missing.append(str(error))
+            continue
+        if not deflate:
+            return P
+        return deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem))
     if missing:
         note(
             logger,
@@ -97,28 +95,22 @@ def krylov_step(
     balance: np.ndarray,
     D: np.ndarray,
     rtol: float,
-) -> Step | None:
-    """Solve for a Newton step from products with Q alone.
+) -> Iterate | None:
+    """Solve for a Newton step dr (k, d) and dlambda (p,) from products with Q alone, to a relative
+    accuracy; None if the iteration does not get anywhere.
 
-    Parameters
-    ----------
-    equations : The equations of contact and friction at k contacts in d components.
-    P : The preconditioner.
-    error : (k, d) right-hand side of the contact equations.
-    balance : (p,) error of the balance.
-    D : (k, d, d) derivatives of the law's map.
-    rtol : Relative accuracy of the step.
-
-    Returns
-    -------
-    dr (k, d) and dlambda (p,); None if the iteration does not get anywhere.
+    The right sides are error (k, d) of the contact equations and -balance (p,); D (k, d, d) are the
+    derivatives of the law's map.
     """
-    symmetric = np.array_equal(D, D.transpose(0, 2, 1))
-    solve = _symmetric_step if symmetric else _unsymmetric_step
-    dr, multipliers = solve(equations, P, error, balance, D, rtol)
+    if np.array_equal(D, D.transpose(0, 2, 1)):
+        dr, multipliers = _symmetric_step(equations, P, error, balance, D, rtol)
+    else:
+        Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
+        inverse = linearised.inverse(P, MODEL_STEP * rtol)
+        dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
     if not (np.all(np.isfinite(dr)) and np.all(np.isfinite(multipliers))):
         return None
-    return dr, multipliers
+    return dr.reshape(error.shape), multipliers
 
 
 def _symmetric_step(
@@ -128,7 +120,7 @@ def _symmetric_step(
     balance: np.ndarray,
     D: np.ndarray,
     rtol: float,
-) -> Step:
+) -> Iterate:
     Q, V = loosened(equations.Q, PRODUCT_SHARE * rtol), equations.V
     # The unknowns alpha are the amounts of the directions U in which a contact may still change its
     # force.
@@ -144,39 +136,34 @@ def _symmetric_step(
     W, b = U.T @ V, -balance - V.T @ known
     m = len(delta)
     if m == 0:
-        return known.reshape(error.shape), np.zeros(len(balance))
-    # N, an approximate inverse of the system U'QU + B, and Y = N W, K = (W'N W)^-1. They make two
-    # projections:
+        return known, np.zeros(len(balance))
+    # N, an approximate inverse of the system U'QU + B, keeps the balance by two projections: off,
+    # and its transpose, which removes multipliers from a residual.
     near = restricted(P, U, added)
-    Y = np.stack([near @ w for w in W.T], axis=1) if W.shape[1] else W
-    K = np.linalg.pinv(W.T @ Y)
+    border = Border(lambda x: near @ x, W, W)
+    off, Y, K = border.off, border.Y, border.K
 
-    # I - Y K W', onto the alpha that do not change the balance, W' alpha = 0
-    def off(x: np.ndarray) -> np.ndarray:
-        return x - Y @ (K @ (W.T @ x))
-
-    # its transpose I - W K Y', which removes multipliers from a residual
     def off_t(x: np.ndarray) -> np.ndarray:
-        return x - W @ (K @ (Y.T @ x))
+        return np.asarray(x - W @ (K @ (Y.T @ x)))
 
     def product(x: np.ndarray) -> np.ndarray:
-        return U.T @ (Q @ (U @ x)) + added * x
+        return np.asarray(U.T @ (Q @ (U @ x)) + added * x)
 
     # Start at an alpha that has the balance; all corrections then keep it.
     start = Y @ (K @ b)
     residual = right - product(start) if np.any(start) else right
     system = LinearOperator((m, m), matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
     inverse = LinearOperator((m, m), matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
-    size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
     # The residual is compared with the right side without multipliers, or with the first residual
     # if that is larger.
+    size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
     beta, _ = cg(
         system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES
     )
     alpha = start + off(beta)
     # The multipliers are what is left of the residual, which lies in the range of W.
     multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
-    return (known + U @ alpha).reshape(error.shape), multipliers
+    return known + U @ alpha, multipliers
 
 
 def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
@@ -194,17 +181,3 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
     U = sp.csr_matrix((columns.ravel(), (rows, np.repeat(np.arange(m), d))), (k * d, m))
     U.eliminate_zeros()
     return U, values[contact, which], rho[contact]
-
-
-def _unsymmetric_step(
-    equations: Equations,
-    P: Preconditioner,
-    error: np.ndarray,
-    balance: np.ndarray,
-    D: np.ndarray,
-    rtol: float,
-) -> Step:
-    Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
-    inverse = linearised.inverse(P, MODEL_STEP * rtol)
-    dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
-    return dr.reshape(error.shape), multipliers

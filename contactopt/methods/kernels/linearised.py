@@ -1,7 +1,8 @@
 """The linear system of one Newton step with an unsymmetric derivative, and its inverse for a model
 of Q.
 
-    (I - D + D rho Q) dr + D rho V dlambda = error,   V' dr = -balance         (contactopt.methods.kernels.semismooth)
+    (I - D + D rho Q) dr + D rho V dlambda = error,   V' dr = -balance
+                                                      (contactopt.methods.kernels.semismooth)
 
 Contacts with D = 0 are open: their dr is known, and they leave the system.
 """
@@ -25,6 +26,33 @@ UNFELT = 1e-12  # share of the largest force that a motion makes, below which it
 Act = Callable[[np.ndarray], np.ndarray]
 
 
+class Border:
+    """The balance V' x of a bordered system [[A, B], [V', 0]], given an approximate inverse N of A
+    on arrays (n,).
+
+    Y = N B, and K is the inverse of the Schur complement V' Y; motions that no contact feels stay
+    out of it.
+    """
+
+    def __init__(self, near: Act, B: np.ndarray, V: np.ndarray, unfelt: float = 1e-15):
+        self.near, self.V = near, V
+        self.Y = np.stack([near(b) for b in B.T], axis=1) if B.shape[1] else B
+        self.K = np.linalg.pinv(V.T @ self.Y, rcond=unfelt)
+
+    def off(self, x: np.ndarray) -> np.ndarray:
+        """I - Y K V', onto the x that do not change the balance."""
+        return np.asarray(x - self.Y @ (self.K @ (self.V.T @ x)))
+
+    def solve(self, x: np.ndarray) -> np.ndarray:
+        """The inverse of the system: first without multipliers, then the multipliers that restore
+        the balance, then their share of dr.
+        """
+        n = len(self.V)
+        y = self.near(x[:n])
+        multipliers = self.K @ (self.V.T @ y - x[n:])
+        return np.concatenate([y - self.Y @ multipliers, multipliers])
+
+
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """One Newton step's system: the equations and the derivative D (k, d, d) of the projection."""
@@ -46,19 +74,6 @@ class Linearised:
         inner = dr.reshape(k, d) - self.equations.rho[:, None] * shift.reshape(k, d)
         return (dr.reshape(k, d) - np.einsum("kab,kb->ka", self.D, inner)).ravel()
 
-    def system(self, product: Act) -> Act:
-        """The left sides (n + p,) of closed contacts and balance, for the products with Q or its
-        model.
-        """
-        n, V = len(self.closed), self.equations.V
-
-        def act(x: np.ndarray) -> np.ndarray:
-            dr = np.zeros(len(V))
-            dr[self.closed] = x[:n]
-            return np.concatenate([self.rows(dr, product(dr) + V @ x[n:])[self.closed], V.T @ dr])
-
-        return act
-
     def solve(
         self,
         product: Act,
@@ -79,8 +94,18 @@ class Linearised:
         return known, x[n:]
 
     def operator(self, product: Act) -> LinearOperator:
-        size = len(self.closed) + self.equations.V.shape[1]
-        return LinearOperator((size, size), matvec=self.system(product), dtype=float)
+        """The left sides (n + p,) of closed contacts and balance, for the products with Q or its
+        model.
+        """
+        n, V = len(self.closed), self.equations.V
+
+        def act(x: np.ndarray) -> np.ndarray:
+            dr = np.zeros(len(V))
+            dr[self.closed] = x[:n]
+            return np.concatenate([self.rows(dr, product(dr) + V @ x[n:])[self.closed], V.T @ dr])
+
+        size = n + V.shape[1]
+        return LinearOperator((size, size), matvec=act, dtype=float)
 
     def inverse(self, P: Preconditioner, rtol: float) -> LinearOperator:
         """The inverse of the system with Q replaced by the model of P, to that accuracy; `rough`
@@ -111,22 +136,10 @@ class Linearised:
             y[inside] = (P @ full)[unknowns]
             return y
 
-        # The border of the balance: K is the inverse of V' N (D rho V), the Schur complement for
-        # the rough inverse N.
-        # Motions that no contact feels stay out of it.
         shifts = (rho[:, None] * V).reshape(n // d, d, p)
-        border = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
-        Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
-        K = np.linalg.pinv(V.T @ Y, rcond=UNFELT)
-
-        def solve(x: np.ndarray) -> np.ndarray:
-            # First without multipliers, then the multipliers that restore the balance, then their
-            # share of dr.
-            y = apply(x[:n])
-            multipliers = K @ (V.T @ y - x[n:])
-            return np.concatenate([y - Y @ multipliers, multipliers])
-
-        return LinearOperator((n + p, n + p), matvec=lambda x: solve(x.ravel()), dtype=float)
+        DrhoV = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
+        border = Border(apply, DrhoV, V, UNFELT)
+        return LinearOperator((n + p, n + p), matvec=lambda x: border.solve(x.ravel()), dtype=float)
 
 
 def _gmres(A: LinearOperator, b: np.ndarray, rtol: float, M: LinearOperator) -> np.ndarray:

@@ -21,6 +21,7 @@ import scipy.linalg as la
 from contactopt.errors import BackendError
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import Interface
+from contactopt.methods.method import Iterate
 from contactopt.methods.notes import note
 
 logger = logging.getLogger(__name__)
@@ -54,13 +55,17 @@ class Equations:
     s: np.ndarray
     project: Projection
     rho: np.ndarray = 1.0  # type: ignore[assignment]
-    center: np.ndarray | None = None
+    center: np.ndarray | float = 0.0
     weight: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "rho", np.broadcast_to(np.asarray(self.rho, dtype=float), (len(self.q),))
-        )
+        rho = np.broadcast_to(np.asarray(self.rho, dtype=float), (len(self.q),))
+        object.__setattr__(self, "rho", rho)
+
+    def displacements(self, r: np.ndarray, lam: np.ndarray) -> np.ndarray:
+        """u (k, d)."""
+        u = (self.Q @ r.ravel() + self.V @ lam).reshape(r.shape) + self.q
+        return np.asarray(u + self.weight * (r - self.center) if self.weight else u)
 
     def evaluate(
         self, r: np.ndarray, lam: np.ndarray
@@ -68,16 +73,13 @@ class Equations:
         """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r -
         rho u.
         """
-        u = (self.Q @ r.ravel() + self.V @ lam).reshape(r.shape) + self.q
-        if self.center is not None:
-            u += self.weight * (r - self.center)
-        P, D = self.project(r - self.rho[:, None] * u)
+        P, D = self.project(r - self.rho[:, None] * self.displacements(r, lam))
         error, balance = P - r, self.V.T @ r.ravel() + self.s
         return float(np.sqrt(np.sum(error**2) + np.sum(balance**2))), error, balance, D
 
     def step(
         self, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float = RIDGE
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    ) -> Iterate | None:
         """dr (k, d), dlambda (p,) of one Newton step; None if the linear system is singular.
 
         It solves (I - D (I - rho Q)) dr + D rho V dlambda = error, V' dr = -balance. Open contacts,
@@ -102,9 +104,9 @@ class Equations:
         matrix[:n, n:] = self.V[rows]
         matrix[:n] *= rho[:, None]  # now rho (Q dr + V dlambda), the rows of a contact that sticks
         matrix[n:, :n] = self.V[rows].T
-        coupling = (
-            rho * (self.Q[np.ix_(rows, gone)] @ dr[gone]) if np.any(dr[gone]) else np.zeros(n)
-        )
+        coupling = np.zeros(n)
+        if np.any(dr[gone]):
+            coupling = rho * (self.Q[np.ix_(rows, gone)] @ dr[gone])
         # Where D is not I the rows become D (rho (Q dr + V dlambda) - dr) + dr.
         D = D[closed]
         bent = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))  # contacts that slip
@@ -139,56 +141,29 @@ def crossover(
     r: np.ndarray,
     multipliers: np.ndarray,
     steps: int = STEPS,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Improve an approximate answer of a subproblem by Newton steps, and return the best point on
-    the way.
+) -> Iterate:
+    """Improve an approximate answer r (k, d) of a dimensionless subproblem by at most so many
+    Newton steps, and return the best point on the way.
 
-    The problem is dimensionless, so that rho = 1 is right. The residual of what comes back is never
-    larger than that of the projection of what came in.
-
-    Parameters
-    ----------
-    Q : (k d, k d) compliance
-    c : (k d,) displacements without forces
-    V, s : (k d, p) rigid motions and (p,) resultants
-    project : the map P with its generalised derivative
-    r, multipliers : (k, d) and (p,), the approximate answer
-    steps : Newton steps at most
-
-    Returns
-    -------
-    r (k, d) and multipliers (p,)
+    c are the displacements without forces; the rest is as in Equations, with rho = 1. The residual
+    of what comes back is never larger than that of the projection of what came in.
     """
-    residual, r, multipliers = _improve(
-        Equations(Q, c.reshape(r.shape), V, s, project), r, multipliers, steps
-    )
+    equations = Equations(Q, c.reshape(r.shape), V, s, project)
+    residual, r, multipliers = _improve(equations, r, multipliers, steps)
     if steps == STEPS and residual > EXACT * max(1.0, float(np.linalg.norm(r))):
         note(logger, "Newton steps did not make the answer of a convex subproblem exact")
     return r, multipliers
 
 
 def certified(
-    solvers: Iterable[tuple[str, Callable[[], tuple[np.ndarray, np.ndarray]]]],
-    equations: Equations,
-) -> tuple[np.ndarray, np.ndarray]:
+    solvers: Iterable[tuple[str, Callable[[], Iterate]]], equations: Equations
+) -> Iterate:
     """Ask backends one after the other until Newton steps make an answer exact.
 
     A backend may call anything optimal, so that every answer is checked by its residual. The next
-    solver, usually the same backend at tighter settings, is asked only if the answer is not exact.
-
-    Parameters
-    ----------
-    solvers : pairs of a backend's name and a function that gives (r, multipliers)
-    equations : of the subproblem
-
-    Returns
-    -------
-    r (k, d) and multipliers (p,) of the first exact answer, or else of the best one
-
-    Raises
-    ------
-    BackendError : if the relative residual of even the best answer is above WRONG; it names the
-        last backend
+    of the pairs (name of a backend, its solve), usually the same backend at tighter settings, is
+    asked only if the answer is not exact. The first exact answer is returned, or else the best one;
+    BackendError if even its relative residual is above WRONG.
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
     for attempt, (asked, solver) in enumerate(solvers):

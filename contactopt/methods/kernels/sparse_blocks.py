@@ -53,20 +53,15 @@ class DenseBlocks:
 
         left None stands for the identity.
         """
-        k, d = len(added), self.d
-        A = (
-            self.Q.copy()
-            if left is None
-            else (left @ self.Q.reshape(k, d, k * d)).reshape(k * d, k * d)
-        )
+        k, d, n = len(added), self.d, len(self.Q)
+        A = self.Q.copy() if left is None else (left @ self.Q.reshape(k, d, n)).reshape(n, n)
         diagonal = np.arange(k)
         A.reshape(k, d, k, d)[diagonal, :, diagonal, :] += added
+        A = A if kept.all() else A[np.ix_(kept, kept)]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
             try:
-                factors = la.lu_factor(
-                    A if kept.all() else A[np.ix_(kept, kept)], overwrite_a=True, check_finite=False
-                )
+                factors = la.lu_factor(A, overwrite_a=True, check_finite=False)
             except (la.LinAlgError, ValueError):
                 return None
         lu, swapped = factors
@@ -93,8 +88,7 @@ class SparseBlocks:
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
         # Every entry belongs to the block of its row's and its column's contact. Blocks are
-        # numbered row by row, and
-        # every diagonal block is there, because something will be added to it.
+        # numbered row by row, and every diagonal block is there, because something will be added.
         entries = sp.coo_array(Q)
         i, j = (index.astype(np.int64) for index in entries.coords)
         own = np.arange(self.k)
@@ -122,12 +116,10 @@ class SparseBlocks:
         # Row and column of every entry of every block in that order, sorted as compressed columns
         # want them.
         local = np.arange(d)
-        row = place[
-            np.broadcast_to((self.rows[:, None] * d + local)[:, :, None], self.blocks.shape)
-        ].ravel()
-        column = place[
-            np.broadcast_to((self.columns[:, None] * d + local)[:, None, :], self.blocks.shape)
-        ].ravel()
+        rows = (self.rows[:, None] * d + local)[:, :, None]
+        columns = (self.columns[:, None] * d + local)[:, None, :]
+        row = place[np.broadcast_to(rows, self.blocks.shape)].ravel()
+        column = place[np.broadcast_to(columns, self.blocks.shape)].ravel()
         order = np.lexsort((row, column))
         return np.argsort(place), order, row[order], column[order]
 
@@ -174,23 +166,14 @@ Blocks = DenseBlocks | SparseBlocks
 def _parity(order: np.ndarray) -> int:
     """1 for an even permutation, -1 for an odd one: by its cycles."""
     n = len(order)
-    cycles = connected_components(sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n)))[
-        0
-    ]
+    graph = sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n))
+    cycles = connected_components(graph)[0]
     return -1 if (n - cycles) % 2 else 1
 
 
 def block_matrix(Q: Interface, d: int) -> Blocks:
-    """Prepare Q for block systems: sparse where that is faster than LAPACK on an array.
-
-    Parameters
-    ----------
-    Q : (n, n) an array or sparse.
-    d : Number of components of a contact.
-
-    Returns
-    -------
-    The matrix, which solves with other diagonal blocks added.
+    """Prepare Q (n, n), in blocks of d components, for block systems: sparse where that is faster
+    than LAPACK on an array.
     """
     if not sp.issparse(Q):
         return DenseBlocks(Q, d)
@@ -201,19 +184,9 @@ def block_matrix(Q: Interface, d: int) -> Blocks:
 def bordered(
     solve: Solver, right: np.ndarray, V: np.ndarray, left: np.ndarray, balance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Solve A x + left lambda = right and V' x = balance, given a solver with A.
+    """Solve A x + left lambda = right (m,) and V' x = balance (p,), given a solver with A.
 
-    Parameters
-    ----------
-    solve : Solves with A (m, m) for right-hand sides (m, j).
-    right : (m,) right-hand side.
-    V, left : (m, p) columns of the border.
-    balance : (p,) right-hand side of the border.
-
-    Returns
-    -------
-    x (m,) and lambda (p,), the latter by least squares where it is not unique. None if a number is
-    not finite.
+    lambda follows by least squares where it is not unique. None if a number is not finite.
     """
     p = len(balance)
     x = solve(np.column_stack([right, left]) if p else right[:, None])

@@ -11,93 +11,81 @@ import numpy as np
 from contactopt.methods.backends import attempts
 from contactopt.methods.backends.conic import DiscSOCP
 from contactopt.methods.backends.qp import BoxQP
-from contactopt.methods.kernels.semismooth import Equations, Projection, certified
+from contactopt.methods.kernels.semismooth import Equations, certified
+from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import disc_derivative, half_line_derivative, split
+from contactopt.problem.cones import disc_derivative, half_line_derivative
 
 
-def _index(k: int, dim: int, normal: bool) -> np.ndarray:
-    blocks = np.arange(k * dim).reshape(k, dim)
-    return blocks[:, 0] if normal else blocks[:, 1:].ravel()
+class Components:
+    """The normal or the tangential components of a dimensionless problem, with the plates that
+    belong to them.
 
-
-class NormalProblem:
-    """The bound-constrained QP of the normal forces; its matrix Q_nn is handed to the backend once.
-
-    backend : name of the QP solver
-    problem : dimensionless
-    columns : (p,) mask of the multipliers that belong to the normal problem
+    own    mask (p,) of the multipliers that belong to them
+    shape  (k, j) of their forces;  Q, V  on them;  coupling  with the other components
     """
 
-    def __init__(self, backend: str, problem: InterfaceProblem, columns: np.ndarray):
-        n, t = (_index(problem.contacts, problem.dim, normal) for normal in (True, False))
-        self.problem, self.columns = problem, columns
-        self.Q, self.Q_nt = problem.Q[np.ix_(n, n)], problem.Q[np.ix_(n, t)]
-        self.V, self.V_t, self.V_other = (
-            problem.V[n][:, columns],
-            problem.V[t][:, columns],
-            problem.V[n][:, ~columns],
+    def __init__(self, problem: InterfaceProblem, own: np.ndarray, normal: bool):
+        blocks = np.arange(problem.q.size).reshape(problem.q.shape)
+        here, there = (blocks[:, :1], blocks[:, 1:]) if normal else (blocks[:, 1:], blocks[:, :1])
+        rows, others = here.ravel(), there.ravel()
+        self.problem, self.own, self.shape = problem, own, here.shape
+        self.q, self.V_all, self.V_there = (
+            problem.q.ravel()[rows],
+            problem.V[rows],
+            problem.V[others],
         )
+        self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
+        self.V = self.V_all[:, own]
+
+    def given(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The linear term and the resultants of the own motions, given the forces of the other
+        components and the other multipliers.
+        """
+        c = self.q + self.coupling @ fixed.ravel() + self.V_all[:, ~self.own] @ lam[~self.own]
+        return c, (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
+
+
+class NormalProblem(Components):
+    """The bound-constrained QP of the normal forces; the backend is handed Q_nn once."""
+
+    def __init__(self, backend: str, problem: InterfaceProblem, own: np.ndarray):
+        super().__init__(problem, own, normal=True)
         self.qp = BoxQP.using(backend, self.Q, self.V.T)
-        self.low = problem.law.lowest
 
-    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
         """r (k, dim) with new r_n, and the multipliers of this problem's balance rows."""
-        r_n, r_t = split(r)
-        c = (
-            self.problem.q[:, 0]
-            + self.Q_nt @ r_t.ravel()
-            + self.V_other @ multipliers[~self.columns]
-        )
-        s = self.problem.s[self.columns] + self.V_t.T @ r_t.ravel()
-        project: Projection = lambda y: half_line_derivative(y, self.low)  # noqa: E731
-        tries = attempts(
-            self.qp, lambda qp: qp.solve(c, -s, self.low, np.full(len(c), np.inf), start=r_n)
-        )
-        new, lam = certified(tries, Equations(self.Q, c[:, None], self.V, s, project))
-        return np.concatenate([new, r_t], axis=1), lam
+        c, s = self.given(r[:, 1:], multipliers)
+        low, high = self.problem.law.lowest, np.full(len(c), np.inf)
+        tries = attempts(self.qp, lambda qp: qp.solve(c, -s, low, high, start=r[:, 0]))
+        equations = Equations(self.Q, c[:, None], self.V, s, lambda y: half_line_derivative(y, low))
+        new, lam = certified(tries, equations)
+        return np.concatenate([new, r[:, 1:]], axis=1), lam
 
 
-class TangentialProblem:
-    """The QP (one tangential direction) or SOCP (two) of the tangential forces, built once.
+class TangentialProblem(Components):
+    """The QP (one tangential direction) or SOCP (two) of the tangential forces, built once."""
 
-    Arguments as for NormalProblem; `columns` are those of the tangential problem.
-    """
-
-    def __init__(self, backend: str, problem: InterfaceProblem, columns: np.ndarray):
-        n, t = (_index(problem.contacts, problem.dim, normal) for normal in (True, False))
-        self.problem, self.columns = problem, columns
-        self.Q, self.Q_tn = problem.Q[np.ix_(t, t)], problem.Q[np.ix_(t, n)]
-        self.V, self.V_n, self.V_other = (
-            problem.V[t][:, columns],
-            problem.V[n][:, columns],
-            problem.V[t][:, ~columns],
-        )
+    def __init__(self, backend: str, problem: InterfaceProblem, own: np.ndarray):
+        super().__init__(problem, own, normal=False)
         self.active = bool(np.any(problem.law.rough))
         if self.active:
             bridge = BoxQP if problem.dim == 2 else DiscSOCP
             self.solver = bridge.using(backend, self.Q, self.V.T)
 
-    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
         """r (k, dim) with new r_t, and the multipliers of this problem's balance rows."""
-        r_n, r_t = split(r)
+        r_n, r_t = r[:, :1], r[:, 1:]
         if not self.active:
-            return np.concatenate([r_n[:, None], np.zeros_like(r_t)], axis=1), np.zeros(0)
-        c = (
-            self.problem.q[:, 1:].ravel()
-            + self.Q_tn @ r_n
-            + self.V_other @ multipliers[~self.columns]
-        )
-        s = self.problem.s[self.columns] + self.V_n.T @ r_n
-        radius = self.problem.law.bound(r_n)
+            return np.concatenate([r_n, np.zeros_like(r_t)], axis=1), np.zeros(0)
+        c, s = self.given(r_n, multipliers)
+        radius, start = self.problem.law.bound(r[:, 0]), r_t.ravel()
         if isinstance(self.solver, BoxQP):
-            tries = attempts(
-                self.solver, lambda qp: qp.solve(c, -s, -radius, radius, start=r_t.ravel())
-            )
+            tries = attempts(self.solver, lambda qp: qp.solve(c, -s, -radius, radius, start=start))
         else:
             tries = attempts(self.solver, lambda socp: socp.solve(c, -s, radius))
         discs = Equations(
             self.Q, c.reshape(r_t.shape), self.V, s, lambda y: disc_derivative(y, radius)
         )
         new, lam = certified(tries, discs)
-        return np.concatenate([r_n[:, None], new], axis=1), lam
+        return np.concatenate([r_n, new], axis=1), lam

@@ -17,6 +17,7 @@ from contactopt.linear.operators import diagonal
 from contactopt.methods.constants import ACTIVE_SETS, SUCCESS, WEIGHT_FALL, WEIGHT_RISE
 from contactopt.methods.kernels.krylov import krylov_step
 from contactopt.methods.kernels.semismooth import Equations, Projection
+from contactopt.methods.method import Iterate
 from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
@@ -24,8 +25,6 @@ from contactopt.problem.cones import disc_derivative, half_line_derivative
 LOOPS = 60  # proximal steps
 EXACT = 1e-10  # residual relative to the size of the forces at which a subproblem is solved
 USABLE = 1e-5  # and above which there is no answer
-
-Iterate = tuple[np.ndarray, np.ndarray]
 
 
 class KrylovSubproblem:
@@ -48,7 +47,7 @@ class KrylovSubproblem:
         the proximal loop (contactopt.methods.proximal), each step a problem whose active sets are
         easier to find. Raises BackendError if that does not come near a solution either.
         """
-        equations = self._equations(r, multipliers, None, 0.0)
+        equations = self._equations(r, multipliers, 0.0, 0.0)
         point = r, multipliers[self.columns]
         if not r[:, self.own].any():
             point = self._glued(*point, equations)
@@ -69,21 +68,12 @@ class KrylovSubproblem:
         return point
 
     def _equations(
-        self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | None, weight: float
+        self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | float, weight: float
     ) -> Equations:
         problem, own = self.problem, self.columns
         q = problem.q + (problem.V[:, ~own] @ multipliers[~own]).reshape(r.shape)
-        rho = 1 / (self.compliance + weight)
-        return Equations(
-            problem.Q,
-            q,
-            problem.V[:, own],
-            problem.s[own],
-            self._projection(r),
-            rho,
-            center,
-            weight,
-        )
+        V, s, rho = problem.V[:, own], problem.s[own], 1 / (self.compliance + weight)
+        return Equations(problem.Q, q, V, s, self._projection(r), rho, center, weight)
 
     def _active_sets(
         self, equations: Equations, r: np.ndarray, lam: np.ndarray
@@ -109,12 +99,11 @@ class KrylovSubproblem:
         """All contacts held by whatever force it takes."""
         D = np.zeros((*r.shape, r.shape[1]))
         D[:, self.own, self.own] = np.eye(r.shape[1])[self.own, self.own]
-        u = (equations.Q @ r.ravel() + equations.V @ lam).reshape(r.shape) + equations.q
         error = np.zeros(r.shape)
-        error[:, self.own] = -equations.rho[:, None] * u[:, self.own]
-        step = krylov_step(
-            equations, self.P, error, equations.V.T @ r.ravel() + equations.s, D, 1e-2
-        )
+        u = equations.displacements(r, lam)[:, self.own]
+        error[:, self.own] = -equations.rho[:, None] * u
+        balance = equations.V.T @ r.ravel() + equations.s
+        step = krylov_step(equations, self.P, error, balance, D, 1e-2)
         return (r, lam) if step is None else (r + step[0], lam + step[1])
 
     def _projection(self, given: np.ndarray) -> Projection:

@@ -11,7 +11,7 @@ from contactopt import reduce_bodies, scenes, solve
 from contactopt.readings.quantities import stick_width
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
-from contactopt.solving.paths import follow
+from contactopt.solving.follow import follow
 from experiments.questions.cattaneo import error
 from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
 

@@ -1,0 +1,194 @@
+"""Newton's steps on one grid of contacts, whose Q is a convolution
+(contactopt.methods.kernels.levels).
+
+A step solves  (I - D) dr + D rho (Q dr + V dlambda) = error,  V' dr = -balance  on the contacts
+               with D != 0; all others have dr = error.
+Products with Q are taken in single precision, which is enough for a correction. Where every closed
+contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES. Both are
+preconditioned by the inverse of the symbol of Q on the grid without padding, restricted to the
+contacts that are closed and to the directions that are held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from contactopt.methods.constants import FIRST_SHIFT, SHIFT_RATIO
+from contactopt.methods.kernels.levels import Evaluation, Level, Point
+from contactopt.methods.kernels.linearised import Border
+
+RESTART, CYCLES = 40, 3  # of GMRES
+ITERATIONS = 100  # of PCG
+
+Act = Callable[[np.ndarray], np.ndarray]
+
+
+def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
+    """Solve for a Newton step dr (c, k), dlambda (p,) to a relative accuracy, and count the
+    iterations that it takes.
+    """
+    known = at.error.copy()
+    known[:, at.closed] = 0.0
+    moved = np.zeros((len(known), len(at.closed)))
+    if np.any(known):
+        moved = level.product(known, single=True)[:, at.closed]
+    balance = -at.balance - np.einsum("ckp,ck->p", level.V, known)
+    identity = np.array_equal(at.D, np.broadcast_to(np.eye(len(known)), at.D.shape))
+    solve = _symmetric if identity else _unsymmetric
+    dr, lam, count = solve(level, at, moved, balance, rtol)
+    known[:, at.closed] = dr
+    return (known, lam), count
+
+
+def _act(level: Level, at: Evaluation) -> Act:
+    """Products with Q on the closed contacts, (c, m) -> (c, m), in single precision."""
+
+    def act(x: np.ndarray) -> np.ndarray:
+        full = np.zeros(at.error.shape, np.float32)
+        full[:, at.closed] = x
+        return level.product(full, single=True)[:, at.closed]
+
+    return act
+
+
+def _symmetric(
+    level: Level, at: Evaluation, moved: np.ndarray, balance: np.ndarray, rtol: float
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by
+    projected PCG.
+    """
+    (c, m), act = moved.shape, _act(level, at)
+    # W holds the columns of the balance; N is the rough inverse, normal and tangential components
+    # by themselves.
+    right = (at.error[:, at.closed] / level.rho - moved).ravel()
+    W = level.V[:, at.closed].reshape(c * m, -1)
+
+    def near(x: np.ndarray) -> np.ndarray:
+        parts = x.reshape(c, m)
+        out = [level.rough_solve(parts[:1], at.closed, level.components[:1], level.inverse)]
+        if c > 1:
+            tangential = level.components[1:]
+            out.append(level.rough_solve(parts[1:], at.closed, tangential, level.inverse))
+        return np.concatenate(out).astype(float).ravel()
+
+    # The start meets the balance W'x; all corrections keep it.
+    border = Border(near, W, W)
+    x = border.Y @ (border.K @ balance)
+    residual = right - (act(x.reshape(c, m)).ravel() if np.any(x) else 0.0)
+    # Conjugate gradients among the x that meet the balance, until residual' N residual has fallen
+    # enough.
+    z = border.off(near(residual))
+    gamma = float(residual @ z)
+    aim, p, count = rtol**2 * abs(gamma), z, 0
+    while count < ITERATIONS and gamma > aim:
+        product = act(p.reshape(c, m)).ravel().astype(float)
+        work = float(p @ product)
+        if not work > 0:  # forces that move nothing
+            break
+        alpha = gamma / work
+        x = x + alpha * p
+        residual = residual - alpha * product
+        z = border.off(near(residual))
+        new = float(residual @ z)
+        p, gamma, count = z + (new / gamma) * p, new, count + 1
+    # What is left of the residual is W lambda; least squares in the norm of N give lambda.
+    return x.reshape(c, m), np.asarray(border.K @ (border.Y.T @ residual)), count
+
+
+def _unsymmetric(
+    level: Level, at: Evaluation, moved: np.ndarray, balance: np.ndarray, rtol: float
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """(I - D) dr + D rho (Q dr + V dlambda) = error - D rho Q known, V' dr = balance, by GMRES."""
+    (c, m), act, V = moved.shape, _act(level, at), level.V[:, at.closed]
+    p, n = len(balance), c * m
+
+    def rows(dr: np.ndarray, w: np.ndarray) -> np.ndarray:
+        return np.asarray(dr - np.einsum("kab,bk->ak", at.D, dr - level.rho * w))
+
+    def system(x: np.ndarray) -> np.ndarray:
+        x = x.ravel()
+        dr = x[:n].reshape(c, m)
+        left = rows(dr, act(dr) + V @ x[n:]).ravel()
+        return np.concatenate([left, np.einsum("ckp,ck->p", V, dr)])
+
+    DrhoV = level.rho * np.einsum("kab,bkp->akp", at.D, V).reshape(n, p)
+    border = Border(_rough_inverse(level, at), DrhoV, V.reshape(n, p))
+    iterations: list[float] = []
+    right = np.concatenate([(at.error[:, at.closed] - rows(0 * moved, moved)).ravel(), balance])
+    x, _ = gmres(
+        LinearOperator((n + p, n + p), matvec=system, dtype=float),
+        right,
+        rtol=rtol,
+        restart=min(n + p, RESTART),
+        maxiter=CYCLES,
+        M=LinearOperator((n + p, n + p), matvec=lambda x: border.solve(x.ravel()), dtype=float),
+        callback=iterations.append,
+        callback_type="pr_norm",
+    )
+    return x[:n].reshape(c, m), x[n:], len(iterations)
+
+
+def _rough_inverse(level: Level, at: Evaluation) -> Act:
+    """An approximate inverse of the system of `_unsymmetric` without its border, on arrays (c m,):
+    first the normal forces, then those that hold or slip.
+
+    With the derivative [[1, 0], [D_tn, D_tt]] of a contact, its tangential row is
+    (I - D_tt) dr_t + D_tt rho w_t = right + D_tn (dr_n - rho w_n). For an eigenvalue d > 0 of D_tt
+    it is
+
+        (sigma + rho Q) dr = right / d,   sigma = (1 - d) / d,
+
+    where sigma is zero for contacts that stick and grows with the slip, without bound on ever finer
+    grids. The symbol of Q is inverted for a few shifts sigma, and each contact takes part in the
+    two next to its own, in shares that sum to one. Beyond the last shift rho Q hardly matters.
+    """
+    D, rho, tangential = at.D, level.rho, level.components[1:]
+    shape = at.D.shape[1], len(at.closed)
+    values, vectors = np.linalg.eigh(D[:, 1:, 1:])
+    values = np.clip(values, 1e-12, 1.0)
+    pressed = D[:, 0, 0] > 0
+    shifts, shares = _shift_shares((1 - values) / values, rho * level.largest)
+
+    def turned(weights: np.ndarray) -> np.ndarray:
+        return np.einsum("kab,kb,kcb->kac", vectors, weights, vectors)
+
+    parts_of = [
+        (
+            turned(np.sqrt(share)),
+            turned(np.sqrt(share) / values),
+            level.inverse_symbols(tangential, shift / rho),
+        )
+        for shift, share in zip(shifts, shares)
+        if share.any()
+    ]
+    free = turned(1 - np.sum(shares, axis=0))
+
+    def apply(x: np.ndarray) -> np.ndarray:
+        parts, out = x.reshape(shape), np.empty(shape)
+        normal = level.rough_solve(parts[:1] * pressed / rho, at.closed, (0,), level.inverse)
+        out[:1] = np.where(pressed, normal, parts[:1])
+        right = parts[1:] + np.einsum("ka,k->ak", D[:, 1:, 0], out[0] - parts[0])
+        out[1:] = np.einsum("kab,bk->ak", free, right)
+        for back, forth, symbols in parts_of:
+            force = np.einsum("kab,bk->ak", forth, right) / rho
+            inner = level.rough_solve(force, at.closed, tangential, symbols)
+            out[1:] += np.einsum("kab,bk->ak", back, inner)
+        return out.ravel()
+
+    return apply
+
+
+def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of
+    them.
+
+    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift
+    sum to less than one.
+    """
+    count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
+    place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)
+    shares = [np.maximum(0.0, 1 - np.abs(place - j)) for j in range(count + 1)]
+    return FIRST_SHIFT * (SHIFT_RATIO ** np.arange(count + 1) - 1.0), shares

@@ -1,0 +1,121 @@
+"""Follow a load path: one state after the other, on the bodies, coupling and Q of the first
+(contactopt.solving.paths).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sized
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.cards import count
+from contactopt.errors import InputError
+from contactopt.methods.driver import TOL
+from contactopt.scenes.scene import Scene
+from contactopt.solving.paths import PathResult, State
+from contactopt.solving.solve_scene import Options, Solved, solve_loaded, solve_scene
+
+KEPT = 500_000  # displacement unknowns of all bodies, up to which every state of a path keeps them
+
+
+def follow(
+    scenes: Iterable[Scene],
+    elements: int | None = None,
+    zone: float | None = None,
+    note: Callable[[str], None] = lambda text: None,
+    Q: str = "auto",
+    solver: str = "auto",
+    **settings: Any,
+) -> PathResult:
+    """Solve a load path: the states of one scene in their order, from the unloaded bodies on.
+
+    Parameters
+    ----------
+    scenes : states that differ in their loads only: forces, tractions, prescribed displacements
+    elements : across the contact half-width; the scene's own number by default. One mesh serves the
+        whole path.
+    zone : half-width that the mesh resolves [length]; by default the scene's
+    note : receives one short sentence after every state, "state 17 of 41: ..." where the number of
+        states is known
+    Q, solver : form of Q and solver of the bodies, as for reduce()
+    settings : arguments of solve(). Each step starts from the solution of the one before.
+
+    Returns
+    -------
+    PathResult : the states with their solutions, in their order
+
+    Raises
+    ------
+    InputError : for an empty path, or for states that are not those of one scene
+    """
+    if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
+        raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
+    method, tol = settings.pop("method", None), settings.pop("tol", TOL)
+    options = Options(Q, solver, method, tol, settings, note)
+    total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
+    states: list[State] = []
+    solved: Solved | None = None
+    mechanics: _Mechanics | None = None
+    for scene in scenes:
+        if solved is None:
+            solved = solve_scene(scene, elements, zone, options)
+        else:
+            solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
+        state, mechanics = _state(solved, states[-1] if states else None, mechanics)
+        states.append(state)
+        steps = count(state.solution.iterations, "iteration")
+        options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
+        if not state.solution.solved:
+            break
+    if solved is None:
+        raise InputError("the path has no states; give at least one scene.")
+    return PathResult(tuple(states), solved.reduction)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mechanics:
+    """What energies are made of: contact forces r and displacements u, both (k, dim), and of each
+    body the displacements U and the external forces F.
+    """
+
+    r: np.ndarray
+    u: np.ndarray
+    U: list[np.ndarray]
+    F: list[np.ndarray]
+
+
+def _state(
+    solved: Solved, before: State | None, last: _Mechanics | None
+) -> tuple[State, _Mechanics]:
+    """What is kept of a state, given the one before it, and the state of the bodies."""
+    reduction, solution = solved.reduction, solved.solution
+    problem, r = reduction.problem, solution.reactions
+    gap, earlier = np.zeros(r.shape), np.zeros(r.shape)
+    gap[:, 0] = reduction.gap
+    if before is not None:
+        earlier[:, 1:] = before.displacements[:, 1:]
+    U = list(reduction.displaced(solution))
+    F = [body.external_forces(own) for body, own in zip(reduction.bodies, U)]
+    now = _Mechanics(r, problem.displacements(r, solution.multipliers) + earlier, U, F)
+    if last is None:  # the unloaded bodies
+        last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
+    moved = problem.displacements(0 * r, solution.multipliers) + earlier - gap
+    steps = zip(now.F, last.F, now.U, last.U)
+    here = all(isinstance(own, np.ndarray) for own in U) and sum(own.size for own in U) <= KEPT
+    state = State(
+        reduction.scene,
+        solution,
+        problem.q,
+        problem.s,
+        now.u,
+        (now.u - earlier)[:, 1:],
+        np.average(moved, axis=0, weights=problem.areas),
+        elastic=sum(body.energy(own) for body, own in zip(reduction.bodies, U)),
+        external=sum(float((F + F0) @ (U - U0)) for F, F0, U, U0 in steps) / 2,
+        contact=-float(np.sum((now.r + last.r) * (now.u - last.u))) / 2,
+        bodies=tuple(U) if here else (),
+    )
+    return state, now
