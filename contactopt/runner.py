@@ -23,7 +23,9 @@ from contactopt.files.writing import check_folder, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.readings.quantities import Reading, approach, pressure_reading, stick_width, width
+from contactopt.readings.edges import contact_edge, stick_width
+from contactopt.readings.peaks import Reading, pressure_reading
+from contactopt.readings.quantities import approach
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
@@ -198,7 +200,7 @@ def run(
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it
         is met, or until a sentence in `Result.estimate` says why not; `elements` only scales the
         first mesh
-    quantity : a name of contactopt.derivatives.outputs; of one of several pairs of surfaces
+    quantity : a name of contactopt.readings.quantities; of one of several pairs of surfaces
         'NAME:PAIR'; or one of contactopt.readings.places, such as 'von_mises:BODY:BOUNDARY' or
         'pressure@X,Y'
     adaptive : whether meshes are refined only where the quantity needs it (contactopt.accuracy),
@@ -503,7 +505,7 @@ def _summary(
         "outer_iterations": solution.iterations,
         "normal_force": float(r[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": width(reduction, solution) if single else None,
+        "contact_half_width": contact_edge(reduction.scene, problem, r) if single else None,
         "stick_half_width": stick_width(reduction, solution)[0] if single else None,
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,

@@ -11,8 +11,8 @@ from turned import moved, turn
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
-from contactopt.derivatives.outputs import find_quantity
 from contactopt.meshes.local_refinement import boundary_curve, divide, simplices
+from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene

@@ -1,12 +1,14 @@
 """An accuracy is asked for, and meshes are refined until the estimated error of one quantity J is
 below it.
 
-    solve -> estimate -> refine (everywhere, or where the quantity needs it), until the target is met or a sentence says why not.
+    solve -> estimate -> refine, everywhere or where the quantity needs it, and so on
+
+until the target is met or a sentence says why not.
 
 Every mesh is a Level, the end is an Estimate. The estimated error of the value is the largest of
 
     what the search says of it: differences of nested solutions, or a sum over the elements (below);
-    how uncertain its reading is (contactopt.readings.quantities, contactopt.readings.places);
+    how uncertain its reading is (contactopt.readings.quantities);
     by how much another local maximum may exceed it, whose elements are refined, too.
 
 The error of a geometry that the file gives by straight edges alone is added at the end
@@ -47,7 +49,7 @@ Poisson's equation, for the marking; Zienkiewicz, Zhu (1987) and (1992) for the 
 |---|---|
 | `loop.py` | `refine(states, quantity, accuracy)`: the loop |
 | `estimate.py` | `Level` and `Estimate`: what is known of every mesh and at the end |
-| `everywhere.py` | meshes made anew for more elements; errors from differences of nested solutions |
+| `everywhere.py` | meshes made anew for more elements; differences of nested solutions |
 | `locally.py` | given meshes divided, where the quantity needs it or everywhere |
 | `indicators.py` | the error of a quantity, element by element |
 | `marking.py` | which elements are divided, and the meshes that come of it |

@@ -30,9 +30,9 @@ from contactopt.accuracy.estimate import Judged, Level
 from contactopt.accuracy.indicators import EDGES
 from contactopt.meshes.cells import is_curved
 from contactopt.readings.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
-from contactopt.readings.quantities import Reading
+from contactopt.readings.peaks import Reading
 from contactopt.scenes.refined_scenes import split_scene
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import solve_states
 from contactopt.solving.solve_scene import Options, Solved
 
@@ -43,23 +43,14 @@ def best_order(quantity: str, degree: int) -> int:
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
-    """Estimate how much a sequence still changes under further halving of the mesh.
+    """Estimate the sum of all further differences of a sequence under further halving of the mesh
+    from its last two, `before` None where there is only one, with the sign of the last one; and the
+    observed order, None if it is unknown.
 
     The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences
     form a geometric series. A small last difference may be luck, so that the result is at least
     what order `best` leaves of the difference before. Where the two differences have opposite
     signs, the result is as large as the last one, or a quarter of the one before.
-
-    Parameters
-    ----------
-    before, last : the last two differences of the sequence; `before` is None where there is only
-        one
-    best : the largest order that is believed
-
-    Returns
-    -------
-    The sum of all further differences, with the sign of the last one, and the observed order, None
-    if it is unknown.
     """
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
@@ -82,12 +73,14 @@ def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | Non
     return -rest, order
 
 
-def stuck(values: Sequence[float]) -> bool:
-    """Whether every halving of the mesh changes the value by as much as the one before."""
+def stuck(name: str, values: Sequence[float]) -> str:
+    """One sentence if every halving of the mesh changes the value by as much as the one before."""
     steps = np.diff(values)
-    return len(steps) > 2 and bool(
-        np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1]))
-    )
+    if len(steps) < 3 or np.any(
+        steps[-2:] * np.sign(steps[-1]) <= 2**-STUCK * np.abs(steps[-3:-1])
+    ):
+        return ""
+    return f"the {name} does not converge: every refinement changes it by as much as the one before"
 
 
 class Everywhere:
@@ -104,11 +97,8 @@ class Everywhere:
         self.name, self.best = quantity, best_order(quantity, scene.degree)
         self.usual = MOST_UNKNOWNS[scene.dim]
         self.first = max(FIRST[scene.dim], scene.elements // BELOW)
-        made = [
-            part.build_mesh(self.first, scene.zone)
-            for part in scene.parts
-            if isinstance(part, Part)
-        ]
+        meshed = [part for part in scene.parts if hasattr(part, "build_mesh")]
+        made = [part.build_mesh(self.first, scene.zone) for part in meshed]
         # what split() can halve
         self.halved = scene.dim == 2 and not any(is_curved(mesh) for mesh in made)
         self.values: dict[tuple[int, int], float] = {}
@@ -149,19 +139,13 @@ class Everywhere:
         grading = 0.0
         if self.changes:
             before = self.changes[-2] if len(self.changes) > 1 else None
-            grading = -remainder(before, self.changes[-1], self.best)[0] - sum(
-                self.changes[splits:]
-            )
+            rest = remainder(before, self.changes[-1], self.best)[0]
+            grading = -rest - sum(self.changes[splits:])
         return Judged(abs(mesh) + abs(grading), mesh, grading, order)
 
     def vain(self) -> str:
         """One sentence that says why further refinement would be in vain, or an empty text."""
-        if stuck(self.meshes):
-            return (
-                f"the {self.name} does not converge: every refinement changes it by as much as the"
-                " one before"
-            )
-        return ""
+        return stuck(self.name, self.meshes)
 
     @property
     def ready(self) -> bool:

@@ -15,9 +15,9 @@ from contactopt.accuracy.everywhere import Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.checks import check_number
-from contactopt.derivatives.outputs import Quantity, find_quantity
 from contactopt.errors import InputError
-from contactopt.readings.quantities import Peak, Reading
+from contactopt.readings.peaks import Peak, Reading
+from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.resolution import coarse
 from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
@@ -52,7 +52,7 @@ def refine(
     Parameters
     ----------
     states : The scene, or the states of its load path.
-    quantity : A name of contactopt.derivatives.outputs, such as 'pressure', 'pressure:block-floor'
+    quantity : A name of contactopt.readings.quantities, such as 'pressure', 'pressure:block-floor'
         or 'von_mises:block:fillet'.
     accuracy : Bound on the estimated relative error of the quantity, between 0 and 1.
     options : How each mesh is solved.
@@ -132,10 +132,8 @@ class _Loop:
         states = list(self.search.states)
         solved = self.search.solve()
         if not solved.solution.solved:
-            sentence = (
-                f"the mesh of {solved.reduction.dofs} unknowns was not solved:"
-                f" {solved.solution.message}"
-            )
+            dofs, why = solved.reduction.dofs, solved.solution.message
+            sentence = f"the mesh of {dofs} unknowns was not solved: {why}"
             if not self.levels:
                 raise InputError(
                     f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
@@ -272,21 +270,16 @@ class _Loop:
         error = last.error + geometry / scale if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy
         if sentence:
-            start = (
-                message
-                if reached or not self.reached
-                else "the geometry keeps the target out of reach"
-            )
-            part = (
-                f"{geometry / scale:.1e} of the error is that of the geometry, since "
-                if geometry > 0
-                else ""
-            )
-            message = f"{start}; {part}{sentence}"
+            if self.reached and not reached:
+                message = "the geometry keeps the target out of reach"
+            if geometry > 0:
+                sentence = (
+                    f"{geometry / scale:.1e} of the error is that of the geometry, since {sentence}"
+                )
+            message = f"{message}; {sentence}"
         seconds = dict(self.solved.solution.seconds)
-        seconds["coarse"] = seconds.get("coarse", 0.0) + max(
-            last.seconds - sum(seconds.values()), 0.0
-        )
+        earlier = max(last.seconds - sum(seconds.values()), 0.0)
+        seconds["coarse"] = seconds.get("coarse", 0.0) + earlier
         solution = replace(self.solved.solution, seconds=seconds)
         signed = known and np.isfinite(judged.mesh)
         return replace(self.solved, solution=solution), Estimate(

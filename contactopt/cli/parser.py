@@ -13,8 +13,7 @@ from contactopt.figures.style import FORMATS
 from contactopt.linear.operators import FORMS
 from contactopt.methods import METHODS
 from contactopt.methods.preconditioners import PRECONDITIONERS
-from contactopt.readings.places import PLACED
-from contactopt.readings.quantities import READINGS
+from contactopt.readings.quantities import NAMES
 from contactopt.scenes import SCENES
 
 EPILOG = """Examples:
@@ -222,11 +221,7 @@ def _run(run: argparse.ArgumentParser) -> None:
         help="refine the mesh until the estimated relative error of a quantity is below X",
     )
     run.add_argument(
-        "--quantity",
-        metavar="NAME",
-        help="the quantity of --accuracy: "
-        + ", ".join((*READINGS, *PLACED))
-        + "; NAME:PAIR is that of one pair of surfaces",
+        "--quantity", metavar="NAME", help="the quantity of --accuracy: " + ", ".join(NAMES)
     )
     run.add_argument(
         "--adaptive",

@@ -36,10 +36,8 @@ Mathematical programs with equilibrium constraints.
 | module | what it does |
 |---|---|
 | `interface.py` | `sensitivity(problem, solution)`: forward and adjoint by q, mu, s, Q and V |
-| `linear.py` | M and M' are solved: by dense or sparse factors, by products with Q, or with the bodies at once |
+| `linear.py` | M and M' are solved: by factors, by products with Q, or with the bodies at once |
 | `kinks.py` | Weakly active contacts are found, and one-sided derivatives are solved for |
-| `parameters.py` | Parameters of scenes have names: E, nu, forces, displacements, mu, the gap |
-| `outputs.py` | Quantities of solved scenes and their derivatives by forces, multipliers and displacements |
 | `states.py` | Derivatives go through the reduction and along load paths |
 | `gradient.py` | `gradient(result, quantity, parameters)` |
 | `fit.py` | `fit(scene, data, parameters)`: calibration by least squares |
