@@ -212,5 +212,5 @@ def test_the_scatter_of_a_reading_is_added_to_the_error_of_the_mesh():
     )
     solved = search.solve()
     reading = search.quantity.read(solved.reduction, solved.solution)
-    sizes = [search.judge(solved, Reading(reading.value, more), ()).size for more in (0.0, 0.25)]
+    sizes = [search.judge(solved, Reading(reading.value, more)).size for more in (0.0, 0.25)]
     assert sizes[1] - sizes[0] == pytest.approx(0.25)

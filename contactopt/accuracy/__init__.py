@@ -44,17 +44,6 @@ smooth, and that straight edges are chords of a curved boundary. So the estimate
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for
 Poisson's equation, for the marking; Zienkiewicz, Zhu (1987) and (1992) for the recovery.
-
-| module | what it does |
-|---|---|
-| `loop.py` | `refine(states, quantity, accuracy)`: the loop |
-| `estimate.py` | `Level` and `Estimate`: what is known of every mesh and at the end |
-| `everywhere.py` | meshes made anew for more elements; differences of nested solutions |
-| `locally.py` | given meshes divided, where the quantity needs it or everywhere |
-| `indicators.py` | the error of a quantity, element by element |
-| `marking.py` | which elements are divided, and the meshes that come of it |
-| `corners.py` | places where a pressure or a stress is infinite are recognised |
-| `polygon.py` | what straight edges leave open of a boundary |
 """
 
 from contactopt.accuracy.estimate import Estimate as Estimate

@@ -26,11 +26,11 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.estimate import Judged
 from contactopt.accuracy.indicators import EDGES
 from contactopt.meshes.cells import is_curved
 from contactopt.readings.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
-from contactopt.readings.peaks import Reading
+from contactopt.readings.peaks import Peak, Reading
 from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import solve_states
@@ -86,10 +86,14 @@ def stuck(name: str, values: Sequence[float]) -> str:
 class Everywhere:
     """The nested solves of scenes whose parts make their own meshes.
 
+    watches  whether the largest peak may exceed its value by what it changed, as others may
+
     values   (elements, splits) -> value;   changes  changes[i] is the change of the value by split
              i + 1. There is one entry for every split of the present mesh; without one there is
              still the first, measured to learn what it does
     """
+
+    watches = False
 
     def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
         self.states, self.options = states, options
@@ -126,7 +130,7 @@ class Everywhere:
         states = [split_scene(scene, elements // 2**splits, splits) for scene in self.states]
         return solve_states(states, elements, self.options, self.last)
 
-    def judge(self, solved: Solved, reading: Reading, levels: Sequence[Level]) -> Judged:
+    def judge(self, solved: Solved, reading: Reading) -> Judged:
         """What is known of the error of the value on the mesh that was solved last."""
         elements, splits = job = self.jobs.pop(0)
         self.values[job], self.unknowns[job] = reading.value, solved.reduction.dofs
@@ -162,18 +166,32 @@ class Everywhere:
             "zone": zones[-2] if zones else None,
         }
 
-    def advance(self, judged: Judged, reading: Reading, unresolved: bool) -> float:
-        """Choose the next mesh; returns how many unknowns it will have."""
+    def advance(
+        self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
+    ) -> float:
+        """Choose the next mesh; returns how many unknowns it will have. Around `contacts` the mesh
+        is too coarse to know, and `rivals` are local maxima that may be the largest.
+        """
         if not self.jobs:
             n, s = self.finest, self.splits + 1
             fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
             many = len(self.meshes) > 2 and self.halved
-            if many and (not self.changes or (fine and not unresolved)) and 2**s * self.first <= n:
+            if (
+                many
+                and (not self.changes or (fine and not len(contacts)))
+                and 2**s * self.first <= n
+            ):
                 jobs = [(n, i) for i in range(1, s + 1)]
                 self.jobs = [job for job in jobs if job not in self.values]
             if not self.jobs:
                 self.jobs = [(2 * n, 0)]
         return self._unknowns(*self.jobs[0])
+
+    def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
+        """By how much the quantity changes in the other shape of guessed boundaries, of which there
+        are none here, and a sentence on them.
+        """
+        return 0.0, ""
 
     def _unknowns(self, elements: int, splits: int) -> float:
         """How many unknowns a mesh will have, by the growth of those before it."""

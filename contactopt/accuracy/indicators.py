@@ -79,10 +79,9 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
         try:
             seeds = quantity.slopes(state)
+            by = {"reactions": seeds.reactions, "multipliers": seeds.multipliers}
             dual = sensitivity(state.problem, state.solution).adjoint(
-                reactions=seeds.reactions,
-                multipliers=seeds.multipliers,
-                displacements=seeds.slip,
+                **by, displacements=seeds.slip
             )
             found = Duals(state, dual, seeds.bodies).fields
         except InputError as error:

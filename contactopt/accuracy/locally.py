@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.estimate import Judged
 from contactopt.accuracy.everywhere import best_order, mesh_error, stuck
 from contactopt.accuracy.indicators import ElementErrors, element_errors
 from contactopt.accuracy.marking import (
@@ -51,7 +51,7 @@ class Locally:
         check_refinable(states[-1])
         made = [divisible(scene, not whole) for scene in states]
         self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
-        self.quantity, self.options, self.whole = quantity, options, whole
+        self.quantity, self.options, self.whole, self.watches = quantity, options, whole, not whole
         self.best = best_order(quantity.name, states[-1].degree)
         self.values: list[float] = []
         self.errors: ElementErrors | None = None
@@ -66,7 +66,7 @@ class Locally:
             return solve_states(states, None, self.options)
         return solve_scene(states[0], options=self.options, start=self.last)
 
-    def judge(self, solved: Solved, reading: Reading, levels: Sequence[Level]) -> Judged:
+    def judge(self, solved: Solved, reading: Reading) -> Judged:
         self.last = solved
         self.values.append(reading.value)
         if self.whole:

@@ -82,11 +82,11 @@ def refine(
             f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
         )
     options = options or Options()
-    search = (
-        Locally(tuple(states), asked, options, not adaptive)
-        if adaptive or scene.given
-        else Everywhere(tuple(states), quantity, options)
-    )
+    search: Everywhere | Locally
+    if adaptive or scene.given:
+        search = Locally(tuple(states), asked, options, not adaptive)
+    else:
+        search = Everywhere(tuple(states), quantity, options)
     return _Loop(asked, accuracy, options, limits or Limits(), search).run()
 
 
@@ -118,9 +118,7 @@ class _Loop:
         while not message:
             start = time.perf_counter()
             try:
-                message = self._next()
-                if not message:
-                    message = self._limit(self._advance(), time.perf_counter() - start)
+                message = self._next() or self._limit(time.perf_counter() - start)
             except InputError as error:
                 if not self.levels:
                     raise
@@ -141,7 +139,7 @@ class _Loop:
             return sentence
         reading = self.quantity.read(solved.reduction, solved.solution)
         facts = self.search.facts(solved)
-        judged = self.search.judge(solved, reading, self.levels)
+        judged = self.search.judge(solved, reading)
         self.solved, self.reading, self.judged, self.states = solved, reading, judged, states
         self.peaks.append(reading.peaks)
         self.rivals, excess = self._rivals()
@@ -176,14 +174,9 @@ class _Loop:
             vain = self.reading.missing
         error = self.levels[-1].error
         self.vain = bool(vain)
-        self.reached = (
-            not vain
-            and not self.reading.missing
-            and self.search.ready
-            and not len(self.unresolved)
-            and error is not None
-            and error <= self.accuracy
-        )
+        known = not vain and not self.reading.missing and not len(self.unresolved)
+        enough = error is not None and error <= self.accuracy
+        self.reached = known and self.search.ready and enough
         if vain or self.reached:
             return vain or f"the estimated error of the {self.quantity.name} is below the target"
         if len(self.levels) >= MOST_LEVELS:
@@ -198,7 +191,7 @@ class _Loop:
         """
         last = self.peaks[-1]
         found, excess = [], 0.0
-        if isinstance(self.search, Locally) and not self.search.whole and last and last[0].size:
+        if self.search.watches and last and last[0].size:
             excess = self._change(last[0])
             found = [last[0]] if excess > self.judged.size / 2 else []
         for peak in last[1:]:
@@ -235,14 +228,11 @@ class _Loop:
         few = [own for _, own in coarse(reduction, solution)]
         return np.concatenate([overlooked(reduction, touching, apart), *few]).astype(int)
 
-    def _advance(self) -> float:
-        """Choose the next mesh; returns how many unknowns it has."""
-        if isinstance(self.search, Locally):
-            return self.search.advance(self.judged, self.reading, self.unresolved, self.rivals)
-        return self.search.advance(self.judged, self.reading, bool(len(self.unresolved)))
-
-    def _limit(self, unknowns: float, last: float) -> str:
-        """One sentence if the next mesh passes a limit."""
+    def _limit(self, last: float) -> str:
+        """Choose the next mesh; one sentence if it passes a limit. `last` is the time of this one
+        [s].
+        """
+        unknowns = self.search.advance(self.judged, self.reading, self.unresolved, self.rivals)
         growth = unknowns / self.levels[-1].unknowns
         held = (resident_memory() - self.before) * (1 + growth)
         spent = time.perf_counter() - self.began
@@ -252,7 +242,7 @@ class _Loop:
         """The error that the shape of guessed boundaries makes [unit of the quantity], and a
         sentence on it.
         """
-        if not isinstance(self.search, Locally) or self.vain or self.reading.missing:
+        if self.vain or self.reading.missing:
             return 0.0, ""
         try:
             return self.search.geometry(self.reading.value, self.states)

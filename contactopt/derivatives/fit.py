@@ -115,11 +115,8 @@ class _Model:
     ):
         self.scenes, self.which, self.data, self.sigma = scenes, which, data, sigma
         self.Q, self.tol = solving
-        self.measured = [
-            (name, int(n))
-            for name, values in data.items()
-            for n in np.flatnonzero(np.isfinite(values))
-        ]
+        finite = {name: np.flatnonzero(np.isfinite(own)).tolist() for name, own in data.items()}
+        self.measured = [(name, n) for name, own in finite.items() for n in own]
         self.noise = np.array([sigma[name] for name, _ in self.measured])
         self.wanted = np.array([data[name][n] for name, n in self.measured])
         self.last: tuple[np.ndarray, Chain] | None = None

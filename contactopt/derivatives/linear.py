@@ -372,7 +372,7 @@ def _refined(
 
 
 def _rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
-    """P where a component is held by contact, the identity where it slips, bordered by the balance."""
+    """P where contact holds a component, the identity where it slips, bordered by the balance."""
     closed, d, V = tangent.closed, tangent.D.shape[1], tangent.problem.V[tangent.closed]
     n = len(closed)
     rho = np.repeat(tangent.rho, d)[closed]

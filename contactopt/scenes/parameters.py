@@ -44,7 +44,12 @@ FORM = {
 }
 
 
-ITEMS = {"force": Plate, "displacement": Support, "traction": Traction, "weight": BodyForce}
+ITEMS: dict[str, Any] = {
+    "force": Plate,
+    "displacement": Support,
+    "traction": Traction,
+    "weight": BodyForce,
+}
 Entry = tuple[str, Mapping[str, float]]  # name of a field, and its components
 
 
@@ -103,11 +108,8 @@ class Parameter:
 
     def pairs(self, scene: Scene) -> list[Any]:
         """The pairs of surfaces whose friction it is."""
-        return [
-            pair
-            for pair in scene.pairs
-            if self.owner in ("", pair.name) and pair.law not in ("frictionless", "tied")
-        ]
+        rough = [pair for pair in scene.pairs if pair.law not in ("frictionless", "tied")]
+        return [pair for pair in rough if self.owner in ("", pair.name)]
 
     def _friction(self, pair: Any) -> float:
         if np.ndim(pair.mu) or callable(pair.mu):
@@ -123,7 +125,7 @@ class Parameter:
         """Its values in one body, none or one unless the name is ambiguous, and the body with
         another value.
         """
-        material = getattr(part, "material", None)
+        material: Any = getattr(part, "material", None)
         if not self.concerns(part) or (self.kind in MATERIAL and material is None):
             return [], part
         if self.kind in MATERIAL:
@@ -163,25 +165,21 @@ class Parameter:
 
     def _entry(self, item: Any, scene: Scene) -> Entry | None:
         """The field of a support or load that holds the parameter; None if it is another one."""
+        there = self.boundary == getattr(item, "boundary", "")
         if not isinstance(item, ITEMS[self.kind]):
             return None
-        if self.boundary != getattr(item, "boundary", "") and (
-            self.boundary or self.kind != "force"
-        ):
+        if self.kind == "force":
+            return ("force", item.force) if there or not self.boundary else None
+        if not there:
             return None
-        if isinstance(item, Plate):
-            return "force", item.force
-        if isinstance(item, Support):
+        if self.kind == "displacement":
             fixed = dict.fromkeys(scene.components, 0.0)
             return "displacement", fixed if item.displacement is None else item.displacement
         return "value", dict(zip(scene.components, item.value))
 
     def _missing(self, scene: Scene) -> str:
-        names = (
-            [pair.name for pair in scene.pairs]
-            if self.kind == "mu"
-            else [part.name for part in scene.parts]
-        )
+        named: Any = scene.pairs if self.kind == "mu" else scene.parts
+        names = [one.name for one in named]
         if self.owner and self.owner not in names:
             return (
                 f"it has no {'contact' if self.kind == 'mu' else 'body'} '{self.owner}', only"
