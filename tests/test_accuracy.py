@@ -84,7 +84,8 @@ def test_the_fitted_peak_is_hertz_where_the_axis_node_is_not():
     solution = solve(reduction.problem)
     nodal = solution.reactions[0, 0] / reduction.problem.areas[0]
     assert abs(nodal / scene.reference.peak - 1) > 5e-3
-    assert value_of("pressure", reduction, solution) == pytest.approx(scene.reference.peak, rel=2e-3)
+    peak = value_of("pressure", reduction, solution)
+    assert peak == pytest.approx(scene.reference.peak, rel=2e-3)
 
 
 def test_the_peak_of_an_exact_ellipse_is_exact():

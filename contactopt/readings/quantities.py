@@ -216,14 +216,16 @@ def _at_place(place: Any, state: State) -> Seeds:
 
 def _motion(state: State, component: int) -> Seeds:
     problem, lam = state.problem, state.solution.multipliers
-    if len(lam) == 0 or (component == 0 and approach(problem, state.solution) is None):
+    near = approach(problem, state.solution)
+    if len(lam) == 0 or (component == 0 and near is None):
         raise InputError(
             f"scene '{state.reduction.scene.name}' has no plate, hence no approach and no shift, or"
             " surfaces around a body, which have no mean normal; ask for another quantity."
         )
     rows = problem.V.reshape(problem.contacts, problem.dim, -1)[:, component]
     weights = np.average(rows, axis=0, weights=problem.areas) * (-1.0 if component == 0 else 1.0)
-    return Seeds(float(weights @ lam), multipliers=weights)
+    value = float(weights @ lam) if component or near is None else near
+    return Seeds(value, multipliers=weights)
 
 
 def _pressure_at(state: State, number: int) -> Seeds:
