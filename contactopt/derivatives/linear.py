@@ -16,7 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -46,15 +46,7 @@ UNIQUE = (
     " not unique there; remove redundant contacts, or hold the bodies."
 )
 
-# for the contacts (k d,), for the balance or the multipliers (p,)
-Pair = tuple[np.ndarray, np.ndarray]
 Act = Callable[[np.ndarray], np.ndarray]
-
-
-class Closed(Protocol):
-    """What solves K x = right and K' x = right, for right (n + p,)."""
-
-    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray: ...
 
 
 def transposed_product(Q: Interface, x: np.ndarray) -> np.ndarray:
@@ -74,7 +66,7 @@ class Tangent:
     rho: np.ndarray
     D: np.ndarray
 
-    def solve(self, error: np.ndarray, balance: np.ndarray) -> Pair:
+    def solve(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dr (k d,) and dlambda (p,) with M (dr, dlambda) = (error, balance)."""
         Q, V, closed, n = self.problem.Q, self.problem.V, self.closed, len(self.closed)
         dr = np.where(self.is_closed, 0.0, error)
@@ -126,8 +118,10 @@ class Tangent:
         return np.flatnonzero(self.is_closed)
 
     @cached_property
-    def system(self) -> Closed:
-        """K by the means that fit the form of Q; InputError where it is singular."""
+    def system(self) -> Stuck | Dense | Sparse | Krylov | Coupled:
+        """What solves K x = right and K' x = right (n + p,), by the means that fit the form of Q;
+        InputError where it is singular.
+        """
         Q = self.problem.Q
         if isinstance(Q, InterfaceOperator):
             return Krylov(self) if Q.coupled is None else Coupled(self, Q.coupled)
@@ -279,10 +273,10 @@ class Krylov:
         """An approximate inverse of K or K': that for the model of Q to INNER, or a rough one
         without a model.
         """
-        rough, model = self.rough[transposed], self.P.model
-        if model is None:
+        rough = self.rough[transposed]
+        if self.P.model is None:
             return rough
-        act = model.matvec
+        act = self.P.model.matvec
         return lambda x: _gmres(lambda y: self.product(y, transposed, act), x, INNER, rough)
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
@@ -314,8 +308,7 @@ class Coupled:
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         tangent, form, contacts = self.tangent, self.form, self.contacts
-        n, sign = len(tangent.closed), -1.0 if transposed else 1.0
-        inverse = contacts.inverse(transposed)
+        n, sign, inverse = len(tangent.closed), 1 - 2 * transposed, contacts.inverse(transposed)
 
         def forces(x: np.ndarray) -> np.ndarray:
             """What the contacts do to the bodies: dr or z (k d,)."""
@@ -373,8 +366,8 @@ def _refined(
 
 def _rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
     """P where contact holds a component, the identity where it slips, bordered by the balance."""
-    closed, d, V = tangent.closed, tangent.D.shape[1], tangent.problem.V[tangent.closed]
-    n = len(closed)
+    closed, n, d = tangent.closed, len(tangent.closed), tangent.D.shape[1]
+    V = tangent.problem.V[closed]
     rho = np.repeat(tangent.rho, d)[closed]
     inside = np.diagonal(tangent.D, axis1=1, axis2=2).ravel()[closed] > SLIPPING
     unknowns = closed[inside]
