@@ -21,7 +21,9 @@ from contactopt.files.writing import check_folder, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.outcome import Outcome
-from contactopt.readings.quantities import Reading, approach, pressure_reading, stick_width, width
+from contactopt.readings.edges import contact_edge, stick_width
+from contactopt.readings.peaks import Reading, pressure_reading
+from contactopt.readings.quantities import approach
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
@@ -305,7 +307,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": width(reduction, solution) if single else None,
+        "contact_half_width": contact_edge(reduction.scene, problem, solution.reactions) if single else None,
         "stick_half_width": stick_width(reduction, solution)[0] if single else None,
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,

@@ -15,8 +15,8 @@ from contactopt.accuracy.corners import filled, re_entrant
 from contactopt.accuracy.indicators import element_errors, pressure_errors
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.derivatives.outputs import find_quantity
 from contactopt.meshes.mesh_refinement import bent, boundary_curves
+from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene

@@ -12,9 +12,9 @@ from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, 
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
 from contactopt.accuracy.marking import divisible
-from contactopt.derivatives.outputs import find_quantity
 from contactopt.meshes.mesh_refinement import boundary_curves, divide
 from contactopt.meshes.structured import simplices
+from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene

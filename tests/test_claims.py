@@ -14,8 +14,9 @@ from contactopt.accuracy import loop, refine
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import balanced, divisible, overlooked
 from contactopt.accuracy.polygon import chords_of, flatter
-from contactopt.derivatives.outputs import find_quantity
-from contactopt.readings.quantities import Peak, Reading, pressure_reading, width_reading
+from contactopt.readings.edges import width_reading
+from contactopt.readings.peaks import Peak, Reading, pressure_reading
+from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.solving.solve_scene import Options, solve_scene
 
@@ -152,7 +153,7 @@ def test_a_wide_contact_with_an_even_pressure_converges():
 
 def test_friction_across_a_plane_of_symmetry_has_an_adjoint():
     from contactopt.accuracy.indicators import element_errors
-    from contactopt.derivatives.outputs import find_quantity
+    from contactopt.readings.quantities import find_quantity
 
     half = block(supports=(Support("bottom"), Support("sides", {"x": 0.0})), loads=())
     tool = Rigid("tool", (0.0, 1.0), lambda x: (x[0] + 2) ** 2 / 8, force={"y": -0.2})
@@ -211,5 +212,5 @@ def test_the_scatter_of_a_reading_is_added_to_the_error_of_the_mesh():
     )
     solved = search.solve()
     reading = search.quantity.read(solved.reduction, solved.solution)
-    sizes = [search.judge(solved, Reading(reading.value, more), ()).size for more in (0.0, 0.25)]
+    sizes = [search.judge(solved, Reading(reading.value, more)).size for more in (0.0, 0.25)]
     assert sizes[1] - sizes[0] == pytest.approx(0.25)

@@ -7,7 +7,7 @@ import pytest
 
 import contactopt
 from contactopt import HalfSpace, InputError, Material, Rigid, Scene, follow, plots, scenes
-from contactopt.derivatives.parameters import parameter
+from contactopt.scenes.parameters import parameter
 
 LOADS = (0.0, 20.0, 42.0, 10.0, -20.0, -42.0, 0.0)
 

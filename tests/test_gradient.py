@@ -10,10 +10,10 @@ import pytest
 import contactopt
 from contactopt import InputError, follow, scenes
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.derivatives.outputs import Functional, seeds_of
-from contactopt.derivatives.parameters import parameter, parameters
 from contactopt.derivatives.states import chain_of
 from contactopt.methods.driver import solve
+from contactopt.readings.quantities import Functional, seeds_of
+from contactopt.scenes.parameters import parameter, parameters
 from contactopt.solving.solve_scene import Solved
 
 CASES = {

@@ -53,7 +53,9 @@ def test_compliance_is_the_trailing_block_of_the_inverse(kind):
         inverse = np.linalg.inv(body.body.A[free][:, free].toarray())
         place = np.searchsorted(free, body.interface)
         expected = inverse[np.ix_(place, place)]
-        assert np.abs(body.solver.trailing_inverse() - expected).max() < 1e-12 * np.abs(expected).max()
+        assert (
+            np.abs(body.solver.trailing_inverse() - expected).max() < 1e-12 * np.abs(expected).max()
+        )
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 """An accuracy is asked for, and meshes are refined until the estimated error of one quantity J is
 below it.
 
-    solve -> estimate -> refine (everywhere, or where the quantity needs it), until the target is met or a sentence says why not.
+    solve -> estimate -> refine, everywhere or where the quantity needs it, and so on
+
+until the target is met or a sentence says why not.
 
 Every mesh is a Level, the end is an Estimate. The estimated error of the value is the largest of
 
     what the search says of it: differences of nested solutions, or a sum over the elements (below);
-    how uncertain its reading is (contactopt.readings.quantities, contactopt.readings.places);
+    how uncertain its reading is (contactopt.readings.quantities);
     by how much another local maximum may exceed it, whose elements are refined, too.
 
 The error of a geometry that the file gives by straight edges alone is added at the end
@@ -42,17 +44,6 @@ smooth, and that straight edges are chords of a curved boundary. So the estimate
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for
 Poisson's equation, for the marking; Zienkiewicz, Zhu (1987) and (1992) for the recovery.
-
-| module | what it does |
-|---|---|
-| `loop.py` | `refine(states, quantity, accuracy)`: the loop |
-| `estimate.py` | `Level` and `Estimate`: what is known of every mesh and at the end |
-| `everywhere.py` | meshes made anew for more elements; errors from differences of nested solutions |
-| `locally.py` | given meshes divided, where the quantity needs it or everywhere |
-| `indicators.py` | the error of a quantity, element by element |
-| `marking.py` | which elements are divided, and the meshes that come of it |
-| `corners.py` | places where a pressure or a stress is infinite are recognised |
-| `polygon.py` | what straight edges leave open of a boundary |
 """
 
 from contactopt.accuracy.estimate import Estimate as Estimate

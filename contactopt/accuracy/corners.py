@@ -25,7 +25,7 @@ from contactopt.bodies.fields import Region
 from contactopt.meshes.cells import straight
 from contactopt.meshes.curves import CORNER
 from contactopt.meshes.structured import simplices
-from contactopt.readings.quantities import Peak, Reading, at_rim
+from contactopt.readings.peaks import Peak, Reading, at_rim
 from contactopt.readings.resultants import views
 from contactopt.solving.solve_scene import Solved
 
@@ -39,32 +39,24 @@ AT_EDGE = 2  # at a corner of the contact surface
 
 
 def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
-    """One sentence that says why no mesh bounds the quantity, or an empty text.
-
-    Parameters
-    ----------
-    solved : on the last mesh
-    reading : of the quantity there
-    levels : all meshes so far
+    """One sentence that says why no mesh bounds the quantity, of all meshes so far and its reading
+    on the last of them, or an empty text.
     """
     if not levels[-1].place:
         return ""
     peak = reading.peaks[0]
     place = ", ".join(f"{x:.4g}" for x in levels[-1].place)
-    if peak.body < 0:
-        if _grows(levels, AT_EDGE) and _at_rim(solved, peak):
-            return (
-                "the largest pressure is at the edge of the contact surface, a corner, where no"
-                " mesh bounds it"
-            )
-        what = "pressure"
-    else:
-        what = "stress"
-        if len(levels) > TRIED and _rises(levels) and _in_corner(solved, peak):
-            return (
-                f"the largest stress is at the re-entrant corner near ({place}), where it is"
-                " infinite; no mesh bounds it"
-            )
+    what = "pressure" if peak.body < 0 else "stress"
+    if what == "pressure" and _grows(levels, AT_EDGE) and _at_rim(solved, peak):
+        return (
+            "the largest pressure is at the edge of the contact surface, a corner, where no mesh"
+            " bounds it"
+        )
+    if what == "stress" and len(levels) > TRIED and _rises(levels) and _in_corner(solved, peak):
+        return (
+            f"the largest stress is at the re-entrant corner near ({place}), where it is infinite;"
+            " no mesh bounds it"
+        )
     if _grows(levels, GROWTHS):
         return (
             f"the largest {what}, at ({place}), grows with every refinement like an infinite one;"
@@ -74,7 +66,7 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
 
 
 def _in_corner(solved: Solved, peak: Peak) -> bool:
-    """Whether a peak of the stress lies at a re-entrant corner of its body, wherever that body is."""
+    """Whether a peak of the stress lies at a re-entrant corner of its body."""
     read = solved.reduction.bodies[peak.body].stress_map(Region())
     assert read is not None  # the stress was read from its elements
     mesh = straight(read.mesh)
@@ -110,9 +102,8 @@ def filled(cells: Any, vertex: int) -> float:
     arms = cells.p[:, others] - cells.p[:, [vertex]][:, :, None]
     arms = arms / np.linalg.norm(arms, axis=0)
     if len(arms) == 2:
-        return float(
-            np.arccos(np.clip(np.sum(arms[:, 0] * arms[:, 1], axis=0), -1, 1)).sum() / (2 * np.pi)
-        )
+        cosines = np.clip(np.sum(arms[:, 0] * arms[:, 1], axis=0), -1, 1)
+        return float(np.arccos(cosines).sum() / (2 * np.pi))
     a, b, c = arms[:, 0], arms[:, 1], arms[:, 2]
     volume = np.abs(np.sum(a * np.cross(b, c, axis=0), axis=0))
     # Van Oosterom, Strackee (1983)

@@ -26,13 +26,13 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.estimate import Judged
 from contactopt.accuracy.indicators import EDGES
 from contactopt.meshes.cells import is_curved
 from contactopt.readings.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
-from contactopt.readings.quantities import Reading
+from contactopt.readings.peaks import Peak, Reading
 from contactopt.scenes.refined_scenes import split_scene
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
 from contactopt.solving.solve_scene import Options, Solved
 
@@ -43,23 +43,14 @@ def best_order(quantity: str, degree: int) -> int:
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
-    """Estimate how much a sequence still changes under further halving of the mesh.
+    """Estimate the sum of all further differences of a sequence under further halving of the mesh
+    from its last two, `before` None where there is only one, with the sign of the last one; and the
+    observed order, None if it is unknown.
 
     The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences
     form a geometric series. A small last difference may be luck, so that the result is at least
     what order `best` leaves of the difference before. Where the two differences have opposite
     signs, the result is as large as the last one, or a quarter of the one before.
-
-    Parameters
-    ----------
-    before, last : the last two differences of the sequence; `before` is None where there is only
-        one
-    best : the largest order that is believed
-
-    Returns
-    -------
-    The sum of all further differences, with the sign of the last one, and the observed order, None
-    if it is unknown.
     """
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
@@ -82,21 +73,27 @@ def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | Non
     return -rest, order
 
 
-def stuck(values: Sequence[float]) -> bool:
-    """Whether every halving of the mesh changes the value by as much as the one before."""
+def stuck(name: str, values: Sequence[float]) -> str:
+    """One sentence if every halving of the mesh changes the value by as much as the one before."""
     steps = np.diff(values)
-    return len(steps) > 2 and bool(
-        np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1]))
-    )
+    if len(steps) < 3 or np.any(
+        steps[-2:] * np.sign(steps[-1]) <= 2**-STUCK * np.abs(steps[-3:-1])
+    ):
+        return ""
+    return f"the {name} does not converge: every refinement changes it by as much as the one before"
 
 
 class Everywhere:
     """The nested solves of scenes whose parts make their own meshes.
 
+    watches  whether the largest peak may exceed its value by what it changed, as others may
+
     values   (elements, splits) -> value;   changes  changes[i] is the change of the value by split
              i + 1. There is one entry for every split of the present mesh; without one there is
              still the first, measured to learn what it does
     """
+
+    watches = False
 
     def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
         self.states, self.options = states, options
@@ -104,11 +101,8 @@ class Everywhere:
         self.name, self.best = quantity, best_order(quantity, scene.degree)
         self.usual = MOST_UNKNOWNS[scene.dim]
         self.first = max(FIRST[scene.dim], scene.elements // BELOW)
-        made = [
-            part.build_mesh(self.first, scene.zone)
-            for part in scene.parts
-            if isinstance(part, Part)
-        ]
+        meshed = [part for part in scene.parts if hasattr(part, "build_mesh")]
+        made = [part.build_mesh(self.first, scene.zone) for part in meshed]
         # what split() can halve
         self.halved = scene.dim == 2 and not any(is_curved(mesh) for mesh in made)
         self.values: dict[tuple[int, int], float] = {}
@@ -136,7 +130,7 @@ class Everywhere:
         states = [split_scene(scene, elements // 2**splits, splits) for scene in self.states]
         return solve_states(states, elements, self.options, self.last)
 
-    def judge(self, solved: Solved, reading: Reading, levels: Sequence[Level]) -> Judged:
+    def judge(self, solved: Solved, reading: Reading) -> Judged:
         """What is known of the error of the value on the mesh that was solved last."""
         elements, splits = job = self.jobs.pop(0)
         self.values[job], self.unknowns[job] = reading.value, solved.reduction.dofs
@@ -149,19 +143,13 @@ class Everywhere:
         grading = 0.0
         if self.changes:
             before = self.changes[-2] if len(self.changes) > 1 else None
-            grading = -remainder(before, self.changes[-1], self.best)[0] - sum(
-                self.changes[splits:]
-            )
+            rest = remainder(before, self.changes[-1], self.best)[0]
+            grading = -rest - sum(self.changes[splits:])
         return Judged(abs(mesh) + abs(grading), mesh, grading, order)
 
     def vain(self) -> str:
         """One sentence that says why further refinement would be in vain, or an empty text."""
-        if stuck(self.meshes):
-            return (
-                f"the {self.name} does not converge: every refinement changes it by as much as the"
-                " one before"
-            )
-        return ""
+        return stuck(self.name, self.meshes)
 
     @property
     def ready(self) -> bool:
@@ -178,18 +166,32 @@ class Everywhere:
             "zone": zones[-2] if zones else None,
         }
 
-    def advance(self, judged: Judged, reading: Reading, unresolved: bool) -> float:
-        """Choose the next mesh; returns how many unknowns it will have."""
+    def advance(
+        self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
+    ) -> float:
+        """Choose the next mesh; returns how many unknowns it will have. Around `contacts` the mesh
+        is too coarse to know, and `rivals` are local maxima that may be the largest.
+        """
         if not self.jobs:
             n, s = self.finest, self.splits + 1
             fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
             many = len(self.meshes) > 2 and self.halved
-            if many and (not self.changes or (fine and not unresolved)) and 2**s * self.first <= n:
+            if (
+                many
+                and (not self.changes or (fine and not len(contacts)))
+                and 2**s * self.first <= n
+            ):
                 jobs = [(n, i) for i in range(1, s + 1)]
                 self.jobs = [job for job in jobs if job not in self.values]
             if not self.jobs:
                 self.jobs = [(2 * n, 0)]
         return self._unknowns(*self.jobs[0])
+
+    def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
+        """By how much the quantity changes in the other shape of guessed boundaries, of which there
+        are none here, and a sentence on them.
+        """
+        return 0.0, ""
 
     def _unknowns(self, elements: int, splits: int) -> float:
         """How many unknowns a mesh will have, by the growth of those before it."""

@@ -9,9 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction
-from contactopt.derivatives.outputs import Quantity
-from contactopt.derivatives.states import Duals, Step
+from contactopt.derivatives.interface import sensitivity
+from contactopt.derivatives.states import Duals
 from contactopt.errors import InputError
+from contactopt.readings.quantities import Quantity
+from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
 
 log = logging.getLogger(__name__)
@@ -64,32 +66,24 @@ class ElementErrors:
 
 
 def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:
-    """What each element adds to the error of a quantity, estimated as in contactopt.accuracy.
+    """What each element adds to the error of a quantity with this value, estimated as in
+    contactopt.accuracy.
 
-    Parameters
-    ----------
-    solved : a scene that was reduced and solved
-    quantity : of the scene. For "energy" no adjoint is needed: the energy of the error itself is
-        taken, without a sign. The same serves, as a guide to the marking alone, for edges and where
-        the adjoint problem has no solution
-    value : of the quantity
-
-    Returns
-    -------
-    ElementErrors : signed shares of the error J - J_h
+    For "energy" no adjoint is needed: the energy of the error itself is taken, without a sign. The
+    same serves, as a guide to the marking alone, for edges and where the adjoint problem has no
+    solution.
     """
-    step = Step(solved.reduction, solved.reduction.problem, solved.solution)
-    bodies, displaced = solved.reduction.bodies, step.displaced
+    state = State(solved.reduction, solved.solution)
+    bodies, displaced = solved.reduction.bodies, state.displaced
     found = None
     if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
         try:
-            seeds = quantity.slopes(step)
-            dual = step.sensitivity.adjoint(
-                reactions=seeds.reactions,
-                multipliers=seeds.multipliers,
-                displacements=_sum(seeds.displacements, seeds.slip),
+            seeds = quantity.slopes(state)
+            by = {"reactions": seeds.reactions, "multipliers": seeds.multipliers}
+            dual = sensitivity(state.problem, state.solution).adjoint(
+                **by, displacements=seeds.slip
             )
-            found = Duals(step, dual, seeds.bodies).fields
+            found = Duals(state, dual, seeds.bodies).fields
         except InputError as error:
             log.info("%s: no adjoint, %s", quantity.name, error)
     fields = displaced if found is None else found
@@ -108,30 +102,17 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     return ElementErrors(value, errors, norm, between)
 
 
-def _sum(*parts: np.ndarray | None) -> np.ndarray | None:
-    given = [part for part in parts if part is not None]
-    return sum(given[1:], given[0]) if given else None
-
-
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
     """What elements at the contact add to the error of a function of the forces, because the
-    pressure varies between contacts.
-
-    Parameters
-    ----------
-    weights : (k,) derivatives of the quantity by the normal forces
-
-    Returns
-    -------
-    For each body (elements,), signed; elements that hold the nodes of a contact share what it adds
+    pressure varies between contacts. `weights` (k,) are its derivatives by the normal forces.
+    Returned are (elements,), signed, for each body; elements that hold the nodes of a contact share
+    what it adds.
     """
     reduction, problem = solved.reduction, solved.reduction.problem
     added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
-    F = [
-        np.asarray(abs(B).T @ np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel())
-        for B in reduction.maps
-    ]
-    shares = [body.on_elements(force) for body, force in zip(reduction.bodies, F)]
+    normal = np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel()
+    parts = zip(reduction.bodies, reduction.maps)
+    shares = [body.on_elements(np.asarray(abs(B).T @ normal)) for body, B in parts]
     total = sum(share.sum() for share in shares)
     factor = added.sum() / total if total != 0 else 0.0
     return tuple(factor * share for share in shares)
@@ -148,8 +129,8 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
     this half is taken on surfaces and where distances vary as well.
     """
     problem = reduction.problem
-    pressure = np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
-    errors = np.zeros(len(forces))
+    errors, areas = np.zeros(len(forces)), problem.areas
+    pressure = np.divide(forces, areas, out=np.zeros(len(forces)), where=areas > 0)
     for pair, coupling in zip(problem.pairs, reduction.couplings):
         cells = coupling.cells.T
         if cells.shape[1] != problem.dim:
@@ -157,18 +138,14 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
         own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
         edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
         size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
-        p, r = (
-            own[cells],
-            points[0][cells] if reduction.scene.kind == "axisymmetric" else np.ones(cells.shape),
-        )
+        ring = reduction.scene.kind == "axisymmetric"
+        p, r = own[cells], points[0][cells] if ring else np.ones(cells.shape)
         (sum_p, sum_r), corner = (x.sum(axis=1, keepdims=True) for x in (p, r)), cells.ravel()
+        both = np.sum(p * r, axis=1, keepdims=True)
         # integrals of phi_a phi_b phi_c r_c p_b over a simplex, in units of its smallest one
-        mean = (
-            sum_p * sum_r + p * sum_r + r * sum_p + np.sum(p * r, axis=1, keepdims=True) + 2 * p * r
-        )
+        mean = sum_p * sum_r + p * sum_r + r * sum_p + both + 2 * p * r
         smooth = np.bincount(corner, (size * mean).ravel(), len(own))
         whole = (problem.dim + 2) * np.bincount(corner, (size * (sum_r + r)).ravel(), len(own))
-        errors[pair.contacts] = (
-            own - np.divide(smooth, whole, out=own.copy(), where=whole > 0)
-        ) / 2
+        mean = np.divide(smooth, whole, out=own.copy(), where=whole > 0)
+        errors[pair.contacts] = (own - mean) / 2
     return errors

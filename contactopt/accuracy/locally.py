@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.estimate import Judged
 from contactopt.accuracy.everywhere import best_order, mesh_error, stuck
 from contactopt.accuracy.indicators import ElementErrors, element_errors
 from contactopt.accuracy.marking import (
@@ -23,8 +23,8 @@ from contactopt.accuracy.marking import (
     unknowns,
     with_bent_edges,
 )
-from contactopt.derivatives.outputs import Quantity
-from contactopt.readings.quantities import Peak, Reading, nodal_pressure
+from contactopt.readings.peaks import Peak, Reading, nodal_pressure
+from contactopt.readings.quantities import Quantity
 from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
@@ -51,7 +51,7 @@ class Locally:
         check_refinable(states[-1])
         made = [divisible(scene, not whole) for scene in states]
         self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
-        self.quantity, self.options, self.whole = quantity, options, whole
+        self.quantity, self.options, self.whole, self.watches = quantity, options, whole, not whole
         self.best = best_order(quantity.name, states[-1].degree)
         self.values: list[float] = []
         self.errors: ElementErrors | None = None
@@ -59,7 +59,6 @@ class Locally:
         self.splits = 0
 
     def solve(self) -> Solved:
-        """Solve the next mesh."""
         return self._solved([with_bent_edges(scene, self.shapes) for scene in self.states])
 
     def _solved(self, states: list[Scene]) -> Solved:
@@ -67,8 +66,7 @@ class Locally:
             return solve_states(states, None, self.options)
         return solve_scene(states[0], options=self.options, start=self.last)
 
-    def judge(self, solved: Solved, reading: Reading, levels: Sequence[Level]) -> Judged:
-        """What is known of the error of the value on the mesh that was solved last."""
+    def judge(self, solved: Solved, reading: Reading) -> Judged:
         self.last = solved
         self.values.append(reading.value)
         if self.whole:
@@ -84,35 +82,22 @@ class Locally:
         return Judged(size, -self.errors.total, energy=self.errors.energy)
 
     def vain(self) -> str:
-        """One sentence that says why further refinement would be in vain, or an empty text."""
-        if self.whole and stuck(self.values):
-            return (
-                f"the {self.quantity.name} does not converge: every refinement changes it by as"
-                " much as the one before"
-            )
-        return ""
+        return stuck(self.quantity.name, self.values) if self.whole else ""
 
     @property
     def ready(self) -> bool:
-        """Whether enough is known for the target to count as reached."""
         return len(self.values) > (2 if self.whole else 1)
 
     def facts(self, solved: Solved) -> dict[str, Any]:
-        """What a Level says of the mesh beside its size."""
-        return (
-            {"elements": self.states[-1].elements, "splits": len(self.values)} if self.whole else {}
-        )
+        if not self.whole:
+            return {}
+        return {"elements": self.states[-1].elements, "splits": len(self.values)}
 
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
     ) -> float:
-        """Divide elements; returns how many unknowns the next mesh has.
-
-        Parameters
-        ----------
-        judged, reading : Of the last mesh.
-        contacts : Numbers of contacts around which the mesh is too coarse to know.
-        rivals : Local maxima that may be the largest.
+        """Divide elements, around contacts where the mesh is too coarse to know and around local
+        maxima that may be the largest, too; returns how many unknowns the next mesh has.
         """
         marked = None
         if not self.whole:
@@ -139,13 +124,8 @@ class Locally:
         return float(unknowns(self.states[-1]))
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
-        """By how much the quantity changes in the other shape of guessed boundaries, and one
-        sentence on them.
-
-        Parameters
-        ----------
-        value : On the last mesh.
-        before : The states on that mesh.
+        """By how much the quantity, `value` on the last mesh with the states `before`, changes in
+        the other shape of guessed boundaries, and one sentence on them.
         """
         if not self.shapes.names:
             return 0.0, ""

@@ -15,9 +15,9 @@ from contactopt.accuracy.everywhere import Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.checks import check_number
-from contactopt.derivatives.outputs import Quantity, find_quantity
 from contactopt.errors import InputError
-from contactopt.readings.quantities import Peak, Reading
+from contactopt.readings.peaks import Peak, Reading
+from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.resolution import coarse
 from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
@@ -52,7 +52,7 @@ def refine(
     Parameters
     ----------
     states : The scene, or the states of its load path.
-    quantity : A name of contactopt.derivatives.outputs, such as 'pressure', 'pressure:block-floor'
+    quantity : A name of contactopt.readings.quantities, such as 'pressure', 'pressure:block-floor'
         or 'von_mises:block:fillet'.
     accuracy : Bound on the estimated relative error of the quantity, between 0 and 1.
     options : How each mesh is solved.
@@ -82,11 +82,11 @@ def refine(
             f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
         )
     options = options or Options()
-    search = (
-        Locally(tuple(states), asked, options, not adaptive)
-        if adaptive or scene.given
-        else Everywhere(tuple(states), quantity, options)
-    )
+    search: Everywhere | Locally
+    if adaptive or scene.given:
+        search = Locally(tuple(states), asked, options, not adaptive)
+    else:
+        search = Everywhere(tuple(states), quantity, options)
     return _Loop(asked, accuracy, options, limits or Limits(), search).run()
 
 
@@ -118,9 +118,7 @@ class _Loop:
         while not message:
             start = time.perf_counter()
             try:
-                message = self._next()
-                if not message:
-                    message = self._limit(self._advance(), time.perf_counter() - start)
+                message = self._next() or self._limit(time.perf_counter() - start)
             except InputError as error:
                 if not self.levels:
                     raise
@@ -132,10 +130,8 @@ class _Loop:
         states = list(self.search.states)
         solved = self.search.solve()
         if not solved.solution.solved:
-            sentence = (
-                f"the mesh of {solved.reduction.dofs} unknowns was not solved:"
-                f" {solved.solution.message}"
-            )
+            dofs, why = solved.reduction.dofs, solved.solution.message
+            sentence = f"the mesh of {dofs} unknowns was not solved: {why}"
             if not self.levels:
                 raise InputError(
                     f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
@@ -143,7 +139,7 @@ class _Loop:
             return sentence
         reading = self.quantity.read(solved.reduction, solved.solution)
         facts = self.search.facts(solved)
-        judged = self.search.judge(solved, reading, self.levels)
+        judged = self.search.judge(solved, reading)
         self.solved, self.reading, self.judged, self.states = solved, reading, judged, states
         self.peaks.append(reading.peaks)
         self.rivals, excess = self._rivals()
@@ -178,14 +174,9 @@ class _Loop:
             vain = self.reading.missing
         error = self.levels[-1].error
         self.vain = bool(vain)
-        self.reached = (
-            not vain
-            and not self.reading.missing
-            and self.search.ready
-            and not len(self.unresolved)
-            and error is not None
-            and error <= self.accuracy
-        )
+        known = not vain and not self.reading.missing and not len(self.unresolved)
+        enough = error is not None and error <= self.accuracy
+        self.reached = known and self.search.ready and enough
         if vain or self.reached:
             return vain or f"the estimated error of the {self.quantity.name} is below the target"
         if len(self.levels) >= MOST_LEVELS:
@@ -200,7 +191,7 @@ class _Loop:
         """
         last = self.peaks[-1]
         found, excess = [], 0.0
-        if isinstance(self.search, Locally) and not self.search.whole and last and last[0].size:
+        if self.search.watches and last and last[0].size:
             excess = self._change(last[0])
             found = [last[0]] if excess > self.judged.size / 2 else []
         for peak in last[1:]:
@@ -237,14 +228,11 @@ class _Loop:
         few = [own for _, own in coarse(reduction, solution)]
         return np.concatenate([overlooked(reduction, touching, apart), *few]).astype(int)
 
-    def _advance(self) -> float:
-        """Choose the next mesh; returns how many unknowns it has."""
-        if isinstance(self.search, Locally):
-            return self.search.advance(self.judged, self.reading, self.unresolved, self.rivals)
-        return self.search.advance(self.judged, self.reading, bool(len(self.unresolved)))
-
-    def _limit(self, unknowns: float, last: float) -> str:
-        """One sentence if the next mesh passes a limit."""
+    def _limit(self, last: float) -> str:
+        """Choose the next mesh; one sentence if it passes a limit. `last` is the time of this one
+        [s].
+        """
+        unknowns = self.search.advance(self.judged, self.reading, self.unresolved, self.rivals)
         growth = unknowns / self.levels[-1].unknowns
         held = (resident_memory() - self.before) * (1 + growth)
         spent = time.perf_counter() - self.began
@@ -254,7 +242,7 @@ class _Loop:
         """The error that the shape of guessed boundaries makes [unit of the quantity], and a
         sentence on it.
         """
-        if not isinstance(self.search, Locally) or self.vain or self.reading.missing:
+        if self.vain or self.reading.missing:
             return 0.0, ""
         try:
             return self.search.geometry(self.reading.value, self.states)
@@ -272,21 +260,16 @@ class _Loop:
         error = last.error + geometry / scale if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy
         if sentence:
-            start = (
-                message
-                if reached or not self.reached
-                else "the geometry keeps the target out of reach"
-            )
-            part = (
-                f"{geometry / scale:.1e} of the error is that of the geometry, since "
-                if geometry > 0
-                else ""
-            )
-            message = f"{start}; {part}{sentence}"
+            if self.reached and not reached:
+                message = "the geometry keeps the target out of reach"
+            if geometry > 0:
+                sentence = (
+                    f"{geometry / scale:.1e} of the error is that of the geometry, since {sentence}"
+                )
+            message = f"{message}; {sentence}"
         seconds = dict(self.solved.solution.seconds)
-        seconds["coarse"] = seconds.get("coarse", 0.0) + max(
-            last.seconds - sum(seconds.values()), 0.0
-        )
+        earlier = max(last.seconds - sum(seconds.values()), 0.0)
+        seconds["coarse"] = seconds.get("coarse", 0.0) + earlier
         solution = replace(self.solved.solution, seconds=seconds)
         signed = known and np.isfinite(judged.mesh)
         return replace(self.solved, solution=solution), Estimate(

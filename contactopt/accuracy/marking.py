@@ -17,9 +17,9 @@ from contactopt.meshes.cells import straight
 from contactopt.meshes.given_curves import Curve
 from contactopt.meshes.mesh_refinement import bent, divide, facets_of, split
 from contactopt.meshes.structured import simplices
-from contactopt.readings.quantities import Peak
+from contactopt.readings.peaks import Peak
 from contactopt.scenes.refined_scenes import part_curves
-from contactopt.scenes.scene import Part, Rigid, Scene
+from contactopt.scenes.scene import Part, Scene
 
 FIRST = 4  # elements across the contact half-width of a first mesh that the scene itself makes
 RATIO = 1.6  # by how much longer facets may be than those of the other body that face them
@@ -42,12 +42,8 @@ class Shapes:
     @property
     def names(self) -> str:
         """The guessed boundaries in words."""
-        found = [
-            f"'{name}' of body '{body}'"
-            for body, own in self.guessed.items()
-            for name in own
-            if name
-        ]
+        pairs = [(body, name) for body, own in self.guessed.items() for name in own if name]
+        found = [f"'{name}' of body '{body}'" for body, name in pairs]
         return ", ".join(found[:3]) + (" and more" if len(found) > 3 else "")
 
     @property
@@ -61,26 +57,19 @@ class Shapes:
 
 
 def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
-    """Put a scene on meshes of straight elements, and find the curves of their boundaries.
+    """Put a scene, whose mesh functions make coarse first meshes, on meshes of straight elements,
+    and find the curves of their boundaries; with `simplicial` quadrilaterals and hexahedra are cut
+    into triangles and tetrahedra.
 
     A boundary follows the `curve` of its part or the edges of second order of its file. Without
     them the curve is a guess, the smooth outline through the nodes of the first mesh
     (contactopt.meshes.curves).
-
-    Parameters
-    ----------
-    scene : The scene, whose mesh functions make coarse first meshes.
-    simplicial : Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
-
-    Returns
-    -------
-    The scene with its meshes, and their Shapes.
     """
     curves: dict[str, dict[str, Curve]] = {}
     guessed: dict[str, dict[str, Chords]] = {}
 
     def prepared(part: Any) -> Any:
-        if not isinstance(part, Part):
+        if not hasattr(part, "build_mesh"):
             return part
         given = part.build_mesh(FIRST, scene.zone)
         cut = simplices(given) if simplicial else straight(given)
@@ -148,7 +137,7 @@ def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Sc
 
     def divided(part: Any) -> Any:
         elements = next(numbers)
-        if not isinstance(part, Part) or not len(elements):
+        if not len(elements):
             return part
         return replace(part, mesh=divide(part.mesh, elements, shapes.of(part)))
 
@@ -157,7 +146,7 @@ def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Sc
 
 def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
     return scene.with_parts(
-        lambda part: replace(part, mesh=mesh(part)) if isinstance(part, Part) else part
+        lambda part: replace(part, mesh=mesh(part)) if hasattr(part, "mesh") else part
     )
 
 
@@ -166,39 +155,28 @@ def unknowns(scene: Scene) -> int:
     unknowns.
     """
     total = 0
-    for part in scene.parts:
-        if isinstance(part, Part):
-            mesh = part.mesh
-            inner = (mesh.nfacets if scene.dim == 2 else mesh.nedges) if scene.degree == 2 else 0
-            total += scene.dim * int(mesh.nvertices + inner)
+    for mesh in (part.mesh for part in scene.parts if hasattr(part, "mesh")):
+        inner = (mesh.nfacets if scene.dim == 2 else mesh.nedges) if scene.degree == 2 else 0
+        total += scene.dim * int(mesh.nvertices + inner)
     return total
 
 
 def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Mark more elements, so that surfaces that face each other stay about as fine as each other.
+    """Mark more elements of meshes of simplices, for each body beside those that are marked, so
+    that surfaces that face each other stay about as fine as each other.
 
     A surface that is much finer than the one that it touches sees the facets of the other one as a
     polygon, whose corners press with a pressure that grows with every refinement of the fine side.
-
-    Parameters
-    ----------
-    scene : The scene on meshes of simplices.
-    marked : For each body the elements that will be divided.
-
-    Returns
-    -------
-    For each body the elements, those of `marked` among them.
     """
     chosen = [set(elements.tolist()) for elements in marked]
     names = [part.name for part in scene.parts]
     for pair in scene.pairs:
         sides = [names.index(body) for body in pair.bodies]
-        parts = [part for part in (scene.parts[i] for i in sides) if isinstance(part, Part)]
-        if len(parts) < 2:
+        parts: list[Any] = [scene.parts[i] for i in sides]
+        if not all(hasattr(part, "mesh") for part in parts):
             continue
-        faces = [
-            _facets(part, surface or part.contact) for part, surface in zip(parts, pair.surfaces)
-        ]
+        sought = zip(parts, pair.surfaces)
+        faces = [_facets(part, surface or part.contact) for part, surface in sought]
         for one, other in ((0, 1), (1, 0)):
             middle, size, element = faces[one]
             facing, small, theirs = faces[other]
@@ -241,11 +219,8 @@ def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -
     """
     found = [np.empty(0, dtype=int)]
     for pair in reduction.problem.pairs:
-        own = [
-            one.value
-            for one in peaks
-            if len(one.contacts) and pair.start <= one.contacts[0] < pair.stop
-        ]
+        named = [one for one in peaks if len(one.contacts)]
+        own = [one.value for one in named if pair.start <= one.contacts[0] < pair.stop]
         if own:
             found.append(np.flatnonzero(pressure[pair.contacts] >= min(own)) + pair.start)
     return np.concatenate(found)
@@ -257,42 +232,30 @@ def joined(*marks: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
 
 
 def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Find the contacts between which the gap of a rigid body is smaller than at the contacts.
+    """Find the contacts between which the gap of a rigid body is smaller than at the contacts,
+    where `touching` (k,) touch and the surfaces are `apart` (k,) [length].
 
     Gap functions are sampled within every facet. Counted is where the sample undercuts what the
     facet has between its nodes by more than the surfaces are apart there and CLOSURE of the
-    closure.
-
-    Parameters
-    ----------
-    reduction : The reduced scene.
-    touching : (k,) mask of the contacts that touch.
-    apart : (k,) distance of the surfaces in the solution [length].
-
-    Returns
-    -------
-    Numbers of the contacts at the corners of such facets.
+    closure. Returned are the contacts at the corners of such facets.
     """
     scene, problem = reduction.scene, reduction.problem
     found = [np.empty(0, dtype=int)]
     parts = {part.name: part for part in scene.parts}
     for pair, made, coupling in zip(scene.pairs, problem.pairs, reduction.couplings):
-        rigid = [part for part in (parts[body] for body in pair.bodies) if isinstance(part, Rigid)]
-        cells = coupling.cells.T
-        gap = rigid[0].gap if rigid else None
-        if not callable(gap) or not np.size(cells):
+        gaps = [getattr(parts[body], "gap", None) for body in pair.bodies]
+        gap = next((own for own in gaps if callable(own)), None)
+        cells, touches = coupling.cells.T, touching[made.contacts]
+        if gap is None or not np.size(cells):
             continue
         corners = cells[:, : scene.dim]  # of a quadrilateral half
         shares = _lattice(scene.dim)
         own, clear = coupling.gap, np.maximum(apart[made.contacts], 0.0)
         points = np.einsum("sc,dvc->dvs", shares, problem.coordinates[:, made.contacts][:, corners])
-        sampled = np.asarray(gap(points.reshape(scene.dim, -1)), dtype=float).reshape(
-            points.shape[1:]
-        )
+        sampled = np.asarray(gap(points.reshape(scene.dim, -1)), dtype=float)
+        sampled = sampled.reshape(points.shape[1:])
         between = own[corners] @ shares.T
-        closure = (
-            float(np.ptp(own[touching[made.contacts]])) if touching[made.contacts].any() else 0.0
-        )
+        closure = float(np.ptp(own[touches])) if touches.any() else 0.0
         bound = clear[corners] @ shares.T + CLOSURE * closure
         rounding = 1e-9 * float(np.abs(problem.coordinates).max())
         hidden = np.any(between - sampled > bound + rounding, axis=1)
@@ -313,7 +276,7 @@ def _lattice(dim: int) -> np.ndarray:
 
 def check_refinable(scene: Scene) -> None:
     """InputError, before anything is solved, for a scene that has no mesh to refine."""
-    if not any(isinstance(part, Part) for part in scene.parts):
+    if not any(hasattr(part, "mesh") for part in scene.parts):
         raise InputError(
             f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a"
             " function (elements, zone) -> points."

@@ -26,17 +26,8 @@ NEAREST = 8  # edges among which that of a point is looked for
 
 
 def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
-    """The straight edges of a boundary of a plane mesh, and by how far the middle of each is in
-    doubt.
-
-    Parameters
-    ----------
-    mesh : A plane mesh of straight elements.
-    facets : Numbers of the facets of the boundary.
-
-    Returns
-    -------
-    Begin and end of every edge, and its doubtful sagitta [length].
+    """Begin and end of every straight edge of the facets of a boundary of a plane mesh, and by how
+    far the middle of each is in doubt.
     """
     edges, points = mesh.facets[:, facets], mesh.p
     count = points.shape[1]
@@ -45,11 +36,8 @@ def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
     nodes, first, each = np.unique(edges.ravel()[order], return_index=True, return_counts=True)
     other = np.roll(edges, 1, axis=0).ravel()[order]
     inner = each == 2
-    a, b, c = (
-        points[:, other[first[inner]]],
-        points[:, nodes[inner]],
-        points[:, other[first[inner] + 1]],
-    )
+    a, b = points[:, other[first[inner]]], points[:, nodes[inner]]
+    c = points[:, other[first[inner] + 1]]
     u, v = b - a, c - b
     area = u[0] * v[1] - u[1] * v[0]
     product = np.prod([np.linalg.norm(side, axis=0) for side in (u, v, c - a)], axis=0)
@@ -62,17 +50,8 @@ def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
 
 
 def flatter(points: np.ndarray, chords: Chords) -> np.ndarray:
-    """Move points on the smooth line to the other shape, towards the edges of the polygon by what
-    is in doubt.
-
-    Parameters
-    ----------
-    points : (2, m) on the line [length].
-    chords : Of the polygon.
-
-    Returns
-    -------
-    (2, m) points; no further than the polygon itself.
+    """Move points (2, m) on the smooth line to the other shape: towards the edges of the polygon by
+    what is in doubt, no further than the polygon itself.
     """
     begin, end, doubt = chords
     count = min(NEAREST, begin.shape[1])

@@ -17,7 +17,7 @@ from contactopt.methods import METHODS
 from contactopt.methods.backends import CONIC, QP
 from contactopt.methods.preconditioners import PRECONDITIONERS
 from contactopt.readings.places import PLACED
-from contactopt.readings.quantities import READINGS
+from contactopt.readings.quantities import ROWS
 from contactopt.scenes import SCENES
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
@@ -30,7 +30,7 @@ NAMES = {
     "Q": tuple(FORMS),
     "preconditioner": (*PRECONDITIONERS, "none"),
     "solver": ("auto", *SOLVERS),
-    "quantity": (*READINGS, *PLACED),
+    "quantity": (*ROWS, *PLACED),
     "figures": FORMATS,
 }
 

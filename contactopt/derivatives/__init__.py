@@ -32,16 +32,4 @@ in which P' is the directional derivative of P, a choice of pieces (contactopt.d
 Sources: Robinson (1980), Strongly regular generalized equations; Outrata, Kocvara, Zowe (1998),
 Nonsmooth approach to optimization problems with equilibrium constraints; Luo, Pang, Ralph (1996),
 Mathematical programs with equilibrium constraints.
-
-| module | what it does |
-|---|---|
-| `interface.py` | `sensitivity(problem, solution)`: forward and adjoint by q, mu, s, Q and V |
-| `linear.py` | M and M' are solved: by dense or sparse factors, by products with Q, or with the bodies at once |
-| `kinks.py` | Weakly active contacts are found, and one-sided derivatives are solved for |
-| `parameters.py` | Parameters of scenes have names: E, nu, forces, displacements, mu, the gap |
-| `outputs.py` | Quantities of solved scenes and their derivatives by forces, multipliers and displacements |
-| `states.py` | Derivatives go through the reduction and along load paths |
-| `gradient.py` | `gradient(result, quantity, parameters)` |
-| `fit.py` | `fit(scene, data, parameters)`: calibration by least squares |
-| `design.py` | `design(...)`: optimal profiles and loads by sequential convex programs |
 """

@@ -22,25 +22,24 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from contactopt.checks import check_number, real_array
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.derivatives.constants import FIRST_RADIUS, GOOD, GROW, SHRINK, TAKEN
-from contactopt.derivatives.parameters import Parameter, parameters, put_all
 from contactopt.derivatives.states import Step
 from contactopt.errors import InputError
 from contactopt.linear.operators import diagonal
 from contactopt.methods.driver import solve
 from contactopt.problem import Solution
+from contactopt.readings.peaks import nodal_pressure
+from contactopt.scenes.parameters import MATERIAL, Parameter, parameters, put_all
 from contactopt.scenes.scene import Scene
 
-if TYPE_CHECKING:
-    import cvxpy as cp
-
 logger = logging.getLogger(__name__)
+Rules = Callable[[Any], list[Any]]  # of the cvxpy variable of all unknowns
 
 IDLE = 1e-10  # change of the forces, over what is usual, that is rounding
 # promised relative gain, and relative size of a trust region, at which the design ends
@@ -58,6 +57,12 @@ class Visit:
     radius: float
     taken: bool
     weak: int
+
+    @classmethod
+    def of(cls, step: Step, radius: float, taken: bool) -> Visit:
+        """The visit of a solved state."""
+        certificate, weak = step.solution.residual, step.sensitivity.weak
+        return cls(_peak(step), certificate, radius, taken, len(weak))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +104,8 @@ class _States:
         self.scene, self.which, self.tol, self.Q = scene, which, tol, Q
         self.base = reduce_bodies(scene, Q=Q)
         k = self.base.problem.contacts
-        made = (
-            np.zeros((k, 0))
-            if shapes is None
-            else shapes(self.base.problem.chart.places)
-            if callable(shapes)
-            else shapes
-        )
-        self.shapes = real_array("shapes", made)
+        made = shapes(self.base.problem.chart.places) if callable(shapes) else shapes
+        self.shapes = real_array("shapes", np.zeros((k, 0)) if made is None else made)
         if self.shapes.ndim != 2 or len(self.shapes) != k:
             raise InputError(
                 f"shapes must have one row per contact, ({k}, m); got {self.shapes.shape}."
@@ -118,7 +117,7 @@ class _States:
         reduction = self.base
         if self.which:
             scene = put_all(self.scene, dict(zip(self.which, x[m:])))
-            moving = any(one.kind in ("E", "nu") for one in self.which)
+            moving = any(one.kind in MATERIAL for one in self.which)
             reduction = reduce_bodies(scene, Q=self.Q) if moving else self.base.loaded(scene)
         q = reduction.problem.q.copy()
         q[:, 0] += self.shapes @ x[:m]
@@ -126,7 +125,7 @@ class _States:
         solution = solve(problem, tol=self.tol, start=start)
         if not solution.solved:
             raise InputError(f"a state of the design was not solved: {solution.message}.")
-        return Step(replace(reduction, problem=problem), problem, solution)
+        return Step(replace(reduction, problem=problem), solution)
 
     def slopes(self, step: Step) -> np.ndarray:
         """Derivatives (k, variables) of the normal forces."""
@@ -136,9 +135,8 @@ class _States:
             columns.append(step.sensitivity.forward(q=q).reactions[:, 0])
         for one in self.which:
             explicit = step.explicit({one: 1.0}, step.reduction)
-            columns.append(
-                step.sensitivity.forward(q=explicit.u, mu=explicit.mu, s=explicit.s).reactions[:, 0]
-            )
+            moved = step.sensitivity.forward(q=explicit.u, mu=explicit.mu, s=explicit.s)
+            columns.append(moved.reactions[:, 0])
         return np.stack(columns, axis=1)
 
 
@@ -148,7 +146,7 @@ def design(
     free: str | Sequence[str] = (),
     *,
     bounds: Mapping[str, tuple[float, float]] | tuple[float, float] | None = None,
-    constraints: Callable[[cp.Variable], list[Any]] | None = None,
+    constraints: Rules | None = None,
     Q: str = "explicit",
     tol: float = 1e-9,
     steps: int = 60,
@@ -161,7 +159,7 @@ def design(
     shapes : (k, m) functions that may be added to the initial gap at the contacts, or a function
         that makes them from the places (dim - 1, k) on the contact surface; None: the profile stays
     free : names of scalar parameters that are free as well, such as loads
-        (contactopt.derivatives.parameters)
+        (contactopt.scenes.parameters)
     bounds : name -> (lowest, highest) value of a free parameter, and 'profile' -> bounds of all
         coefficients; a pair alone is that of the profile. Free parameters need bounds
     constraints : function of the cvxpy variable of all unknowns, coefficients first, that gives a
@@ -192,18 +190,27 @@ def design(
         raise InputError(
             "nothing is free; give shapes of the profile, or names of free parameters."
         )
-    low, high = _bounds(bounds, which, m)
+    return _improved(states, x, _bounds(bounds, which, m), constraints, steps)
+
+
+def _improved(
+    states: _States,
+    x: np.ndarray,
+    limits: tuple[np.ndarray, np.ndarray],
+    constraints: Rules | None,
+    steps: int,
+) -> Design:
+    """Steps of convex programs from x until none is promised."""
     now, radius, visits, message = states.step(x, None), FIRST_RADIUS, [], "the steps ran out"
-    visits.append(Visit(_peak(now), now.solution.residual, radius, True, len(now.sensitivity.weak)))
+    visits.append(Visit.of(now, radius, True))
     slopes = states.slopes(now)
-    steepest = np.abs(slopes / np.maximum(now.problem.areas, 1e-300)[:, None]).max(
-        axis=0, initial=0.0
-    )
+    areas = np.maximum(now.problem.areas, 1e-300)[:, None]
+    steepest = np.abs(slopes / areas).max(axis=0, initial=0.0)
     if not np.all(np.abs(slopes).max(axis=0) > IDLE * _usual(states, now, x)):
         raise InputError("a shape or a free parameter does not change the pressure; leave it out.")
     sizes = _peak(now) / steepest  # each changes the pressure somewhere by as much as the largest
     while len(visits) < steps:
-        d, promised = _program(now, slopes, x, radius * sizes, low, high, constraints)
+        d, promised = _program(now, slopes, x, radius * sizes, limits, constraints)
         if promised <= SETTLED * _peak(now) or radius < SETTLED:
             message = "no better state is near"
             break
@@ -215,9 +222,7 @@ def design(
             continue
         gain = (_peak(now) - _peak(trial)) / promised
         taken = gain >= TAKEN
-        visits.append(
-            Visit(_peak(trial), trial.solution.residual, radius, taken, len(trial.sensitivity.weak))
-        )
+        visits.append(Visit.of(trial, radius, taken))
         radius *= SHRINK if not taken else GROW if gain >= GOOD else 1.0
         if taken:
             now, x = trial, x + d
@@ -234,19 +239,8 @@ def _designed(
     gap = now.reduction.gap + states.shapes @ x[:m]
     values = {one.name: float(value) for one, value in zip(states.which, x[m:])}
     peak, converged = _peak(now), message != "the steps ran out"
-    return Design(
-        x[:m],
-        values,
-        gap,
-        pressure,
-        peak,
-        peak / mean,
-        visits,
-        converged,
-        message,
-        now.reduction,
-        now.solution,
-    )
+    found = x[:m], values, gap, pressure, peak, peak / mean, visits, converged, message
+    return Design(*found, now.reduction, now.solution)
 
 
 def _program(
@@ -254,9 +248,8 @@ def _program(
     slopes: np.ndarray,
     x: np.ndarray,
     reach: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    constraints: Callable[[cp.Variable], list[Any]] | None,
+    limits: tuple[np.ndarray, np.ndarray],
+    constraints: Rules | None,
 ) -> tuple[np.ndarray, float]:
     """The step (variables,) of the convex program, and the gain that it promises [stress].
 
@@ -270,7 +263,7 @@ def _program(
     J = slopes[loaded] / now.problem.areas[loaded, None] / peak * reach
     d, t = cp.Variable(len(x)), cp.Variable()
     rules = [p + J @ d <= t, cp.abs(d) <= 1.0]
-    for bound, sign in ((low, -1.0), (high, 1.0)):
+    for bound, sign in zip(limits, (-1.0, 1.0)):
         kept = np.flatnonzero(np.isfinite(bound))
         if len(kept):
             rules.append(sign * cp.multiply(reach[kept], d[kept]) <= sign * (bound - x)[kept])
@@ -291,11 +284,7 @@ def _program(
 
 
 def _pressure(step: Step) -> np.ndarray:
-    """(k,) [stress]; zero at a contact without an area."""
-    areas = step.problem.areas
-    return np.divide(
-        step.solution.reactions[:, 0], areas, out=np.zeros(len(areas)), where=areas > 0
-    )
+    return nodal_pressure(step.problem, step.solution)
 
 
 def _peak(step: Step) -> float:
@@ -306,12 +295,10 @@ def _usual(states: _States, now: Step, x: np.ndarray) -> np.ndarray:
     """What each variable would change the forces by if every contact were on its own, for
     parameters in units of their own.
     """
-    compliance = float(np.mean(diagonal(now.problem.Q)))
-    rest = np.where(x[states.shapes.shape[1] :] != 0, np.abs(x[states.shapes.shape[1] :]), 1.0)
+    compliance, rest = float(np.mean(diagonal(now.problem.Q))), x[states.shapes.shape[1] :]
     largest = float(np.abs(now.solution.reactions).max())
-    return np.concatenate(
-        [np.abs(states.shapes).max(axis=0, initial=0.0) / compliance, largest / rest]
-    )
+    shapes = np.abs(states.shapes).max(axis=0, initial=0.0) / compliance
+    return np.concatenate([shapes, largest / np.where(rest != 0, np.abs(rest), 1.0)])
 
 
 def _bounds(
@@ -319,13 +306,9 @@ def _bounds(
     which: tuple[Parameter, ...],
     m: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    given = (
-        dict(bounds)
-        if isinstance(bounds, Mapping)
-        else {}
-        if bounds is None
-        else {"profile": bounds}
-    )
+    given = dict(bounds) if isinstance(bounds, Mapping) else {"profile": bounds}
+    if bounds is None:
+        given = {}
     pairs = [given.get("profile", (-np.inf, np.inf))] * m
     for one in which:
         if one.name not in given:

@@ -27,17 +27,18 @@ from scipy.stats import norm, t
 
 from contactopt.checks import check_number
 from contactopt.derivatives.kinks import Weak
-from contactopt.derivatives.outputs import seeds_of
-from contactopt.derivatives.parameters import Parameter, put_all
-from contactopt.derivatives.parameters import parameters as parameters_of
 from contactopt.derivatives.states import Chain, along, solved_chain
 from contactopt.errors import InputError
+from contactopt.readings.quantities import seeds_of
+from contactopt.scenes.parameters import MATERIAL, Parameter, put_all
+from contactopt.scenes.parameters import parameters as parameters_of
 from contactopt.scenes.scene import Scene
 
 logger = logging.getLogger(__name__)
 
 CONFIDENCE = 0.95
 BLIND = 1e-8  # singular values below this fraction of the largest tell nothing
+EVALUATIONS = 60  # of the model, at most
 SHARE = 1e-3  # of such a direction, from which on a parameter is not identifiable
 HALVINGS = 10  # of the friction coefficients that are tried where contacts stick
 # E over its first value
@@ -84,23 +85,24 @@ class Fit:
     @property
     def sentence(self) -> str:
         """What was found, for people."""
-        parts = [
-            f"{name} = {self.values[name]:.6g} in [{low:.6g}, {high:.6g}]" if self.identifiable[name]
-            else f"{name} cannot be identified from these data"
-            for name, (low, high) in self.intervals.items()
-        ]  # fmt: skip
-        kinks = (
-            f"; {len(self.weak)} contacts are weakly active there, so the intervals hold on one"
-            " side"
-            if self.weak
-            else ""
-        )
-        return "; ".join(parts) + kinks
+        parts = []
+        for name, (low, high) in self.intervals.items():
+            value = f"{name} = {self.values[name]:.6g} in [{low:.6g}, {high:.6g}]"
+            blind = f"{name} cannot be identified from these data"
+            parts.append(value if self.identifiable[name] else blind)
+        if self.weak:
+            parts.append(
+                f"{len(self.weak)} contacts are weakly active there, so the intervals hold on one"
+                " side"
+            )
+        return "; ".join(parts)
 
 
 class _Model:
     """The quantities of a path as functions of the parameters, with warm starts and the
     certificates of all states visited.
+
+    Residuals and Jacobian have one row for each datum that was measured, in units of its noise.
     """
 
     def __init__(
@@ -108,53 +110,58 @@ class _Model:
         scenes: tuple[Scene, ...],
         which: tuple[Parameter, ...],
         data: dict[str, np.ndarray],
-        Q: str,
-        tol: float,
+        sigma: dict[str, float],
+        solving: tuple[str, float],
     ):
-        self.scenes, self.which, self.data, self.Q, self.tol = scenes, which, data, Q, tol
-        self.measured = {
-            name: np.flatnonzero(np.isfinite(values)).tolist() for name, values in data.items()
-        }
+        self.scenes, self.which, self.data, self.sigma = scenes, which, data, sigma
+        self.Q, self.tol = solving
+        finite = {name: np.flatnonzero(np.isfinite(own)).tolist() for name, own in data.items()}
+        self.measured = [(name, n) for name, own in finite.items() for n in own]
+        self.noise = np.array([sigma[name] for name, _ in self.measured])
+        self.wanted = np.array([data[name][n] for name, n in self.measured])
         self.last: tuple[np.ndarray, Chain] | None = None
         self.certificates: list[float] = []
 
     def chain(self, values: np.ndarray) -> Chain:
-        if self.last is not None and np.array_equal(self.last[0], values):
-            return self.last[1]
+        """The solved states for values (p,) of the parameters."""
+        starts = base = None
+        if self.last is not None:
+            before, known = self.last
+            if np.array_equal(before, values):
+                return known
+            starts = [step.solution for step in known.steps]
+            if not any(one.kind in MATERIAL for one in self.which):
+                base = known.steps[0].reduction
         chosen = dict(zip(self.which, values))
         scenes = [put_all(scene, chosen) for scene in self.scenes]
-        starts = None if self.last is None else [step.solution for step in self.last[1].steps]
-        base = None
-        if self.last is not None and not any(one.kind in ("E", "nu") for one in self.which):
-            base = self.last[1].steps[0].reduction
         made = solved_chain(scenes, self.tol, base, starts, self.Q)
         self.last = values.copy(), made
         self.certificates.append(max(step.solution.residual for step in made.steps))
         return made
 
-    def quantities(self, values: np.ndarray) -> dict[str, np.ndarray]:
+    def computed(self, values: np.ndarray) -> np.ndarray:
+        """(data,) what was measured, as the model has it."""
         steps = self.chain(values).steps
-        out = {name: np.full(len(steps), np.nan) for name in self.data}
-        for name, numbers in self.measured.items():
-            for n in numbers:
-                out[name][n] = seeds_of(name, steps[n]).value
-        return out
+        return np.array([seeds_of(name, steps[n]).value for name, n in self.measured])
 
-    def slopes(self, values: np.ndarray) -> dict[str, np.ndarray]:
-        """Derivatives (states, p) of every quantity."""
+    def misfit(self, values: np.ndarray) -> np.ndarray:
+        """(data,) residuals, infinite where a state has no solution."""
+        try:
+            return (self.computed(values) - self.wanted) / self.noise
+        except InputError as error:  # bodies that slide off: the trust region shrinks
+            logger.info("a trial of fit has no solution: %s", error)
+            return np.full(len(self.measured), np.inf)
+
+    def jacobian(self, values: np.ndarray) -> np.ndarray:
+        """(data, p) slopes."""
         chain = self.chain(values)
-        seeds = {
-            (name, n): seeds_of(name, chain.steps[n])
-            for name, numbers in self.measured.items()
-            for n in numbers
-        }
-        out = {name: np.full((len(chain.steps), len(self.which)), np.nan) for name in self.data}
-        for j, one in enumerate(self.which):
-            for n, moved in enumerate(chain.forward({one: 1.0})):
-                for name in self.data:
-                    if (name, n) in seeds:
-                        out[name][n, j] = along(seeds[name, n], moved, {one: 1.0})
-        return out
+        seeds = [seeds_of(name, chain.steps[n]) for name, n in self.measured]
+        columns = []
+        for one in self.which:
+            moved = list(chain.forward({one: 1.0}))
+            pairs = zip(seeds, self.measured)
+            columns.append([along(own, moved[n], {one: 1.0}) for own, (_, n) in pairs])
+        return np.array(columns).T / self.noise[:, None]
 
 
 def fit(
@@ -167,16 +174,15 @@ def fit(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     Q: str = "auto",
     tol: float = 1e-10,
-    evaluations: int = 60,
 ) -> Fit:
     """Fit parameters of a scene, or of a load path, to measured quantities by least squares.
 
     Parameters
     ----------
     scene : a Scene, or the states of a load path in their order
-    data : name of a quantity (contactopt.derivatives.outputs) -> its measured value, on a path one
+    data : name of a quantity (contactopt.readings.quantities) -> its measured value, on a path one
         per state; nan where it was not measured
-    parameters : names of scalar parameters (contactopt.derivatives.parameters)
+    parameters : names of scalar parameters (contactopt.scenes.parameters)
     noise : standard deviation of the data, one number or one for each quantity, in their units;
         None: estimated from what the model leaves, for all quantities relative to the size of their
         data
@@ -184,7 +190,6 @@ def fit(
     bounds : name -> (lowest, highest) value; by default what makes sense for E, nu and mu
     Q : form of Q, as for contactopt.reduce
     tol : bound on the certificate of every state
-    evaluations : of the model, at most
 
     Returns
     -------
@@ -208,112 +213,91 @@ def fit(
             f"'{fields[0]}' has one number per contact; fit takes parameters that are single"
             " numbers."
         )
-    known = _data(data, len(scenes))
-    first = _first(which, scenes, start or {})
-    sigma = _noise(noise, known)
-    model = _Model(scenes, which, known, Q, tol)
-    count = sum(len(numbers) for numbers in model.measured.values())
+    known, first = _data(data, len(scenes)), _first(which, scenes, start or {})
+    model = _Model(scenes, which, known, _noise(noise, known), (Q, tol))
+    count = len(model.measured)
     if count < len(which) + (noise is None):
         raise InputError(
             f"{count} data cannot determine {len(which)} parameters and their accuracy; measure"
             " more states."
         )
-    size = np.where(first != 0, np.abs(first), 1.0)
-    low, high = _bounds(which, bounds or {}, first)
+    limits = _bounds(which, bounds or {}, first)
     model.chain(first)  # an error in the first state is the user's to see
+    return _result(model, *_minimised(model, first, limits, noise is None), noise is None)
 
-    def stacked(values: Mapping[str, np.ndarray], scaled: bool) -> np.ndarray:
-        parts = []
-        for name, numbers in model.measured.items():
-            own = values[name][numbers] - (known[name][numbers] if scaled else 0.0)
-            parts.append(own / sigma[name])
-        return np.concatenate(parts)
+
+def _minimised(
+    model: _Model, first: np.ndarray, limits: tuple[np.ndarray, np.ndarray], estimated: bool
+) -> tuple[np.ndarray, Any]:
+    """The values (p,) of the smallest misfit, and what the optimiser says, which works in units of
+    the first values.
+
+    Where the data hardly know friction because contacts stick, it goes on from less friction.
+    """
+    size = np.where(first != 0, np.abs(first), 1.0)
+    low, high = limits[0] / size, limits[1] / size
 
     def misfit(x: np.ndarray) -> np.ndarray:
-        try:
-            return stacked(model.quantities(size * x), True)
-        except InputError as error:  # bodies that slide off: the trust region shrinks
-            logger.info("a trial of fit has no solution: %s", error)
-            return np.full(count, np.inf)
+        return model.misfit(size * x)
 
     def jacobian(x: np.ndarray) -> np.ndarray:
-        return stacked(model.slopes(size * x), False) * size
+        return model.jacobian(size * x) * size
 
-    def minimised(x: np.ndarray) -> Any:
-        limits = low / size, high / size
+    def search(x: np.ndarray) -> Any:
         return least_squares(
-            misfit, x, jacobian, limits, "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations
+            misfit, x, jacobian, (low, high), "trf", 1e-10, 1e-9, 1e-10, max_nfev=EVALUATIONS
         )
 
-    found = minimised(first / size)
-    spread = np.sqrt(2 * found.cost / max(count - len(which), 1)) if noise is None else 1.0
+    found = search(first / size)
+    freedom = max(len(model.measured) - len(first), 1)
+    spread = np.sqrt(2 * found.cost / freedom) if estimated else 1.0
     told = np.linalg.norm(jacobian(found.x), axis=0) * np.abs(found.x) > spread
-    sticks = np.array([one.kind == "mu" for one in which]) & ~told
-    if sticks.any():
-        slipping = _slipping(misfit, found.x, sticks, low / size)
-        if slipping is not None:
-            found = _better(found, minimised(slipping))
-    values = size * found.x
-    J = stacked(model.slopes(values), False)
-    return _result(model, which, values, J, found, sigma, noise is None)
+    sticks = np.array([one.kind == "mu" for one in model.which]) & ~told
+    slipping = _slipping(misfit, found.x, sticks, low) if sticks.any() else None
+    if slipping is not None:
+        other = search(slipping)
+        if other.cost < found.cost:
+            told = (
+                "contacts stick at the first values, where the data hardly know friction; the fit"
+                " went on from less of it"
+            )
+            logger.info(told)
+            found, found.message = other, f"{other.message} ({told})"
+    return size * found.x, found
 
 
 def _slipping(
     misfit: Callable[[np.ndarray], np.ndarray], x: np.ndarray, sticks: np.ndarray, low: np.ndarray
 ) -> np.ndarray | None:
-    """The best point with less friction, where the data hardly know friction because contacts
-    stick; None if there is none.
-
-    sticks  (p,) mask of the friction coefficients that do not matter at x
+    """The best point with less of the friction coefficients that do not matter at x, a mask (p,);
+    None if there is none.
     """
-    points = [
-        np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x)
-        for i in range(1, HALVINGS + 1)
-    ]
-    here = misfit(x)
-    costs = [float(np.sum(residuals**2)) for residuals in map(misfit, points)]
-    told = [
-        (cost, i) for i, cost in enumerate(costs) if np.isfinite(cost) and cost != np.sum(here**2)
-    ]
-    return points[min(told)[1]] if told else None
+    here, best, least = float(np.sum(misfit(x) ** 2)), None, np.inf
+    for i in range(1, HALVINGS + 1):
+        point = np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x)
+        cost = float(np.sum(misfit(point) ** 2))
+        if cost < least and cost != here:
+            best, least = point, cost
+    return best
 
 
-def _better(found: Any, other: Any) -> Any:
-    """The optimum of the smaller cost; the second one says how it was found."""
-    if not other.cost < found.cost:
-        return found
-    told = (
-        "contacts stick at the first values, where the data hardly know friction; the fit went on"
-        " from less of it"
-    )
-    logger.info(told)
-    other.message = f"{other.message} ({told})"
-    return other
-
-
-def _result(
-    model: _Model,
-    which: tuple[Parameter, ...],
-    values: np.ndarray,
-    J: np.ndarray,
-    found: Any,
-    sigma: dict[str, float],
-    estimated: bool,
-) -> Fit:
-    """Intervals and identifiability from the Jacobian (data, p) at the solution."""
-    names, freedom = tuple(one.name for one in which), len(J) - len(which)
+def _result(model: _Model, values: np.ndarray, found: Any, estimated: bool) -> Fit:
+    """Intervals and identifiability from the Jacobian at the solution."""
+    J = model.jacobian(values)
+    names, freedom = tuple(one.name for one in model.which), len(J) - len(values)
     variance = 2 * found.cost / freedom if estimated else 1.0
     unit = np.where(values != 0, np.abs(values), 1.0)
     _, singular, directions = np.linalg.svd(J * unit, full_matrices=False)
     seen = singular > BLIND * singular.max(initial=0.0)
-    if not singular.max(initial=0.0) > 0:
-        seen = np.zeros(len(singular), dtype=bool)
     inverse = directions[seen].T @ np.diag(1 / singular[seen] ** 2) @ directions[seen]
     covariance = variance * unit[:, None] * inverse * unit
     blind = np.sqrt(np.sum(directions[~seen] ** 2, axis=0)) > SHARE
     quantile = t.ppf(0.5 + CONFIDENCE / 2, freedom) if estimated else norm.ppf(0.5 + CONFIDENCE / 2)
     half = np.where(blind, np.inf, quantile * np.sqrt(np.diag(covariance)))
     chain, root = model.chain(values), float(np.sqrt(variance))
+    computed = {name: np.full(len(chain.steps), np.nan) for name in model.data}
+    for (name, n), value in zip(model.measured, model.computed(values)):
+        computed[name][n] = value
     return Fit(
         names,
         dict(zip(names, values.tolist())),
@@ -323,8 +307,8 @@ def _result(
         directions,
         dict(zip(names, (~blind).tolist())),
         model.data,
-        model.quantities(values),
-        {name: root * one for name, one in sigma.items()},
+        computed,
+        {name: root * one for name, one in model.sigma.items()},
         len(model.certificates),
         tuple(model.certificates),
         chain.weak,

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from contactopt.derivatives.kinks import Weak
-from contactopt.derivatives.outputs import seeds_of
-from contactopt.derivatives.parameters import parameters as parameters_of
-from contactopt.derivatives.states import Chain, Seeds, along, chain_of
+from contactopt.derivatives.kinks import Weak, named
+from contactopt.derivatives.states import Chain, along, chain_of
 from contactopt.errors import InputError
+from contactopt.readings.quantities import seeds_of
+from contactopt.readings.state import Seeds
+from contactopt.scenes.parameters import parameters as parameters_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,6 @@ class Gradient:
     weak: tuple[tuple[int, Weak], ...]
     chain: Chain
     quantity: Any
-    state: int
 
     @property
     def differentiable(self) -> bool:
@@ -39,12 +39,10 @@ class Gradient:
         """What the derivatives are, for people."""
         if self.differentiable:
             return "the quantity has a gradient here: no contact is weakly active"
-        named = ", ".join(
-            f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak[:5]
-        )
+        names = [f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak]
         return (
-            f"the quantity has no gradient here, only one-sided derivatives: {len(self.weak)}"
-            f" weakly active contacts, {named}{' and more' if len(self.weak) > 5 else ''}"
+            f"the quantity has no gradient here, only one-sided derivatives: {len(names)} weakly"
+            f" active contacts, {named(names)}"
         )
 
     def onesided(self, direction: dict[str, Any]) -> float:
@@ -53,10 +51,8 @@ class Gradient:
         """
         scene = self.chain.steps[0].reduction.scene
         chosen = {which: direction[which.name] for which in parameters_of(tuple(direction), scene)}
-        for number, moved in enumerate(self.chain.forward(chosen)):
-            if number == self.state:
-                return along(seeds_of(self.quantity, self.chain.steps[number]), moved, chosen)
-        raise InputError(f"the path has no state {self.state}.")
+        *_, moved = self.chain.forward(chosen)  # of the last state, at which the quantity is read
+        return along(seeds_of(self.quantity, self.chain.steps[-1]), moved, chosen)
 
 
 def gradient(
@@ -75,9 +71,9 @@ def gradient(
     Parameters
     ----------
     result : what contactopt.run or contactopt.follow returned
-    quantity : a name of contactopt.derivatives.outputs, such as 'approach', 'energy', 'pressure:12'
+    quantity : a name of contactopt.readings.quantities, such as 'approach', 'energy', 'pressure:12'
         or 'shear_force', or a Functional
-    parameters : names of contactopt.derivatives.parameters, such as 'mu', 'E:upper',
+    parameters : names of contactopt.scenes.parameters, such as 'mu', 'E:upper',
         'force:upper:y' or 'gap'. A load of a path is changed by the same amount in all states
     state : of a load path, the number of the state at which the quantity is read; by default the
         last
@@ -101,5 +97,5 @@ def gradient(
     chain = Chain(chain.steps[: state + 1])
     which = parameters_of(parameters, chain.steps[0].reduction.scene)
     seeds: list[Seeds | None] = [None] * len(chain.steps)
-    own = seeds[state] = seeds_of(quantity, chain.steps[state])
-    return Gradient(own.value, chain.adjoint(seeds, which), chain.weak, chain, quantity, state)
+    own = seeds[-1] = seeds_of(quantity, chain.steps[-1])
+    return Gradient(own.value, chain.adjoint(seeds, which), chain.weak, chain, quantity)

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from contactopt.checks import check_number, real_array
-from contactopt.derivatives.kinks import Onesided, Weak, weak_contacts
-from contactopt.derivatives.linear import Tangent
+from contactopt.derivatives.kinks import Onesided, Weak, named, weak_contacts
+from contactopt.derivatives.linear import Tangent, transposed_product
 from contactopt.errors import InputError
-from contactopt.linear.operators import Interface, InterfaceOperator
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.problem import (
     InterfaceProblem,
@@ -110,8 +109,10 @@ class Sensitivity:
     def tangent(self) -> Tangent:
         """The matrix M, dimensionless."""
         scaled, scales = self._scaled
+        D = self.problem.law.project(self._point)[1].copy()
+        D[~self.problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
-        D = self._moves[:, :, None] * _slopes(self.problem, self._point)
+        D = self._moves[:, :, None] * D
         return Tangent(scaled, self._rho * scales.length / scales.force, D)
 
     @cached_property
@@ -121,28 +122,25 @@ class Sensitivity:
 
     @property
     def differentiable(self) -> bool:
-        """Whether no contact is weakly active, so that the solution has a gradient."""
+        """Whether the solution has a gradient."""
         return not self.weak
 
     @property
     def force(self) -> float:
         """The largest force, with which distances to kinks are compared."""
-        return (
-            float(np.linalg.norm(self.solution.reactions, axis=1).max(initial=0.0))
-            or self._scaled[1].force
-        )
+        sizes = np.linalg.norm(self.solution.reactions, axis=1)
+        return float(sizes.max(initial=0.0)) or self._scaled[1].force
 
     @property
     def sentence(self) -> str:
         """What is known of the derivative, for people."""
         if self.differentiable:
             return "the solution has a gradient here: no contact is weakly active"
-        named = ", ".join(f"{weak.contact} ({weak.edge})" for weak in self.weak[:5])
-        more = f" and {len(self.weak) - 5} more" if len(self.weak) > 5 else ""
+        names = named([f"{weak.contact} ({weak.edge})" for weak in self.weak])
         return (
             f"the solution has no gradient here, only one-sided derivatives: {len(self.weak)} of"
             f" {self.problem.contacts} contacts are weakly active, within {self.distance:g} of the"
-            f" largest force of a kink: {named}{more}"
+            f" largest force of a kink: {names}"
         )
 
     @cached_property
@@ -208,16 +206,8 @@ class Sensitivity:
             return dr, dlam, self._moved(dr, dlam, 0 * dr)
 
         by_parameter = self._by_parameter if np.any(self.problem.law.rough) else 0 * self._point
-        return Onesided.of(
-            self.problem.law,
-            self._point,
-            contacts,
-            self.tangent.D,
-            by_parameter,
-            self.distance * self.force,
-            self.force,
-            response,
-        )
+        place = self.problem.law, self._point, contacts, self.tangent.D, by_parameter
+        return Onesided(*place, self.distance * self.force, self.force, response)
 
     def adjoint(
         self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None
@@ -243,7 +233,7 @@ class Sensitivity:
         by_lam = _given("multipliers", multipliers, problem.s.shape)
         by_u = _given("displacements", displacements, problem.q.shape)
         if np.any(by_u):
-            by_r = by_r + _transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
+            by_r = by_r + transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
         z, a, b = self.tangent.solve_transposed(
             (scales.force * by_r).ravel(), scales.multipliers * by_lam
@@ -321,30 +311,6 @@ def sensitivity(
         distance = max(NEAR, ROUNDING * residual)
     check_number("distance", distance, low=0.0)
     return Sensitivity(problem, solution, distance)
-
-
-def _slopes(problem: InterfaceProblem, y: np.ndarray) -> np.ndarray:
-    """Compute the derivative of the law's map at the points of the contacts.
-
-    A contact without friction has no tangential force, even at rest.
-
-    Parameters
-    ----------
-    problem : The interface problem, with k contacts in dim dimensions.
-    y : (k, dim) points r - rho u, normal first [force].
-
-    Returns
-    -------
-    (k, dim, dim) derivatives D [-].
-    """
-    D = problem.law.project(y)[1].copy()
-    D[~problem.law.rough, 1:, :] = 0.0
-    return D
-
-
-def _transposed_product(Q: Interface, x: np.ndarray) -> np.ndarray:
-    """Q' x; an operator is symmetric."""
-    return np.asarray(Q @ x if isinstance(Q, InterfaceOperator) else Q.T @ x)
 
 
 def _given(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:

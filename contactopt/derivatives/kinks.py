@@ -23,6 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from contactopt.errors import InputError
 from contactopt.problem.laws.law import Kinks, Law
@@ -45,17 +46,8 @@ class Weak:
 
 
 def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
-    """Find the contacts whose point lies near a kink of the law's map.
-
-    Parameters
-    ----------
-    law : The law of the contacts.
-    y : (k, dim) points r - rho u, normal first [force].
-    distance : How near counts [force].
-
-    Returns
-    -------
-    The contacts with the names of the kinks at which they are.
+    """The contacts whose points r - rho u (k, dim), normal first [force], lie within a distance
+    [force] of a kink of the law's map, with the names of the kinks.
     """
     kinks = law.kinks(y, distance)
     names = {
@@ -67,7 +59,11 @@ def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
     return tuple(Weak(i, names[which]) for i, which in enumerate(both) if any(which))
 
 
-@dataclass(frozen=True, eq=False)
+def named(names: list[str]) -> str:
+    """The first five of several, in words."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
 class Onesided:
     """The complementarity problem of m weakly active contacts.
 
@@ -76,21 +72,13 @@ class Onesided:
     D, P_mu     (m, d, d) and (m, d) of the piece that M has
     dr, dlam    (m d, k, d) and (m d, p) responses to a unit of z
     S           (m d, m d) and the dy at these contacts that goes with it
+
+    It is made from the map at all k contacts, and from the response (dr, dlambda, dy) of the linear
+    system to an error (k, d).
     """
 
-    law: Law
-    y: np.ndarray
-    contacts: np.ndarray
-    force: float
-    D: np.ndarray
-    P_mu: np.ndarray
-    dr: np.ndarray
-    dlam: np.ndarray
-    S: np.ndarray
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         law: Law,
         y: np.ndarray,
         contacts: np.ndarray,
@@ -99,28 +87,25 @@ class Onesided:
         distance: float,
         force: float,
         response: Response,
-    ) -> Onesided:
-        """From the map at all contacts, a scale of the forces, and the response (dr, dlambda, dy)
-        of the linear system to an error (k, d).
-        """
-        d, own = y.shape[1], law.select(contacts)
-        if len(contacts) * d > MOST:
+    ):
+        if len(contacts) * y.shape[1] > MOST:
             raise InputError(
                 f"{len(contacts)} contacts are weakly active, too many for one-sided derivatives;"
                 " solve the problem with a smaller tol, or give a smaller distance."
             )
         logger.info("one-sided derivative: %d weakly active contacts", len(contacts))
         kinks = law.kinks(y, distance)
-        place = own.on_kinks(y[contacts], Kinks(kinks.normal[contacts], kinks.tangential[contacts]))
+        own = Kinks(kinks.normal[contacts], kinks.tangential[contacts])
+        self.law, self.contacts, self.force = law.select(contacts), contacts, force
+        self.y, self.D, self.P_mu = self.law.on_kinks(y[contacts], own), D[contacts], P_mu[contacts]
         answers = []
         for contact in contacts:
-            for component in range(d):
+            for component in range(y.shape[1]):
                 unit = np.zeros(y.shape)
                 unit[contact, component] = 1.0
                 answers.append(response(unit))
-        dr, dlam, dy = (np.array(part) for part in zip(*answers))
-        S = dy[:, contacts].reshape(len(dy), -1).T
-        return cls(own, place, contacts, force, D[contacts], P_mu[contacts], dr, dlam, S)
+        self.dr, self.dlam, dy = (np.array(part) for part in zip(*answers))
+        self.S = dy[:, contacts].reshape(len(dy), -1).T
 
     def step(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What to add to dr (k, d) and dlambda (p,) of the piece M, from its dy (k, d) and dmu
@@ -138,13 +123,9 @@ class Onesided:
             guess = dy0 if start == 0 else size * rng.normal(size=dy0.shape)
             for _ in range(STEPS):
                 D, moved = self._piece(guess, dmu)
-                change = np.zeros((len(self.S), len(self.S)))
-                d, i = dy0.shape[1], np.arange(len(dy0))
-                change.reshape(len(i), d, len(i), d)[i, :, i, :] = D - self.D
+                change, one = block_diag(*(D - self.D)), np.eye(len(self.S))
                 try:
-                    z = np.linalg.solve(
-                        np.eye(len(self.S)) - change @ self.S, change @ dy0.ravel() + moved.ravel()
-                    )
+                    z = np.linalg.solve(one - change @ self.S, change @ dy0.ravel() + moved.ravel())
                 except np.linalg.LinAlgError:
                     break
                 guess = dy0 + (self.S @ z).reshape(dy0.shape)
@@ -157,13 +138,8 @@ class Onesided:
 
     def _piece(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """D (m, d, d) of the piece into which dy leads, and (P_mu - P_mu0) dmu (m, d)."""
-        size = (
-            max(
-                float(np.abs(dy).max(initial=0.0)), self.force * float(np.abs(dmu).max(initial=0.0))
-            )
-            or 1.0
-        )
-        t = STEP * self.force / size
+        sizes = np.abs(dy).max(initial=0.0), self.force * np.abs(dmu).max(initial=0.0)
+        t = STEP * self.force / (float(max(sizes)) or 1.0)
         law, place = self.law.shifted(t * dmu), self.y + t * dy
         D = law.project(place)[1].copy()
         D[~law.rough, 1:, :] = 0.0

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -26,7 +26,7 @@ from scipy.sparse.linalg import LinearOperator, gmres, splu
 from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.errors import InputError
 from contactopt.linear.flexible_gmres import flexible_gmres
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import Interface, InterfaceOperator
 from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, Vector, norm
 from contactopt.methods.constants import LOOSE, SLIPPING
@@ -46,15 +46,12 @@ UNIQUE = (
     " not unique there; remove redundant contacts, or hold the bodies."
 )
 
-# for the contacts (k d,), for the balance or the multipliers (p,)
-Pair = tuple[np.ndarray, np.ndarray]
 Act = Callable[[np.ndarray], np.ndarray]
 
 
-class Closed(Protocol):
-    """What solves K x = right and K' x = right, for right (n + p,)."""
-
-    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray: ...
+def transposed_product(Q: Interface, x: np.ndarray) -> np.ndarray:
+    """Q' x; an operator is symmetric."""
+    return np.asarray(Q @ x if isinstance(Q, InterfaceOperator) else Q.T @ x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +66,7 @@ class Tangent:
     rho: np.ndarray
     D: np.ndarray
 
-    def solve(self, error: np.ndarray, balance: np.ndarray) -> Pair:
+    def solve(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dr (k d,) and dlambda (p,) with M (dr, dlambda) = (error, balance)."""
         Q, V, closed, n = self.problem.Q, self.problem.V, self.closed, len(self.closed)
         dr = np.where(self.is_closed, 0.0, error)
@@ -97,21 +94,18 @@ class Tangent:
         """a (k d,) on the contacts with D = 0, zero elsewhere, for what solve_transposed returned;
         one product with Q'.
         """
-        Q = self.problem.Q
-        moved = Q @ z if isinstance(Q, InterfaceOperator) else Q.T @ z
+        moved = transposed_product(self.problem.Q, z)
         return np.where(self.is_closed, 0.0, by_r - moved - self.problem.V @ b)
 
     def slope(self, moved: np.ndarray) -> np.ndarray:
         """D rho moved, (k d,)."""
-        return np.asarray(
-            np.einsum("kab,k,kb->ka", self.D, self.rho, moved.reshape(self.D.shape[:2])).ravel()
-        )
+        blocks = moved.reshape(self.D.shape[:2])
+        return np.asarray(np.einsum("kab,k,kb->ka", self.D, self.rho, blocks).ravel())
 
     def slope_transposed(self, a: np.ndarray) -> np.ndarray:
         """rho D' a, (k d,)."""
-        return np.asarray(
-            np.einsum("kab,k,ka->kb", self.D, self.rho, a.reshape(self.D.shape[:2])).ravel()
-        )
+        blocks = a.reshape(self.D.shape[:2])
+        return np.asarray(np.einsum("kab,k,ka->kb", self.D, self.rho, blocks).ravel())
 
     @cached_property
     def is_closed(self) -> np.ndarray:
@@ -124,8 +118,10 @@ class Tangent:
         return np.flatnonzero(self.is_closed)
 
     @cached_property
-    def system(self) -> Closed:
-        """K by the means that fit the form of Q; InputError where it is singular."""
+    def system(self) -> Stuck | Dense | Sparse | Krylov | Coupled:
+        """What solves K x = right and K' x = right (n + p,), by the means that fit the form of Q;
+        InputError where it is singular.
+        """
         Q = self.problem.Q
         if isinstance(Q, InterfaceOperator):
             return Krylov(self) if Q.coupled is None else Coupled(self, Q.coupled)
@@ -230,10 +226,9 @@ class Sparse:
     def __init__(self, tangent: Tangent):
         problem, closed, d = tangent.problem, tangent.closed, tangent.problem.dim
         k, p, V = problem.contacts, len(problem.s), sp.csr_array(problem.V)
-        scaled = sp.bsr_array(
-            (tangent.rho[:, None, None] * tangent.D, np.arange(k), np.arange(k + 1))
-        ).tocsr()
-        rest = sp.bsr_array((np.eye(d) - tangent.D, np.arange(k), np.arange(k + 1))).tocsr()
+        places = np.arange(k), np.arange(k + 1)
+        scaled = sp.bsr_array((tangent.rho[:, None, None] * tangent.D, *places)).tocsr()
+        rest = sp.bsr_array((np.eye(d) - tangent.D, *places)).tocsr()
         rows = (scaled @ problem.Q + rest)[closed][:, closed]
         border = (scaled @ V)[closed], V[closed].T
         K = sp.block_array([[rows, border[0]], [border[1], sp.csr_array((p, p))]], format="csc")
@@ -265,25 +260,24 @@ class Krylov:
         full = np.zeros(len(V))
         full[tangent.closed] = x[:n]
         D = tangent.D
+        turned, blocks = D.transpose(0, 2, 1) if transposed else D, full.reshape(D.shape[:2])
+        top = full - np.einsum("kab,kb->ka", turned, blocks).ravel()
         if transposed:
-            z = tangent.slope_transposed(full)
-            kept = np.einsum("kab,ka->kb", D, full.reshape(D.shape[:2])).ravel()
-            top, bottom = full - kept + act(z) + V @ x[n:], V.T @ z
+            full = tangent.slope_transposed(full)
+            top += act(full) + V @ x[n:]
         else:
-            kept = np.einsum("kab,kb->ka", D, full.reshape(D.shape[:2])).ravel()
-            top, bottom = full - kept + tangent.slope(act(full) + V @ x[n:]), V.T @ full
-        return np.concatenate([top[tangent.closed], bottom])
+            top += tangent.slope(act(full) + V @ x[n:])
+        return np.concatenate([top[tangent.closed], V.T @ full])
 
     def inverse(self, transposed: bool) -> Act:
         """An approximate inverse of K or K': that for the model of Q to INNER, or a rough one
         without a model.
         """
-        rough, model = self.rough[transposed], self.P.model
-        if model is None:
+        rough = self.rough[transposed]
+        if self.P.model is None:
             return rough
-        return lambda x: _gmres(
-            lambda y: self.product(y, transposed, model.matvec), x, INNER, rough
-        )
+        act = self.P.model.matvec
+        return lambda x: _gmres(lambda y: self.product(y, transposed, act), x, INNER, rough)
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         Q = self.tangent.problem.Q
@@ -292,9 +286,11 @@ class Krylov:
             return self.product(x, transposed, lambda y: Q @ y)
 
         inverse = self.inverse(transposed)
-        return _refined(
-            product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right))
-        )
+
+        def solve(rest: np.ndarray) -> np.ndarray:
+            return _gmres(product, rest, ROUND, inverse)
+
+        return _refined(product, solve, right, np.ones(len(right)))
 
 
 class Coupled:
@@ -312,8 +308,7 @@ class Coupled:
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         tangent, form, contacts = self.tangent, self.form, self.contacts
-        n, sign = len(tangent.closed), -1.0 if transposed else 1.0
-        inverse = contacts.inverse(transposed)
+        n, sign, inverse = len(tangent.closed), 1 - 2 * transposed, contacts.inverse(transposed)
 
         def forces(x: np.ndarray) -> np.ndarray:
             """What the contacts do to the bodies: dr or z (k d,)."""
@@ -334,42 +329,24 @@ class Coupled:
 
         rho = np.repeat(tangent.rho, tangent.problem.dim)[tangent.closed]
         share = rho**0.5 if transposed else rho**-0.5
-        weights = Stacked(
-            (
-                *(form.diagonal() ** -0.5).parts,
-                np.concatenate([share, np.ones(len(tangent.problem.s))]),
-            )
-        )
+        own = np.concatenate([share, np.ones(len(tangent.problem.s))])
+        weights = Stacked((*(form.diagonal() ** -0.5).parts, own))
+
+        def solve(rest: Stacked) -> Any:
+            return flexible_gmres(product, precondition, rest, weights, ROUND)
+
         none = form.pulled(np.zeros(tangent.problem.q.size))
-        whole = Stacked((*none.parts, right))
-        found = _refined(
-            product,
-            lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND),
-            whole,
-            weights,
-        )
+        found = _refined(product, solve, Stacked((*none.parts, right)), weights)
         return np.asarray(found.parts[-1])
 
 
 def _refined(
     product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector
 ) -> Any:
-    """Solve A x = b to the accuracy ACCURACY by solving again for what is left.
+    """Solve A x = b to ACCURACY by solving again for what is left, from x -> A x, b -> an
+    approximate x, and weights W of the rows, like b: the residual is |W (b - A x)| / |W b|.
 
-    Parameters
-    ----------
-    product : x -> A x.
-    solve : b -> an approximate solution x.
-    right : The right-hand side b, an array (n,) or a vector in parts.
-    weights : Weights W of the rows, like b; the residual is measured by |W (b - A x)| / |W b|.
-
-    Returns
-    -------
-    The solution x.
-
-    Raises
-    ------
-    InputError : If the accuracy is out of reach, because the solution is not unique.
+    InputError if that is out of reach, because the solution is not unique.
     """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)
@@ -388,9 +365,9 @@ def _refined(
 
 
 def _rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
-    """P where a component is held by contact, the identity where it slips, bordered by the balance."""
-    closed, d, V = tangent.closed, tangent.D.shape[1], tangent.problem.V[tangent.closed]
-    n = len(closed)
+    """P where contact holds a component, the identity where it slips, bordered by the balance."""
+    closed, n, d = tangent.closed, len(tangent.closed), tangent.D.shape[1]
+    V = tangent.problem.V[closed]
     rho = np.repeat(tangent.rho, d)[closed]
     inside = np.diagonal(tangent.D, axis1=1, axis2=2).ravel()[closed] > SLIPPING
     unknowns = closed[inside]
@@ -416,9 +393,8 @@ def _rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act
 
 
 def _gmres(product: Act, right: np.ndarray, rtol: float, inverse: Act) -> np.ndarray:
-    shape = (len(right), len(right))
-    A = LinearOperator(shape, matvec=lambda x: product(x.ravel()), dtype=float)
-    M = LinearOperator(shape, matvec=lambda x: inverse(x.ravel()), dtype=float)
-    return np.asarray(
-        gmres(A, right, rtol=rtol, restart=min(len(right), RESTART), maxiter=CYCLES, M=M)[0]
-    )
+    n = len(right)
+    A = LinearOperator((n, n), matvec=lambda x: product(x.ravel()), dtype=float)
+    M = LinearOperator((n, n), matvec=lambda x: inverse(x.ravel()), dtype=float)
+    found = gmres(A, right, rtol=rtol, restart=min(n, RESTART), maxiter=CYCLES, M=M)
+    return np.asarray(found[0])

@@ -17,8 +17,8 @@ to that of the earlier state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -28,33 +28,15 @@ from contactopt.checks import real_array
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
 from contactopt.derivatives.kinks import Weak
-from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.errors import InputError
 from contactopt.methods.driver import solve
-from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.laws import Place, find_law
+from contactopt.problem import Solution
+from contactopt.readings.state import Seeds, State
+from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 
 Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
-
-
-@dataclass(frozen=True, eq=False)
-class Seeds:
-    """A function of one solved state: its value, and its derivatives by what the state holds.
-
-    reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured
-    from the state before, bodies: (n,) by U of each body at fixed forces and
-    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
-    """
-
-    value: float
-    reactions: Any = None
-    multipliers: Any = None
-    displacements: Any = None
-    slip: Any = None
-    bodies: tuple[Any, ...] = ()
-    explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,63 +63,22 @@ class Moved:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """One solved state: the reduction under its loads, and the problem that its solution was
-    certified against.
+class Step(State):
+    """One solved state whose derivatives are asked for; `distance` to a kink as for sensitivity().
+
+    In what follows `base` is the reduction that has the materials, whose matrices are kept there.
     """
 
-    reduction: Reduction
-    problem: InterfaceProblem
-    solution: Solution
     distance: float | None = None
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
         return sensitivity(self.problem, self.solution, self.distance)
 
-    @cached_property
-    def displaced(self) -> tuple[np.ndarray, ...]:
-        """U (n,) of every body."""
-        return self.reduction.displaced(self.solution)
-
-    @cached_property
-    def forces(self) -> tuple[np.ndarray, ...]:
-        """Contact forces (n,) on every body."""
-        return tuple(B.T @ self.solution.reactions.ravel() for B in self.reduction.maps)
-
-    def law_change(self, which: Parameter) -> np.ndarray:
-        """Differentiate the law's parameter by the friction of pairs of surfaces.
-
-        Parameters
-        ----------
-        which : The parameter, which names the pairs.
-
-        Returns
-        -------
-        (k,) derivatives.
-        """
-        out, areas = np.zeros(self.problem.contacts), self.problem.areas
-        chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
-        for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
-            if pair.name in chosen:
-                place = Place(areas[made.contacts], np.zeros((1, 2, 2)))
-                law = find_law(pair.law).of_place(np.ones(made.stop - made.start), place)
-                out[made.contacts] = getattr(law, law.parameters[0])
-        return out
-
-    def loads(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
-        """Change a load by a step.
+    def _changed(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
+        """The scene with a load changed by a step, its part that stands for a body, and the step.
 
         Bodies are affine in their loads, so that a step of any size gives the derivative.
-
-        Parameters
-        ----------
-        which : The parameter that is a load.
-        number : The number of the body among the parts of the scene.
-
-        Returns
-        -------
-        The changed scene, the part of it that stands for the body, and the step.
         """
         scene = self.reduction.scene
         value = which.read(scene)
@@ -145,83 +86,62 @@ class Step:
         changed = which.put(scene, value + step)
         return changed, changed.parts[number], step
 
+    def _concerned(self, which: Parameter) -> list[int]:
+        """The numbers of the bodies that a parameter changes."""
+        parts = self.reduction.scene.parts
+        return [number for number, part in enumerate(parts) if which.concerns(part)]
+
     def explicit(self, direction: Direction, base: Reduction) -> Explicit:
-        """Compute what a direction changes at fixed forces and multipliers.
-
-        Parameters
-        ----------
-        direction : The parameters that change, and by how much.
-        base : The reduction that has the materials, whose matrices are kept there.
-
-        Returns
-        -------
-        The changes of displacement, balance, law and bodies.
-        """
-        problem = self.problem
-        du, dmu = np.zeros(problem.q.shape), np.zeros(problem.contacts)
+        """What a direction changes at fixed forces and multipliers."""
+        bodies = self.reduction.bodies
+        du, dmu = np.zeros(self.problem.q.shape), np.zeros(self.problem.contacts)
         dU = [0.0 * U for U in self.displaced]
-        ds = [np.zeros(len(body.resultants)) for body in self.reduction.bodies]
+        ds = [np.zeros(len(body.resultants)) for body in bodies]
         for which, amount in direction.items():
-            if which.is_field:
-                change = _one_per_contact(which, amount, problem.contacts)
-                du[:, 0] += change if which.kind == "gap" else 0.0
-                dmu += change if which.kind == "friction" else 0.0
+            if which.kind == "gap":
+                du[:, 0] += _one_per_contact(which, amount, len(du))
+            elif which.kind == "friction":
+                dmu += _one_per_contact(which, amount, len(du))
             elif which.kind == "mu":
                 dmu += amount * self.law_change(which)
-            for number, part in enumerate(self.reduction.scene.parts):
-                if not which.concerns(part):
-                    continue
+            for number in self._concerned(which):
+                old = bodies[number]
                 if which.kind in MATERIAL:
                     moved, balance = base.bodies[number].material_change(
                         which.kind, self.displaced[number], self.forces[number]
                     )
                 else:
-                    scene, other, step = self.loads(which, number)
-                    old, new = (
-                        self.reduction.bodies[number],
-                        self.reduction.bodies[number].loaded(scene, other),
-                    )
-                    moved, balance = (
-                        (new.at_rest - old.at_rest) / step,
-                        (new.resultants - old.resultants) / step,
-                    )
+                    scene, part, step = self._changed(which, number)
+                    new = old.loaded(scene, part)
+                    moved = (new.at_rest - old.at_rest) / step
+                    balance = (new.resultants - old.resultants) / step
                 dU[number] = dU[number] + amount * moved
                 ds[number] += amount * balance
         for B, own in zip(self.reduction.maps, dU):
             du += (B @ own).reshape(du.shape)
         return Explicit(du, np.concatenate(ds), dmu, tuple(dU))
 
-    def work(self, which: Parameter, dual: Duals, base: Reduction) -> Any:
-        """Compute the derivative by one parameter from the gradient by the data of the problem.
-
-        Parameters
-        ----------
-        which : The parameter.
-        dual : The gradient by q, s and mu, and what it is on the bodies.
-        base : The reduction that has the materials, whose matrices are kept there.
-
-        Returns
-        -------
-        The derivative; (k,) for a parameter with one number per contact.
+    def work(self, which: Parameter, back: Duals, base: Reduction) -> Any:
+        """The derivative by one parameter, (k,) where it has one number per contact, from the
+        gradient by the data of the problem.
         """
         if which.kind == "gap":
-            return dual.q[:, 0]
+            return back.dual.q[:, 0]
         if which.kind == "friction":
-            return dual.mu
+            return back.dual.mu
         if which.kind == "mu":
-            return float(dual.mu @ self.law_change(which))
+            return float(back.dual.mu @ self.law_change(which))
         total = 0.0
-        for number, part in enumerate(self.reduction.scene.parts):
-            if not which.concerns(part):
-                continue
-            G, weights, W = dual.forces[number], dual.weights[number], dual.fields[number]
+        for number in self._concerned(which):
+            G, W = back.forces[number], back.fields[number]
             if which.kind in MATERIAL:
                 total += base.bodies[number].material_work(
                     which.kind, self.displaced[number], self.forces[number], G, W
                 )
             else:
-                scene, other, step = self.loads(which, number)
-                total += self.reduction.bodies[number].load_work(scene, other, G, weights, W) / step
+                scene, part, step = self._changed(which, number)
+                own = self.reduction.bodies[number]
+                total += own.load_work(scene, part, G, back.weights[number], W) / step
         return total
 
 
@@ -231,31 +151,24 @@ class Duals:
     module's head.
     """
 
-    step: Step
+    state: State
     dual: Dual
     bodies: tuple[Any, ...]
 
-    @property
-    def q(self) -> np.ndarray:
-        return self.dual.q
-
-    @property
-    def mu(self) -> np.ndarray:
-        return self.dual.mu
-
     @cached_property
     def weights(self) -> tuple[np.ndarray, ...]:
-        return self.step.reduction.own_multipliers(self.dual.s)
+        return self.state.reduction.own_multipliers(self.dual.s)
 
     @cached_property
     def forces(self) -> tuple[np.ndarray, ...]:
-        given = self.bodies or (None,) * len(self.step.reduction.maps)
-        made = (np.asarray(B.T @ self.dual.q.ravel()) for B in self.step.reduction.maps)
+        maps = self.state.reduction.maps
+        made = (np.asarray(B.T @ self.dual.q.ravel()) for B in maps)
+        given = self.bodies or (None,) * len(maps)
         return tuple(G if own is None else G + own for G, own in zip(made, given))
 
     @cached_property
     def fields(self) -> tuple[np.ndarray, ...]:
-        parts = zip(self.step.reduction.bodies, self.forces, self.weights)
+        parts = zip(self.state.reduction.bodies, self.forces, self.weights)
         return tuple(body.displacement(G, own) - body.at_rest for body, G, own in parts)
 
 
@@ -273,7 +186,9 @@ class Chain:
         )
 
     def forward(self, direction: Direction) -> Iterator[Moved]:
-        """State by state, how the solution changes along a direction; displacements are total ones."""
+        """State by state, how the solution changes along a direction; displacements are total
+        ones.
+        """
         base = self.steps[0].reduction
         before = np.zeros(self.steps[0].problem.q.shape)
         for step in self.steps:
@@ -310,18 +225,8 @@ class Chain:
 
 
 def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
-    """Compute the change of a function of a state along a direction.
-
-    Parameters
-    ----------
-    seeds : The derivatives of the function by the reactions, multipliers, displacements and slip of
-        the state.
-    moved : The changes of the state along the direction, from `Chain.forward`.
-    direction : The parameters that change, and by how much.
-
-    Returns
-    -------
-    The directional derivative, in the unit of the function.
+    """The directional derivative of a function of a state, which moves as Chain.forward says along
+    a direction, in the unit of the function.
     """
     total = sum(
         amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field
@@ -339,22 +244,10 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
 
 def chain_of(result: Any, distance: float | None = None) -> Chain:
-    """Make a chain of the solved states of a result, to differentiate through.
+    """The solved states of a result, to differentiate through: of what contactopt.run or
+    contactopt.follow returned, or of anything else with a reduction and a solution.
 
-    Parameters
-    ----------
-    result : What contactopt.run or contactopt.follow returned, or anything else with a reduction
-        and a solution.
-    distance : How near to a kink a contact counts as weakly active, over the largest force [-]; by
-        default as in `sensitivity`.
-
-    Returns
-    -------
-    The states in their order.
-
-    Raises
-    ------
-    InputError : For a result without a solved scene, and for a state that is not certified.
+    InputError for a result without a solved scene, and for a state that is not certified.
     """
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:
@@ -364,12 +257,12 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
                 "a derivative needs a solved scene: what contactopt.run or contactopt.follow"
                 f" returns; got {type(result).__name__}."
             )
-        return Chain((Step(reduction, reduction.problem, solution, distance),))
+        return Chain((Step(reduction, solution, distance),))
     steps = []
     for number, state in enumerate(path.states):
         reduction = path.reduction.loaded(state.scene)
         problem = replace(reduction.problem, q=state.q, s=state.s)
-        steps.append(Step(reduction, problem, state.solution, distance))
+        steps.append(Step(replace(reduction, problem=problem), state.solution, distance))
         if not state.solution.solved:
             raise InputError(
                 f"state {number} of the path is not certified; a derivative needs all states"
@@ -394,34 +287,18 @@ def solved_chain(
     starts: Sequence[Solution] | None = None,
     Q: str = "auto",
 ) -> Chain:
-    """Solve the states of a load path, without their energies, and make a chain of them.
+    """Solve the states of a load path, without their energies, to the certificate `tol`.
 
-    A path of one scene is one
-    state.
-
-    Parameters
-    ----------
-    scenes : The states in their order.
-    tol : Bound on the certificate of every state.
-    base : A reduction of the same bodies, which is then only loaded anew.
-    starts : A solution for every state, to start from.
-    Q : Form of Q, as for contactopt.reduce.
-
-    Returns
-    -------
-    The certified states in their order.
-
-    Raises
-    ------
-    InputError : Where a state has no solution or is not solved.
+    A path of one scene is one state. `base` is a reduction of the same bodies, which is then only
+    loaded anew; `starts` has a solution for every state to start from. InputError where a state has
+    no solution or is not solved.
     """
     steps: list[Step] = []
-    before = None
+    slipped: Any = 0.0
     for number, scene in enumerate(scenes):
         base = reduce_bodies(scene, Q=Q) if base is None else base.loaded(scene)
         q = base.problem.q.copy()
-        if before is not None:
-            q[:, 1:] -= before[:, 1:]
+        q[:, 1:] -= slipped
         problem = replace(base.problem, q=q)
         start = starts[number] if starts is not None else steps[-1].solution if steps else None
         solution = solve(problem, tol=tol, start=start)
@@ -429,11 +306,7 @@ def solved_chain(
             raise InputError(
                 f"state {number} of scene '{scene.name}' was not solved: {solution.message}."
             )
-        steps.append(Step(base, problem, solution))
+        steps.append(Step(replace(base, problem=problem), solution))
         moved = problem.displacements(solution.reactions, solution.multipliers)
-        before = (
-            moved
-            if before is None
-            else moved + np.concatenate([0 * before[:, :1], before[:, 1:]], axis=1)
-        )
+        slipped = slipped + moved[:, 1:]
     return Chain(tuple(steps))

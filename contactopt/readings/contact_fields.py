@@ -15,8 +15,8 @@ from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import facet_nodes
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
+from contactopt.readings.peaks import nodal_pressure
 from contactopt.readings.resultants import space_forces
-from contactopt.scenes.scene import Part
 
 # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 NEAR = 1.5
@@ -49,15 +49,11 @@ class ContactFields:
     @property
     def data(self) -> dict[str, np.ndarray]:
         """The quantities as arrays with one row per contact, vectors with three columns."""
-
-        def tall(x: np.ndarray) -> np.ndarray:
-            return np.pad(x, ((0, 3 - len(x)), (0, 0))).T
-
         return {
             "contact_pressure": self.pressure,
-            "contact_traction": tall(self.traction),
+            "contact_traction": _tall(self.traction),
             "contact_gap": self.gap,
-            "contact_slip": tall(self.slip),
+            "contact_slip": _tall(self.slip),
             "contact_status": self.status.astype(float),
         }
 
@@ -65,29 +61,22 @@ class ContactFields:
         """The surface as a VTU file with its quantities at the contacts."""
         import meshio
 
-        points = np.pad(self.points, ((0, 3 - len(self.points)), (0, 0))).T
-        meshio.Mesh(points, [(CELLS[len(self.cells)], self.cells.T)], self.data).write(
-            path, file_format="vtu"
-        )
+        cells = [(CELLS[len(self.cells)], self.cells.T)]
+        meshio.Mesh(_tall(self.points), cells, self.data).write(path, file_format="vtu")
+
+
+def _tall(x: np.ndarray) -> np.ndarray:
+    """(m, 3) rows of vectors (dim, m)."""
+    return np.pad(x, ((0, 3 - len(x)), (0, 0))).T
 
 
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
-    """Collect the contact quantities on the surface of every pair.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    The ContactFields of each pair, in the order of the pairs.
-    """
+    """The ContactFields of each pair, in the order of the pairs."""
     problem, r = reduction.problem, solution.reactions
     u, areas = problem.displacements(r, solution.multipliers), problem.areas
     # the contact on an axis has no area
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
-    forces, status = space_forces(reduction, solution), contact_status(problem, r)
+    traction, status = space_forces(reduction, solution) * share, contact_status(problem, r)
     slip = np.einsum("kad,ka->dk", reduction.frames[:, 1:], u[:, 1:])
     state = np.where(status.open, 0, np.where(status.stick, 1, 2))
     made = []
@@ -98,8 +87,8 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
                 pair.name,
                 coupling.positions,
                 coupling.cells,
-                r[own, 0] * share[own],
-                forces[:, own] * share[own],
+                nodal_pressure(problem, solution)[own],
+                traction[:, own],
                 u[own, 0],
                 slip[:, own],
                 state[own],
@@ -111,24 +100,11 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
 def on_nodes(
     reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
 ) -> tuple[Fields, ...]:
-    """Put the contact quantities on the nodes of the bodies' contact surfaces.
-
-    They are zero at all other nodes.
-
-    A node takes the values of the contact nearest to it. Traction and slip of a lower body have the
-    opposite sign.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene.
-    fields : The displacements and stresses of the bodies.
-    surfaces : The contact quantities of each pair, as `contact_fields` gives them.
-
-    Returns
-    -------
-    The fields of the bodies with the contact quantities added.
+    """Put the contact quantities of the pairs on the nodes of the bodies' contact surfaces, beside
+    their displacements and stresses. They are zero at all other nodes. A node takes the values of
+    the contact nearest to it. Traction and slip of a lower body have the opposite sign.
     """
-    default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
+    default = {part.name: getattr(part, "contact", None) for part in reduction.scene.parts}
     made = []
     for body in fields:
         data = {
@@ -140,10 +116,8 @@ def on_nodes(
                 if name != body.name:
                     continue
                 nodes = facet_nodes(body.mesh, body.mesh.boundaries[boundary or default[name]])
-                tree = KDTree(surface.points.T)
-                spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(
-                    len(surface.gap), -1
-                )
+                tree, count = KDTree(surface.points.T), len(surface.gap)
+                spacing = tree.query(surface.points.T, k=min(2, count))[0].reshape(count, -1)
                 apart, nearest = tree.query(body.mesh.p[:, nodes].T)
                 near = apart <= np.abs(coupling.gap[nearest]) + NEAR * spacing[nearest, -1]
                 for key, value in surface.data.items():

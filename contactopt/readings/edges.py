@@ -19,14 +19,17 @@ an end cannot be read, the nodal areas are counted.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.problem import InterfaceProblem
+from contactopt.coupling.reduction import Reduction
+from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.constants import INNER, NEAR, OUTER, SMOOTH, WITHIN
 from contactopt.readings.patches import End, patches_of
+from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
 
 Read = tuple[float, float]  # a distance and its uncertainty
@@ -34,18 +37,8 @@ Reader = Callable[[End], Read | None]
 
 
 def equivalent_half_width(scene: Scene, area: float) -> float:
-    """Compute the half-width of a contact zone from its area, as if the zone were a strip, a disc
-    or a square.
-
-    Parameters
-    ----------
-    scene : Its kind says which: a strip of the scene's thickness in plane strain, a disc in an
-        axisymmetric scene, and a square in space.
-    area : The contact area [length^2].
-
-    Returns
-    -------
-    Half the width of the strip or of the square, or the radius of the disc [length].
+    """Half the width of the strip of the scene's thickness in plane strain, or of the square in
+    space, or the radius of the axisymmetric disc, that has an area [length].
     """
     if scene.kind == "plane-strain":
         return area / (2 * scene.thickness)
@@ -53,43 +46,22 @@ def equivalent_half_width(scene: Scene, area: float) -> float:
 
 
 def contact_area(scene: Scene, half_width: float) -> float:
-    """Compute the contact area of a given half-width, the inverse of `equivalent_half_width`.
-
-    Parameters
-    ----------
-    scene : Its kind says which: a strip of the scene's thickness in plane strain, a disc in an
-        axisymmetric scene, and a square in space.
-    half_width : Half the width of the strip or of the square, or the radius of the disc [length].
-
-    Returns
-    -------
-    The area [length^2].
-    """
+    """The area of a half-width [length^2], the inverse of `equivalent_half_width`."""
     if scene.kind == "plane-strain":
         return 2 * half_width * scene.thickness
     return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """Read the half-width of the contact zone [length], as contact_zone() does.
-
-    Parameters
-    ----------
-    scene : says what the pair of surfaces is
-    problem : its interface problem
-    reactions : (k, dim) contact forces, normal first [force]
-
-    Returns
-    -------
-    The half-width [length].
-    """
+    """The half-width of the contact zone [length], as contact_zone() reads it."""
     return contact_zone(scene, problem, reactions)[0]
 
 
 def contact_zone(
     scene: Scene, problem: InterfaceProblem, reactions: np.ndarray
 ) -> tuple[float, float]:
-    """Read the half-width of the contact zone, with its uncertainty.
+    """Read the half-width of the contact zone of one pair of surfaces, and its uncertainty
+    [length]; both are 0 without contact.
 
     Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against
     x^2 over the outer part of the half-width, without the last two nodes, weighted by the nodal
@@ -99,16 +71,6 @@ def contact_zone(
     counts only where the disc of that radius has the area of the zone to within an element. The
     uncertainty is half of what the parabola and the straight line differ, WITHIN of an element at
     least. Where areas of nodes are counted, it is that of the nodes at the edge.
-
-    Parameters
-    ----------
-    scene : The scene, which says what symmetry left out.
-    problem : Its interface problem, or that of one pair of surfaces.
-    reactions : (k, dim) contact forces, normal first [force].
-
-    Returns
-    -------
-    The half-width and its uncertainty [length]; both are 0 without contact.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
@@ -128,25 +90,15 @@ def contact_zone(
 def stick_edge(
     scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None
 ) -> tuple[float, float]:
-    """Read the half-width of the stick zone, with its uncertainty.
+    """Read the half-width of the stick zone of one pair of surfaces, and its uncertainty [length].
 
     The slack of the friction bound counts towards the direction in which the nearest slipping node
     slips. Where contact ends at a corner, the pressure is singular: the slack relative to its bound
     stays smooth but not straight. The values nearest to the edge then serve best, and the edge is
-    the mean of what the slack inside and the slip outside read; it is as uncertain as they differ.
-    A reading that is off by more than an element is left out, which happens to the slip of small
-    steps of a load path.
-
-    Parameters
-    ----------
-    scene : The scene, which says what symmetry left out.
-    problem : Its interface problem, or that of one pair of surfaces.
-    reactions : (k, dim) contact forces, normal first [force].
-    slip : (k, dim - 1) tangential motion of the step that led to the reactions [length], if known.
-
-    Returns
-    -------
-    The half-width and its uncertainty [length].
+    the mean of what the slack inside and the slip outside read, where `slip` (k, dim - 1) is known:
+    the tangential motion of the step that led to the reactions [length]. It is as uncertain as they
+    differ. A reading that is off by more than an element is left out, which happens to the slip of
+    small steps of a load path.
     """
     status = contact_status(problem, reactions)
     contact, uncertain = contact_zone(scene, problem, reactions)
@@ -238,3 +190,43 @@ def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray
     x = problem.coordinates.T
     nearest = r_t[np.flatnonzero(slipping)[KDTree(x[slipping]).query(x)[1]]]
     return np.asarray(nearest / np.maximum(np.linalg.norm(nearest, axis=1), 1e-300)[:, None])
+
+
+def width_reading(reduction: Reduction, solution: Solution) -> Reading:
+    """The half-width of the contact zone of a reduction with one pair of surfaces [length]."""
+    problem, r = reduction.problem, solution.reactions
+    touching = contact_status(problem, r).touching
+    missing = "" if touching.any() else "nothing touches, so that the zone of contact has no width"
+    zone = contact_zone(reduction.scene, problem, r)
+    return Reading(*zone, _edges_of(problem, touching), missing)
+
+
+def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]:
+    """The contacts on both sides of the edge of a zone, as one peak; none where the zone has no
+    edge.
+    """
+    across = inside[neighbours(problem)] != inside[:, None]
+    edge = np.flatnonzero(np.any(across, axis=1))
+    return (Peak(0.0, 0.0, problem.coordinates[:, edge[0]], 0.0, edge),) if len(edge) else ()
+
+
+def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
+    """Half-width of the stick zone of a reduction with one pair of surfaces, and its uncertainty
+    [length].
+    """
+    problem, r = reduction.problem, solution.reactions
+    slip = problem.displacements(r, solution.multipliers)[:, 1:]
+    return stick_edge(reduction.scene, problem, r, slip)
+
+
+def stick_reading(reduction: Reduction, solution: Solution) -> Reading:
+    """The half-width of the stick zone over that of contact [-]."""
+    edge = width_reading(reduction, solution)
+    if edge.missing:
+        return replace(edge, value=0.0)
+    stick, uncertainty = stick_width(reduction, solution)
+    status = contact_status(reduction.problem, solution.reactions)
+    ratio, own = stick / edge.value, uncertainty / edge.value
+    if status.slip.any() and status.stick.any():
+        own += ratio * edge.uncertainty / edge.value
+    return Reading(ratio, own, (*_edges_of(reduction.problem, status.stick), *edge.peaks))

@@ -48,24 +48,13 @@ class SurfaceContact:
 
 
 def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceContact:
-    """Compute the numbers that describe one solved state.
-
-    Parameters
-    ----------
-    problem : The interface problem of the state.
-    solution : Its solution.
-
-    Returns
-    -------
-    Areas, pressures, the mean gap and the work of friction.
+    """The numbers that describe one solved state: areas, pressures, the mean gap and the work of
+    friction.
     """
     r, areas = solution.reactions, problem.areas
     status, u = contact_status(problem, r), problem.displacements(r, solution.multipliers)
-    area, whole, force = (
-        float(areas[status.touching].sum()),
-        float(areas.sum()),
-        float(r[:, 0].sum()),
-    )
+    area, whole = float(areas[status.touching].sum()), float(areas.sum())
+    force, apart = float(r[:, 0].sum()), status.open
     return SurfaceContact(
         area=area,
         fraction=area / whole,
@@ -74,11 +63,7 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
         mean_pressure=force / whole,
         contact_pressure=force / area if area > 0 else 0.0,
         largest_pressure=float((r[:, 0] / areas).max(initial=0.0)),
-        mean_gap=(
-            float(np.average(u[status.open, 0], weights=areas[status.open]))
-            if status.open.any()
-            else 0.0
-        ),
+        mean_gap=float(np.average(u[apart, 0], weights=areas[apart])) if apart.any() else 0.0,
         slip_work=-float(np.sum(r[status.slip, 1:] * u[status.slip, 1:])),
     )
 
@@ -86,18 +71,8 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
 def pressure_distribution(
     problem: InterfaceProblem, solution: Solution, bins: int = 50
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the distribution of the pressure over the real contact area.
-
-    Parameters
-    ----------
-    problem : The interface problem of the state.
-    solution : Its solution.
-    bins : Number of intervals of pressure.
-
-    Returns
-    -------
-    The edges (bins + 1,) of the intervals [stress], and the density (bins,) [1 / stress], whose
-    integral is one.
+    """The distribution of the pressure over the real contact area: the edges (bins + 1,) of the
+    intervals [stress], and the density (bins,) [1 / stress], whose integral is one.
     """
     touching = contact_status(problem, solution.reactions).touching
     pressure = solution.reactions[touching, 0] / problem.areas[touching]
@@ -106,19 +81,10 @@ def pressure_distribution(
 
 
 def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
-    """Compute the stiffness of the present contacts against relative motions of the bodies.
-
-    It is made of the forces that a small motion adds if no contact opens, closes or changes between
-    stick and slip. Contacts that slip take part with their normal components.
-
-    Parameters
-    ----------
-    problem : The interface problem of the state.
-    solution : Its solution.
-
-    Returns
-    -------
-    (dim, dim), along n, t1[, t2] [force / length]; zeros without contact.
+    """The stiffness of the present contacts against relative motions of the bodies, (dim, dim)
+    along n, t1[, t2] [force / length]; zeros without contact. It is made of the forces that a small
+    motion adds if no contact opens, closes or changes between stick and slip. Contacts that slip
+    take part with their normal components.
     """
     status = contact_status(problem, solution.reactions)
     takes_part = np.repeat(status.stick[:, None], problem.dim, axis=1)
@@ -129,33 +95,17 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
     Q = block(problem.Q, rows)
     motions = np.tile(np.eye(problem.dim), (problem.contacts, 1))[rows]
     system = LinearOperator(Q.shape, matvec=lambda x: Q @ x, dtype=float)
-    forces = np.stack(
-        [
-            cg(system, m, rtol=STIFFNESS, maxiter=10 * len(rows))[0] if m.any() else m
-            for m in motions.T
-        ],
-        axis=1,
-    )
-    return np.asarray(motions.T @ forces)
+    most = 10 * len(rows)
+    forces = [cg(system, m, rtol=STIFFNESS, maxiter=most)[0] for m in motions.T]
+    return np.asarray(motions.T @ np.stack(forces, axis=1))
 
 
 def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarray]:
-    """Make maps of the contact quantities on the grid of a half-space's points.
+    """Maps of the contact quantities on the grid of a half-space's (n0[, n1]) points.
 
-    Parameters
-    ----------
-    reduction : The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
-    solution : A solution of its problem.
-
-    Returns
-    -------
     'pressure' (n0[, n1]) and 'traction' (n0[, n1], dim - 1) on the upper body [stress]; 'gap' (n0[,
     n1]) and 'slip' (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1
-    where sticking and 2 where slipping.
-
-    Raises
-    ------
-    InputError : If the scene has no half-space.
+    where sticking and 2 where slipping. InputError if the scene has no half-space.
     """
     problem, grid = reduction.problem, _half_space(reduction, None).grid
     r, areas = solution.reactions, problem.areas
@@ -172,22 +122,11 @@ def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarr
 def subsurface_stress(
     reduction: Reduction, solution: Solution, depths: Sequence[float], body: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the stresses below the points of a half-space.
+    """The stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress] at depths (j,)
+    [length] below the (n0[, n1]) points of a half-space, at least half a spacing of the points; by
+    default below the lower one, if both bodies are half-spaces.
 
-    Parameters
-    ----------
-    reduction : The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
-    solution : A solution of its problem.
-    depths : (j,) depths below the surface [length], at least half a spacing of the points.
-    body : Name of the half-space; by default the lower one, if both bodies are half-spaces.
-
-    Returns
-    -------
-    Stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress].
-
-    Raises
-    ------
-    InputError : If there is no such half-space, if it is periodic, or if a depth is too small.
+    InputError if there is no such half-space, if it is periodic, or if a depth is too small.
     """
     found = _half_space(reduction, body)
     place = reduction.bodies.index(found)

@@ -71,9 +71,8 @@ class End:
         None as in inner().
         """
         depth = self.distance - self.distance[~self.inside].min()
-        return self._zero(
-            self.distance, value[self.contact] ** (2 / 3), ~self.inside, depth, window
-        )
+        outside, root = ~self.inside, value[self.contact] ** (2 / 3)
+        return self._zero(self.distance, root, outside, depth, window)
 
     def clip(self, edge: float) -> float:
         """The edge, brought to less than an element from where the nodes say that it is."""
@@ -89,12 +88,9 @@ class End:
         rings = _rings(depth[side], self.step, sum(window))
         skip = max(0, min(window[0], len(rings) - window[1]))
         fitted = rings[skip : skip + window[1]]
-        near = (
-            side
-            & (depth >= fitted[0] - SAME * self.step)
-            & (depth <= fitted[-1] + SAME * self.step)
-        )
-        if np.ptp(depth[near]) <= SAME * self.step:
+        slack = SAME * self.step
+        near = side & (depth >= fitted[0] - slack) & (depth <= fitted[-1] + slack)
+        if np.ptp(depth[near]) <= slack:
             return None
         slope, height = np.polyfit(x[near], y[near], 1)
         falls = (slope < 0) == bool(self.inside[near][0])
@@ -130,11 +126,9 @@ class Patch:
         first, last, uncertainty = float(x.min()), float(x.max()), 0.0
         if self.centred:
             found = self._read(1.0, 0.0, read)
-            return (
-                None
-                if found is None
-                else Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
-            )
+            if found is None:
+                return None
+            return Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
         for _ in range(ROUNDS):
             centre = (first + last) / 2
             left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
@@ -173,18 +167,9 @@ class Patch:
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
-    """Find the connected patches of a zone on a contact surface.
-
-    Parameters
-    ----------
-    problem : The interface problem of one pair of surfaces.
-    inside : (k,) mask of the contacts of the zone: some of them, but not all.
-    weights : (k,) weights of the contacts in the mean place that is the centre of a disc.
-
-    Returns
-    -------
-    The patches in their order along a contact line. On a surface one patch, or none where the zone
-    is no disc.
+    """The connected patches of a zone on the contact surface of one pair, where some contacts are
+    `inside` (k,), but not all: in their order along a contact line. On a surface one disc about the
+    mean place of the contacts inside with their weights (k,), or none where the zone is no disc.
     """
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)
@@ -201,9 +186,8 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
     stops = np.flatnonzero(within & ~np.append(within[1:], False))
     found = []
     for i in range(len(starts)):
-        part = slice(
-            stops[i - 1] + 1 if i else 0, starts[i + 1] if i + 1 < len(starts) else len(order)
-        )
+        last = starts[i + 1] if i + 1 < len(starts) else len(order)
+        part = slice(stops[i - 1] + 1 if i else 0, last)
         reaches = chart.mirrored[0] and _reaches_origin(place, place[starts[i] : stops[i] + 1])
         copies = 1 if reaches or not chart.mirrored[0] else 2
         found.append(Patch(order[part], place[part], within[part], reaches, copies, chart.places))
@@ -219,10 +203,9 @@ def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
     """
     plane = ON_PLANE * np.abs(place).max()
     off_plane = np.abs(place[np.abs(place) > plane])
+    nearest = np.abs(patch).min()
     touches = np.abs(place).min() <= plane
-    return bool(
-        touches and (np.abs(patch).min() <= plane or np.abs(patch).min() <= off_plane.min())
-    )
+    return bool(touches and (nearest <= plane or nearest <= off_plane.min()))
 
 
 def _longest_run(mask: np.ndarray) -> int:
@@ -244,9 +227,8 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
     distance = np.linalg.norm(x - centre[:, None], axis=0)
     disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, x)
     step = disc.step(disc.contact, distance, float(distance[inside].max()))
-    return (
-        disc if abs(distance[~inside].min() - distance[inside].max()) <= ROUNDNESS * step else None
-    )
+    apart = abs(distance[~inside].min() - distance[inside].max())
+    return disc if apart <= ROUNDNESS * step else None
 
 
 def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:

@@ -29,8 +29,10 @@ from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.readings.constants import MOST_PEAKS
-from contactopt.readings.quantities import Peak, Reading
-from contactopt.scenes.scene import Part, Scene
+from contactopt.readings.peaks import Peak, Reading
+from contactopt.readings.state import Seeds, State
+from contactopt.scenes.parameters import MATERIAL, Parameter
+from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
@@ -66,40 +68,26 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class StressReading:
+class StressReading(Reading):
     """A stress, and what it was read from.
 
-    value  [stress]
-    uncertainty  by how much it may be off because stresses scatter from element to element [stress]
-    peaks  where it is, with the elements where the stress may be larger than the value or is as
-           uncertain as it; of a largest stress then its other local maxima
-    body   its number among the parts of the scene;   map, slopes (m, 4 or 6)  of the recovered
-           stress, for its derivative
+    The uncertainty is by how much it may be off because stresses scatter from element to element
+    [stress]. The first peak is where it is, with the elements where the stress may be larger than
+    the value or is as uncertain as it; of a largest stress the others are its other local maxima.
+
+    body, map, slopes  number of the body among the parts of the scene, and the recovered stress
+                       there with the derivatives (m, 4 or 6) by it
     """
 
-    value: float
-    uncertainty: float
-    peaks: tuple[Peak, ...] = field(repr=False)
-    body: int
-    map: StressMap = field(repr=False)
-    slopes: np.ndarray = field(repr=False)
+    body: int = 0
+    map: StressMap = field(kw_only=True, repr=False)
+    slopes: np.ndarray = field(kw_only=True, repr=False)
 
 
 def place_of(name: Any, scene: Scene) -> Place | None:
-    """Find the quantity at a place that has a name.
+    """Find the quantity at a place that has a name; None for the names of other quantities.
 
-    Parameters
-    ----------
-    name : The name of any quantity.
-    scene : The scene that is asked.
-
-    Returns
-    -------
-    None for the names of other quantities.
-
-    Raises
-    ------
-    InputError : For a body, pair, component or point that the scene does not have.
+    InputError for a body, pair, component or point that the scene does not have.
     """
     from contactopt.bodies.fields import STRESSES
 
@@ -118,11 +106,11 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     if kind != LARGEST and stress == kind:
         return None
     body, _, boundary = rest.partition(":")
-    known = [part.name for part in scene.parts if isinstance(part, Part)]
-    if body not in known:
+    meshed = {part.name: part for part in scene.parts if hasattr(part, "build_mesh")}
+    if body not in meshed:
         raise InputError(
             f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from"
-            f" {', '.join(known)}."
+            f" {', '.join(meshed)}."
         )
     if kind != LARGEST and stress not in STRESSES[scene.kind]:
         names = ", ".join(f"stress_{own}" for own in STRESSES[scene.kind])
@@ -137,17 +125,17 @@ def place_of(name: Any, scene: Scene) -> Place | None:
         )
     if boundary and at:
         raise InputError(f"quantity {name!r}: give either a boundary or a point.")
-    part = next(part for part in scene.parts if isinstance(part, Part) and part.name == body)
-    _check_there(part, region, scene)
+    if boundary or at:
+        _check_there(meshed[body], region, scene)
     return Place(name, kind if kind == LARGEST else stress, body, region)
 
 
-def _check_there(part: Part, region: Region, scene: Scene) -> None:
+def _check_there(part: Any, region: Region, scene: Scene) -> None:
     """InputError for a boundary that the first mesh of a body does not have, and for a point far
     outside it.
     """
-    if not region.boundary and not region.point:
-        return
+    from contactopt.meshes.cells import straight
+
     mesh = part.build_mesh(scene.elements, scene.zone)
     known = mesh.boundaries or {}
     if region.boundary and region.boundary not in known:
@@ -156,36 +144,31 @@ def _check_there(part: Part, region: Region, scene: Scene) -> None:
             f" {', '.join(sorted(known)) or 'none'}."
         )
     if region.point:
-        from contactopt.meshes.cells import straight
-
         corners = straight(mesh).p
         low, high = corners.min(axis=1), corners.max(axis=1)
         slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
         if np.any(region.point < low - slack) or np.any(region.point > high + slack):
-            place = ", ".join(f"{x:g}" for x in region.point)
             raise InputError(
-                f"the point ({place}) lies outside body '{part.name}'; give one inside it or on its"
-                " surface."
+                f"the point ({_words(region)}) lies outside body '{part.name}'; give one inside it"
+                " or on its surface."
             )
+
+
+def _words(region: Region) -> str:
+    return ", ".join(f"{x:g}" for x in region.point)
 
 
 def _around(name: str, where: str, scene: Scene) -> Region:
     """The point, or the circle around it, that stands behind the @ of a quantity."""
-    texts = where.split(",")
+    texts, radius = where.split(","), None
     try:
-        radius = (
-            float(texts.pop().strip().removeprefix("radius="))
-            if texts[-1].strip().startswith("radius=")
-            else None
-        )
+        if texts[-1].strip().startswith("radius="):
+            radius = float(texts.pop().strip().removeprefix("radius="))
         point = tuple(float(text) for text in texts)
     except ValueError:
-        point, radius = (), None
-    if (
-        len(point) != scene.dim
-        or not np.all(np.isfinite(point))
-        or (radius is not None and not 0 < radius < np.inf)
-    ):
+        point = ()
+    fits = radius is None or 0 < radius < np.inf
+    if len(point) != scene.dim or not np.all(np.isfinite(point)) or not fits:
         example = ",".join(scene.components)
         raise InputError(
             f"quantity {name!r}: a place needs {scene.dim} numbers, @{example} or"
@@ -197,56 +180,40 @@ def _around(name: str, where: str, scene: Scene) -> Region:
 def read_stress(
     place: Place, reduction: Reduction, displaced: tuple[np.ndarray, ...]
 ) -> StressReading:
-    """Read the stress that a quantity names.
+    """Read the stress that a quantity names from the displacements U (n,) of all bodies [length].
 
-    Parameters
-    ----------
-    place : The quantity.
-    reduction : The reduced scene.
-    displaced : For each body its displacement U (n,) [length].
-
-    Returns
-    -------
-    The value, where it is, and by how much it may be off.
-
-    Raises
-    ------
-    InputError : For a boundary that the body does not have, and a point outside the body.
+    InputError for a boundary that the body does not have, and a point outside the body.
     """
     from contactopt.bodies.fields import STRESSES, von_mises, von_mises_slopes
 
-    number = [part.name for part in reduction.scene.parts].index(place.owner)
-    recovered = map_of(place, reduction)
-    stress = recovered.stress(displaced[number])
+    number, recovered = _map_of(place, reduction)
+    U = displaced[number]
+    stress = recovered.stress(U)
     if place.kind == LARGEST:
         sizes, slopes = von_mises(stress), von_mises_slopes(stress)
+        tops = _tops(recovered.places, sizes)
     else:
         column = STRESSES[reduction.scene.kind].index(place.kind)
-        sizes, slopes = stress[:, column], np.zeros(stress.shape)
+        sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
-    scatter = DEVIATIONS * recovered.deviation(displaced[number], slopes)
+    scatter = DEVIATIONS * recovered.deviation(U, slopes)
     above = sizes + scatter - sizes[top]
     doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
     slopes[np.arange(len(slopes)) != top] = 0.0
     uncertainty = float(above.max())
-    others = (
-        [i for i in _tops(recovered.places, sizes) if i != top] if place.kind == LARGEST else []
-    )
-    nothing = np.empty(0, dtype=int)
-    peaks = [
-        Peak(
-            float(sizes[i]),
-            uncertainty if i == top else float(scatter[i]),
-            recovered.places[:, i],
-            recovered.size(i),
-            nothing,
-            number,
-            recovered.elements(np.flatnonzero(doubtful) if i == top else np.array([i])),
+
+    def peak(i: int, doubt: float, vertices: np.ndarray) -> Peak:
+        place, elements = recovered.places[:, i], recovered.elements(vertices)
+        return Peak(
+            float(sizes[i]), doubt, place, recovered.size(i), body=number, elements=elements
         )
-        for i in (top, *others)
-    ]
-    return StressReading(float(sizes[top]), uncertainty, tuple(peaks), number, recovered, slopes)
+
+    others = [peak(i, float(scatter[i]), np.array([i])) for i in tops if i != top]
+    peaks = (peak(top, uncertainty, np.flatnonzero(doubtful)), *others)
+    return StressReading(
+        float(sizes[top]), uncertainty, peaks, body=number, map=recovered, slopes=slopes
+    )
 
 
 def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
@@ -260,22 +227,9 @@ def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
     return [int(i) for i in chosen[order]]
 
 
-def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> StressMap:
-    """Make the recovered stress in the region of a quantity a linear map of the displacement.
-
-    Parameters
-    ----------
-    place : The quantity.
-    reduction : The reduced scene.
-    by_poisson : Whether the derivative of the map by Poisson's ratio is wanted instead.
-
-    Returns
-    -------
-    The map.
-
-    Raises
-    ------
-    InputError : Where the stress of the body cannot be read.
+def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tuple[int, StressMap]:
+    """The number of the body, and its recovered stress in the region of a quantity as a linear map
+    of the displacement, or the derivative of that map by Poisson's ratio.
     """
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = reduction.bodies[number].stress_map(place.region, by_poisson)
@@ -283,20 +237,36 @@ def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> Stre
         raise InputError(
             f"quantity {place.name!r}: the stress inside body '{place.owner}' cannot be read here."
         )
-    return recovered
+    return number, recovered
+
+
+def stress_seeds(place: Place, state: State) -> Seeds:
+    """The slopes of a stress inside a body: a function of its displacement U, which follows the
+    contact forces by its compliance.
+
+    A largest stress has the derivative of the stress at the place where it is largest. The
+    multipliers do not enter, since the free motions that they stand for strain nothing.
+    """
+    found = read_stress(place, state.reduction, state.displaced)
+    number = found.body
+    own = found.map.transposed(found.slopes)
+
+    def explicit(which: Parameter) -> float:
+        part: Any = state.reduction.scene.parts[number]
+        if which.kind not in MATERIAL or not which.concerns(part):
+            return 0.0
+        if which.kind == "E":
+            return found.value / part.material.E
+        by_poisson = _map_of(place, state.reduction, by_poisson=True)[1]
+        return float(np.sum(found.slopes * by_poisson.stress(state.displaced[number])))
+
+    bodies = tuple(own if i == number else None for i in range(len(state.displaced)))
+    return Seeds(found.value, state.following(number, own), bodies=bodies, explicit=explicit)
 
 
 def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
-    """Compute what the force at each contact contributes to the pressure at a place.
-
-    Parameters
-    ----------
-    place : The quantity.
-    reduction : The reduced scene.
-
-    Returns
-    -------
-    (k, dim) array : The contributions [1 / length^2].
+    """(k, dim) what the force at each contact contributes to the pressure at a place
+    [1 / length^2].
     """
     problem = reduction.problem
     pairs = {pair.name: pair for pair in problem.pairs}
@@ -305,15 +275,13 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
     own &= problem.areas > 0
     chosen = np.flatnonzero(own)
     offset = problem.coordinates[:, chosen] - np.asarray(place.region.point)[:, None]
-    near = np.argsort(np.linalg.norm(offset, axis=0), kind="stable")[: NEAREST[problem.dim]]
-    tangents = reduction.frames[chosen[near[0]], 1:]
-    along = tangents @ offset[:, near]
+    order = np.argsort(np.linalg.norm(offset, axis=0), kind="stable")[: NEAREST[problem.dim]]
+    near, areas = chosen[order], problem.areas[chosen[order]]
+    along = reduction.frames[near[0], 1:] @ offset[:, order]
     terms = np.concatenate([np.ones((1, len(near))), along / (np.abs(along).max() or 1.0)])
-    root = np.sqrt(problem.areas[chosen[near]])
+    root = np.sqrt(areas)
     weights = np.zeros(problem.q.shape)
-    weights[chosen[near], 0] = (
-        np.linalg.pinv((terms * root).T)[0] * root / problem.areas[chosen[near]]
-    )
+    weights[near, 0] = np.linalg.pinv((terms * root).T)[0] * root / areas
     return weights
 
 
@@ -321,49 +289,30 @@ def read_place(place: Place, reduction: Reduction, solution: Solution) -> Readin
     """Read a quantity at a place, with its uncertainty [stress].
 
     The uncertainty of a pressure is what the nodal values scatter about the linear function through
-    them.
-
-    Parameters
-    ----------
-    place : The quantity.
-    reduction : The reduced scene.
-    solution : Of its problem.
-
-    Returns
-    -------
-    The stress or the pressure. Where no contact near the place touches, it says that there is no
-    pressure.
-
-    Raises
-    ------
-    InputError : As read_stress() and pressure_weights().
+    them. Where no contact near the place touches, the reading says that there is no pressure.
     """
     if place.kind != "pressure":
-        found = read_stress(place, reduction, reduction.displaced(solution))
-        return Reading(found.value, found.uncertainty, found.peaks)
-    weights, problem = pressure_weights(place, reduction), reduction.problem
+        return read_stress(place, reduction, reduction.displaced(solution))
+    weights, problem, r = pressure_weights(place, reduction), reduction.problem, solution.reactions
     near = np.flatnonzero(weights[:, 0])
-    value = float(np.sum(weights * solution.reactions))
-    pressure = solution.reactions[near, 0] / problem.areas[near]
+    value, areas = float(np.sum(weights * r)), problem.areas[near]
     missing = ""
-    if not problem.law.pressed(solution.reactions)[near].any():
-        point = ", ".join(f"{x:g}" for x in place.region.point)
-        apart = problem.displacements(solution.reactions, solution.multipliers)[near, 0].min()
-        missing = f"there is no contact at ({point}): the surfaces are {apart:.3g} apart there"
-    share = weights[near, 0] * problem.areas[near]
-    scatter = (
-        float(np.abs(pressure - value) @ np.abs(share))
-        if len(near) < 3
-        else float(
-            np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2))
+    if not problem.law.pressed(r)[near].any():
+        apart = problem.displacements(r, solution.multipliers)[near, 0].min()
+        missing = (
+            f"there is no contact at ({_words(place.region)}): the surfaces are {apart:.3g} apart"
+            " there"
         )
-    )
-    noise = solution.residual * float(
-        np.linalg.norm(solution.reactions) / problem.areas[near].min()
-    )
-    at = problem.coordinates[:, near[0]]
-    size = float(np.ptp(problem.coordinates[:, near], axis=1).max())
-    return Reading(value, scatter + noise, (Peak(value, scatter, at, size, near),), missing)
+    pressure, share, points = r[near, 0] / areas, weights[near, 0] * areas, problem.coordinates
+    if len(near) < 3:
+        scatter = float(np.abs(pressure - value) @ np.abs(share))
+    else:
+        left = _left(points[:, near], pressure)
+        scatter = float(np.sqrt(np.sum(left**2) * np.sum(share**2)))
+    noise = solution.residual * float(np.linalg.norm(r) / areas.min())
+    size = float(np.ptp(points[:, near], axis=1).max())
+    peak = Peak(value, scatter, points[:, near[0]], size, near)
+    return Reading(value, scatter + noise, (peak,), missing)
 
 
 def _left(points: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,46 +1,111 @@
-"""Numbers that people ask of a contact, by name, each read so that its error falls smoothly with
-the mesh.
+"""Numbers that people ask of a contact, by name: how each is read, how uncertain that is, and its
+derivatives by forces, multipliers and displacements.
 
-A single node, or a count of nodes, jumps from mesh to mesh, and the estimate of an error lives on
-differences between meshes: values at an edge or a peak come from fits through several nodes,
-weighted by the nodal areas. Every reading says how uncertain it is.
+    approach, shift              of the plates along the mean normal and along t1 [length]
+    normal_force, shear_force    on the upper body of a pair, the latter along t1, with the signs of
+                                 load paths [force]; of one pair of several as normal_force:PAIR
+    resultant:PAIR:COMPONENT     of the contact forces on the upper body of a pair, in the
+                                 coordinates of space [force]
+    pressure:CONTACT             at one contact, by its number [stress]
+    pressure@X,Y                 at a place, and the stresses of contactopt.readings.places:
+                                 von_mises:BODY:BOUNDARY, ...
+    energy                       elastic energy of all bodies [force length]
+    pressure, width              the largest pressure [stress] and the half-width of contact
+                                 [length]; of one pair of several pressure:PAIR
+    stick                        the half-width of stick over that of contact [-]
+
+ROWS has one row for each. What it makes, a Quantity, is all that is known of it, and all that
+errors, gradients, fits and the command line know of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from itertools import combinations_with_replacement
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.chart import ON_PLANE
-from contactopt.problem.contact_status import contact_status
-from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
-from contactopt.readings.edges import contact_zone, stick_edge
+from contactopt.readings.edges import stick_reading, width_reading
+from contactopt.readings.peaks import Peak, Reading, pressure_reading
+from contactopt.readings.places import PLACED, place_of, pressure_weights, read_place, stress_seeds
+from contactopt.readings.resultants import views
+from contactopt.readings.slopes import by_normal_forces, of_stick
+from contactopt.readings.state import Functional, Seeds, State
+from contactopt.scenes.parameters import MATERIAL, Parameter
+from contactopt.scenes.scene import Scene
 
-if TYPE_CHECKING:
-    from contactopt.coupling.reduction import Reduction
-
+__all__ = ["ROWS", "Functional", "Peak", "Quantity", "Reading", "find_quantity", "value_of"]
 CLOSED = 1e-3  # a mean motion below this share of the mean size is that of a surface around a body
+Reader = Callable[[Reduction, Solution], Reading]
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """One quantity of one scene: how it is read, how uncertain that is, and its slopes.
+
+    name    as it was asked for
+    slopes  state -> Seeds: its value and its derivatives by what a state holds
+    reader  (reduction, solution) -> Reading: value, uncertainty, local maxima; None: the value of
+            the slopes
+    nodal   whether it means another thing on the next mesh
+    """
+
+    name: str
+    slopes: Callable[[State], Seeds]
+    reader: Reader | None = None
+    nodal: bool = False
+
+    def read(self, reduction: Reduction, solution: Solution) -> Reading:
+        """Read it from a solution; InputError where the scene does not have it."""
+        if self.reader is not None:
+            return self.reader(reduction, solution)
+        return Reading(self.slopes(State(reduction, solution)).value)
+
+
+def find_quantity(name: Any, scene: Scene) -> Quantity:
+    """Find a quantity by its name, one from this module's head, before anything is solved.
+
+    InputError for an unknown quantity, and for a body, boundary, pair or place that the scene does
+    not have.
+    """
+    if not isinstance(name, str):
+        raise InputError(f"a quantity is given by its name; got {name!r}.")
+    place = place_of(name, scene)
+    if place is not None:
+        return Quantity(name, partial(_at_place, place), partial(read_place, place))
+    kind, _, rest = name.partition(":")
+    form, make = ROWS.get(kind, (None, None))
+    if make is None:
+        raise InputError(f"unknown quantity {name!r}; choose from {', '.join(NAMES)}.")
+    if rest and not form:
+        named = ", ".join(own for own, (form, _) in ROWS.items() if form == "[:PAIR]")
+        raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {named}.")
+    return make(name, rest, scene)
+
+
+def seeds_of(quantity: Any, state: State) -> Seeds:
+    """The value of a quantity of a solved state and its derivatives, by its name or as a function
+    of the state that returns Seeds.
+    """
+    if callable(quantity):
+        return quantity(state)
+    return find_quantity(quantity, state.reduction.scene).slopes(state)
+
+
+def value_of(name: str, reduction: Reduction, solution: Solution) -> float:
+    """The value of a quantity by its name, in its unit."""
+    return find_quantity(name, reduction.scene).read(reduction, solution).value
 
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
-    """How far the plates bring the bodies together along the mean normal.
+    """How far the plates bring the bodies together along the mean normal [length].
 
-    Parameters
-    ----------
-    problem : An interface problem.
-    solution : Of the problem.
-
-    Returns
-    -------
-    [length]; None without a plate, and where the surface surrounds a body, so that its normals have
-    no mean.
+    None without a plate, and where the surface surrounds a body, so that its normals have no mean.
     """
     if len(solution.multipliers) == 0:
         return None
@@ -52,409 +117,166 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
-    """Elastic energy of all bodies together, the sum of U' A U / 2.
-
-    Parameters
-    ----------
-    reduction : A reduced scene.
-    solution : Of its problem.
-
-    Returns
-    -------
-    [force length].
-    """
+    """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
     displaced = reduction.displaced(solution)
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
-@dataclass(frozen=True, eq=False)
-class Peak:
-    """A local maximum of a quantity.
-
-    value        [its unit];   uncertainty  of the reading [its unit]
-    place        (dim,) [length];   size  distance of the nodes there [length]
-    contacts     (m,) numbers of the contacts from which it was read
-    body, elements  where it lies inside a body: the number of the body and the elements around it
+def _of_pair(read: Reader) -> Callable[[str, str, Scene], Quantity]:
+    """A row whose quantity is read from the forces on one pair of surfaces; of the pressure also
+    that at one contact, by its number.
     """
 
-    value: float
-    uncertainty: float
-    place: np.ndarray
-    size: float
-    contacts: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
-    body: int = -1
-    elements: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    def make(name: str, rest: str, scene: Scene) -> Quantity:
+        if read is pressure_reading and rest.isdigit():
+            return Quantity(name, partial(_pressure_at, number=int(rest)), nodal=True)
+        names = [pair.name for pair in scene.pairs]
+        if not rest and len(names) > 1:
+            raise InputError(
+                f"scene '{scene.name}' has {len(names)} pairs of surfaces, each with its own"
+                f" pressure and half-widths; name the pair, as in '{name}:{names[0]}', or ask for"
+                " the energy."
+            )
+        if rest and rest not in names:
+            raise InputError(
+                f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are"
+                f" {', '.join(names)}."
+            )
+        number = names.index(rest) if rest else 0
+        slopes = of_stick if read is stick_reading else partial(by_normal_forces, read)
+        return Quantity(name, partial(slopes, pair=number), partial(_read_pair, read, number))
+
+    return make
 
 
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """A quantity as it is read from one solution.
-
-    value        [its unit];   uncertainty  of the reading alone, not of the solution [its unit]
-    peaks        of a largest value: its local maxima, the largest first; of an edge, the contacts
-                 next to it
-    missing      one sentence if the quantity does not exist in this solution
-    """
-
-    value: float
-    uncertainty: float = 0.0
-    peaks: tuple[Peak, ...] = ()
-    missing: str = ""
-
-
-def peak_pressure(reduction: Reduction, solution: Solution) -> float:
-    """Largest value of a smooth pressure, as pressure_reading() reads it [stress]."""
-    return pressure_reading(reduction, solution).value
-
-
-def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
-    """Read the largest pressure from a local fit around the node where it is largest.
-
-    The square of the pressure is quadratic under Hertz's ellipse, and near the top of any smooth
-    pressure. A quadratic polynomial is fitted to it through the few nodes around every local
-    maximum of the nodal pressures, with the nodal areas as weights. What the nodes scatter about
-    the fit is the uncertainty, so that the reading agrees with the nodal values within its own
-    error. Nodes on the axis of an axisymmetric mesh are left out: the strain u_r / r is poorly
-    resolved there, on a ring without area. At the rim of the contact surface the nodal value is
-    returned.
-
-    Parameters
-    ----------
-    reduction : A reduced scene with one pair of surfaces.
-    solution : Of its problem.
-
-    Returns
-    -------
-    The largest pressure with its local maxima [stress].
-
-    Raises
-    ------
-    InputError : If the scene has several pairs of surfaces.
-    """
-    _one_pair(reduction)
-    problem = reduction.problem
-    pressure = nodal_pressure(problem, solution)
-    if not np.any(pressure > 0):
-        return Reading(0.0, missing="nothing touches, so that there is no pressure")
-    usable = problem.areas > 0
-    if reduction.scene.kind == "axisymmetric":
-        radius = np.abs(problem.coordinates[0])
-        usable &= radius > ON_PLANE * radius.max(initial=0.0)
-    noise = solution.residual * float(np.linalg.norm(solution.reactions))
-    found = []
-    for top in _maxima(problem, np.where(usable, pressure, 0.0)):
-        value, uncertainty, near, size = _fitted_top(problem, pressure, usable, top)
-        uncertainty += noise / float(problem.areas[top])
-        found.append(Peak(value, uncertainty, problem.coordinates[:, top], size, near))
-    found.sort(key=lambda peak: -peak.value)
-    return Reading(found[0].value, found[0].uncertainty, tuple(found))
-
-
-def nodal_pressure(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
-    """Divide the normal forces by the nodal areas, (k,) [stress]; 0 at contacts without an area.
-
-    Parameters
-    ----------
-    problem : an interface problem
-    solution : of the problem
-
-    Returns
-    -------
-    (k,) pressures [stress].
-    """
-    forces = solution.reactions[:, 0]
-    return np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
-
-
-def _maxima(problem: InterfaceProblem, pressure: np.ndarray) -> np.ndarray:
-    """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them
-    first, MOST_PEAKS at most.
-    """
-    places, node = _surroundings(problem)
-    count = min(NEIGHBOURS[problem.dim], len(node))
-    near = node[
-        cKDTree(places.T).query(problem.chart.places.T, k=count)[1].reshape(problem.contacts, count)
-    ]
-    top = (pressure > 0) & (pressure >= pressure[near].max(axis=1))
-    chosen = np.flatnonzero(top)
-    return chosen[np.argsort(-pressure[chosen], kind="stable")[:MOST_PEAKS]]
-
-
-def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Places (dim - 1, m) of the whole surface with all mirror images and once around closed lines,
-    and the contact of each.
-    """
-    chart = problem.chart
-    if chart.period is None:
-        return chart.images()
-    shifts = chart.period * np.array([-1.0, 0.0, 1.0])
-    places = (chart.places[0] + shifts[:, None]).reshape(1, -1)
-    return places, np.tile(np.arange(problem.contacts), 3)
-
-
-def _fitted_top(
-    problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
-) -> tuple[float, float, np.ndarray, float]:
-    """Value and uncertainty of the pressure near a node, the contacts next to it, and their
-    distance.
-
-    Beside an axis the value is that of the widest fit that agrees with all narrower ones within
-    their uncertainties (after Lepski): the nodes next to the axis are poor, and those farther away
-    mend a smooth pressure.
-    """
-    count, widest = FITTED[problem.dim], 0
-    if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
-        widest = len(_surroundings(problem)[1])
-    narrowest = _fit_to(count, problem, pressure, usable, top)
-    found: list[tuple[float, float]] = []
-    value, doubt = narrowest[:2]
-    while np.isfinite(doubt) and all(
-        abs(value - other) <= doubt + around for other, around in found
-    ):
-        found.append((value, doubt))
-        count *= 2
-        if count > widest:
-            break
-        value, doubt = _fit_to(count, problem, pressure, usable, top)[:2]
-    return *(found[-1] if found else (narrowest[0], narrowest[0])), *narrowest[2:]
-
-
-def _fit_to(
-    count: int, problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
-) -> tuple[float, float, np.ndarray, float]:
-    """As _fitted_top, from a quadratic fit to the square of the pressure at `count` contacts.
-
-    The uncertainty is infinite where these are too few, or not all pressed.
-    """
-    places, node = _surroundings(problem)
-    offset = places - problem.chart.places[:, [top]]
-    distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
-    near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
-    own, nodal = np.unique(node[near]), float(pressure[top])
-    reach = float(distance[near].max(initial=0.0))
-    size = reach / max(len(near) / 2, 1) ** (1 / len(places)) or float(
-        problem.areas[top] ** (1 / len(places))
+def _read_pair(read: Reader, number: int, reduction: Reduction, solution: Solution) -> Reading:
+    """A reading of one pair of surfaces, with contacts numbered as in the whole scene."""
+    first, found = (
+        reduction.problem.pairs[number].start,
+        read(*views(reduction, solution)[number]),
     )
-    # with a first coordinate of 1
-    powers = list(combinations_with_replacement(range(len(places) + 1), 2))
-    if len(near) <= len(powers) or not np.all(pressure[node[near]] > 0):
-        return nodal, np.inf, own, size  # too few contacts to know
-    terms = np.concatenate([np.ones((1, len(near))), offset[:, near] / reach])
-    terms = np.array([terms[i] * terms[j] for i, j in powers]).T
-    square, root = (
-        pressure[node[near]] ** 2,
-        np.sqrt(problem.areas[node[near]] / problem.areas[node[near]].mean()),
-    )
-    fit = np.linalg.lstsq(terms * root[:, None], square * root, rcond=None)[0]
-    left = (terms @ fit - square) * root
-    inner = terms[distance[near] <= reach / 2]
-    value = float(np.sqrt(max((inner @ fit).max(), 0.0)))
-    value = (
-        max(value, _stationary(fit, powers, len(places)) or 0.0)
-        if not _outermost(offset[:, near])
-        else nodal
-    )
-    scatter = float(np.sqrt(np.sum(left**2) / (len(near) - len(powers))))
-    at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
-    at_top *= min(
-        1.0, float(np.sqrt(problem.areas[top] / problem.areas[node[near]].mean()))
-    )  # rings at an axis bear little
-    return value, max(scatter, at_top) / (2 * value or 1.0), own, size
+    peaks = tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks)
+    return replace(found, peaks=peaks)
 
 
-def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> float | None:
-    """The root of a quadratic polynomial at its top, if it has one within half the fitted nodes;
-    powers as in _fitted_top().
-    """
-    H = np.zeros((dim + 1, dim + 1))
-    for coefficient, (i, j) in zip(fit, powers):
-        H[i, j] += coefficient / 2
-        H[j, i] += coefficient / 2
-    if np.any(np.linalg.eigvalsh(H[1:, 1:]) >= 0):
-        return None
-    at = -np.linalg.solve(H[1:, 1:], H[1:, 0])
-    top = float(H[0, 0] + H[0, 1:] @ at)
-    return float(np.sqrt(top)) if np.linalg.norm(at) <= 0.5 and top > 0 else None
+def _of_scene(
+    slopes: Callable[[State], Seeds], reader: Reader | None = None
+) -> Callable[[str, str, Scene], Quantity]:
+    """A row whose quantity takes nothing but its name."""
+    return lambda name, rest, scene: Quantity(name, slopes, reader)
 
 
-def at_rim(reduction: Reduction, solution: Solution) -> bool:
-    """Whether the largest pressure is at the rim of the candidate surface, where it may be
-    infinite.
+def _pair_force(name: str, rest: str, scene: Scene) -> Quantity:
+    column, sign = (0, 1.0) if name.startswith("normal_force") else (1, -1.0)
+    if rest:
+        _check_pair(rest, scene)
 
-    A node inside has neighbours in all directions.
+    def slopes(state: State) -> Seeds:
+        weights = np.zeros(state.problem.q.shape)
+        weights[_contacts(state, rest) if rest else slice(None), column] = sign
+        return Functional(weights)(state)
 
-    Parameters
-    ----------
-    reduction : A reduced scene with one pair of surfaces.
-    solution : Of its problem.
-
-    Returns
-    -------
-    bool
-    """
-    problem = reduction.problem
-    top = int(np.argmax(nodal_pressure(problem, solution)))
-    offsets = _surroundings(problem)[0] - problem.chart.places[:, [top]]
-    return _outermost(offsets[:, np.argsort(np.linalg.norm(offsets, axis=0), kind="stable")[:9]])
+    return Quantity(name, slopes)
 
 
-def _outermost(offsets: np.ndarray) -> bool:
-    """Whether the nodes (dim - 1, m) around a node all lie on one side of it."""
-    if len(offsets) == 1:
-        return bool((offsets > 0).any() != (offsets < 0).any())
-    near = offsets[:, np.any(offsets != 0, axis=0)]
-    angles = np.sort(np.arctan2(near[1], near[0]))
-    return bool(
-        np.max(np.diff(np.append(angles, angles[:1] + 2 * np.pi)), initial=0.0) > 0.8 * np.pi
-    )
+def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
+    pair, _, component = rest.rpartition(":")
+    _check_pair(pair, scene)
+    if component not in scene.components:
+        raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")
+
+    def slopes(state: State) -> Seeds:
+        axis = np.eye(scene.dim)[scene.components.index(component)]
+        for plane in state.reduction.planes:  # mirror images balance each other across it
+            axis = axis - plane.inward * (plane.inward @ axis)
+        if scene.kind == "axisymmetric" and component == "r":
+            axis = 0 * axis
+        weights, own = np.zeros(state.problem.q.shape), _contacts(state, pair)
+        weights[own] = state.reduction.frames[own] @ axis
+        return Functional(weights)(state)
+
+    return Quantity(name, slopes)
 
 
-def width(reduction: Reduction, solution: Solution) -> float:
-    """Half-width of the contact zone of a scene with one pair of surfaces, as contact_zone() reads
-    it [length].
-
-    Parameters
-    ----------
-    reduction : a reduced scene with one pair of surfaces
-    solution : of its problem
-
-    Returns
-    -------
-    The half-width [length].
-    """
-    return width_reading(reduction, solution).value
+def _check_pair(name: str, scene: Scene) -> None:
+    names = [pair.name for pair in scene.pairs]
+    if name not in names:
+        raise InputError(f"there is no contact '{name}', only {', '.join(names)}.")
 
 
-def width_reading(reduction: Reduction, solution: Solution) -> Reading:
-    """Read the half-width of the contact zone with its uncertainty.
-
-    Parameters
-    ----------
-    reduction : A reduced scene with one pair of surfaces.
-    solution : Of its problem.
-
-    Returns
-    -------
-    The half-width [length].
-
-    Raises
-    ------
-    InputError : If the scene has several pairs of surfaces.
-    """
-    _one_pair(reduction)
-    problem, r = reduction.problem, solution.reactions
-    touching = contact_status(problem, r).touching
-    missing = "" if touching.any() else "nothing touches, so that the zone of contact has no width"
-    return Reading(
-        *contact_zone(reduction.scene, problem, r), _edges_of(problem, touching), missing
-    )
+def _contacts(state: State, name: str) -> slice:
+    return next(pair.contacts for pair in state.problem.pairs if pair.name == name)
 
 
-def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]:
-    """The contacts on both sides of the edge of a zone, as one peak; none where the zone has no
-    edge.
-    """
-    places, node = _surroundings(problem)
-    count = min(NEIGHBOURS[problem.dim], len(node))
-    near = node[
-        cKDTree(places.T).query(problem.chart.places.T, k=count)[1].reshape(problem.contacts, count)
-    ]
-    edge = np.flatnonzero(np.any(inside[near] != inside[:, None], axis=1))
-    if not len(edge):
-        return ()
-    return (Peak(0.0, 0.0, problem.coordinates[:, edge[0]], 0.0, edge),)
+def _at_place(place: Any, state: State) -> Seeds:
+    if place.kind == "pressure":
+        return Functional(pressure_weights(place, state.reduction))(state)
+    return stress_seeds(place, state)
 
 
-def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """Half-width of the stick zone of a scene with one pair of surfaces, and its uncertainty, as
-    stick_edge() reads them [length].
-
-    Parameters
-    ----------
-    reduction : a reduced scene with one pair of surfaces
-    solution : of its problem
-
-    Returns
-    -------
-    The half-width and its uncertainty [length].
-    """
-    _one_pair(reduction)
-    problem = reduction.problem
-    slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
-    return stick_edge(reduction.scene, problem, solution.reactions, slip)
-
-
-def stick_reading(reduction: Reduction, solution: Solution) -> Reading:
-    """Read the half-width of the stick zone over that of contact, with its uncertainty.
-
-    Parameters
-    ----------
-    reduction : A reduced scene with one pair of surfaces.
-    solution : Of its problem.
-
-    Returns
-    -------
-    The ratio [-].
-
-    Raises
-    ------
-    InputError : If the scene has several pairs of surfaces.
-    """
-    edge = width_reading(reduction, solution)
-    if edge.missing:
-        return replace(edge, value=0.0)
-    stick, uncertainty = stick_width(reduction, solution)
-    status = contact_status(reduction.problem, solution.reactions)
-    ratio, own = stick / edge.value, uncertainty / edge.value
-    if status.slip.any() and status.stick.any():
-        own += ratio * edge.uncertainty / edge.value
-    return Reading(ratio, own, (*_edges_of(reduction.problem, status.stick), *edge.peaks))
-
-
-def _one_pair(reduction: Reduction) -> None:
-    """InputError if a scene has several pairs of surfaces, each with numbers of its own."""
-    if len(reduction.problem.pairs) > 1:
+def _motion(state: State, component: int) -> Seeds:
+    problem, lam = state.problem, state.solution.multipliers
+    near = approach(problem, state.solution)
+    if len(lam) == 0 or (component == 0 and near is None):
         raise InputError(
-            f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces,"
-            " each with its own pressure and half-widths; name the pair, as in 'pressure:"
-            + reduction.problem.pairs[0].name
-            + "', or ask for the energy."
+            f"scene '{state.reduction.scene.name}' has no plate, hence no approach and no shift, or"
+            " surfaces around a body, which have no mean normal; ask for another quantity."
+        )
+    rows = problem.V.reshape(problem.contacts, problem.dim, -1)[:, component]
+    weights = np.average(rows, axis=0, weights=problem.areas) * (-1.0 if component == 0 else 1.0)
+    value = float(weights @ lam) if component or near is None else near
+    return Seeds(value, multipliers=weights)
+
+
+def _pressure_at(state: State, number: int) -> Seeds:
+    problem = state.problem
+    if number >= problem.contacts or not problem.areas[number] > 0:
+        raise InputError(
+            "pressure:CONTACT needs the number of a contact with an area, 0 to"
+            f" {problem.contacts - 1}; got {number}."
+        )
+    weights = np.zeros(problem.q.shape)
+    weights[number, 0] = 1 / problem.areas[number]
+    return Functional(weights)(state)
+
+
+def _energy(state: State) -> Seeds:
+    reduction, by_r, by_U = state.reduction, np.zeros(state.problem.q.shape), []
+    for number, (body, B) in enumerate(zip(reduction.bodies, reduction.maps)):
+        own, by_force = body.energy_gradient(state.displaced[number], state.forces[number])
+        by_r += (B @ by_force).reshape(by_r.shape)
+        if np.any(own):
+            by_r += state.following(number, own)
+        by_U.append(own)
+
+    def explicit(which: Parameter) -> float:
+        if which.kind not in MATERIAL:
+            return 0.0
+        parts = zip(reduction.scene.parts, reduction.bodies, state.displaced, state.forces)
+        return sum(
+            body.energy_change(which.kind, U, F)
+            for part, body, U, F in parts
+            if which.concerns(part)
         )
 
-
-def _approach(reduction: Reduction, solution: Solution) -> Reading:
-    value = approach(reduction.problem, solution)
-    if value is None:
-        raise InputError(
-            f"scene '{reduction.scene.name}' has no plate, hence no approach; ask for another"
-            " quantity."
-        )
-    return Reading(value)
+    value = elastic_energy(reduction, state.solution)
+    return Seeds(value, by_r, bodies=tuple(by_U), explicit=explicit)
 
 
-# name -> function of a reduction and its solution
-READINGS: dict[str, Callable[[Reduction, Solution], Reading]] = {
-    "pressure": pressure_reading,
-    "width": width_reading,
-    "approach": _approach,
-    "stick": stick_reading,
-    "energy": lambda *solved: Reading(elastic_energy(*solved)),
+def _read_energy(reduction: Reduction, solution: Solution) -> Reading:
+    return Reading(elastic_energy(reduction, solution))
+
+
+# kind of a quantity -> what may follow its name, and a function of name, what follows, and scene
+ROWS: dict[str, tuple[str, Callable[[str, str, Scene], Quantity]]] = {
+    "pressure": ("[:PAIR]", _of_pair(pressure_reading)),
+    "width": ("[:PAIR]", _of_pair(width_reading)),
+    "approach": ("", _of_scene(partial(_motion, component=0))),
+    "stick": ("[:PAIR]", _of_pair(stick_reading)),
+    "energy": ("", _of_scene(_energy, _read_energy)),
+    "shift": ("", _of_scene(partial(_motion, component=1))),
+    "normal_force": ("[:PAIR]", _pair_force),
+    "shear_force": ("[:PAIR]", _pair_force),
+    "resultant": (":PAIR:COMPONENT", _pair_resultant),
 }
-# these belong to a surface, not to the scene as a whole
-OF_ONE_PAIR = ("pressure", "width", "stick")
-
-
-def value_of(name: str, reduction: Reduction, solution: Solution) -> float:
-    """The value of one of READINGS, in its unit.
-
-    Parameters
-    ----------
-    name : one of READINGS
-    reduction : a reduced scene with one pair of surfaces
-    solution : of its problem
-
-    Returns
-    -------
-    The value.
-    """
-    return READINGS[name](reduction, solution).value
+NAMES = (*(f"{kind}{form}" for kind, (form, _) in ROWS.items()), *PLACED)

@@ -11,30 +11,19 @@ from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.resultants import views
 
-FEWEST = (
-    # elements across the half-width of contact; with so few the largest pressure is some percent
-    # off (reports/hertz)
-    4
-)
+# elements across the half-width of contact; with so few the largest pressure is some percent off
+# (reports/hertz)
+FEWEST = 4
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Tell of zones of contact that are smaller than the mesh can show, or reach the other
-    surface's rim.
+    """Full sentences on zones of contact that are smaller than the mesh can show, or reach the
+    other surface's rim; none if every zone is resolved, and for solutions that are not certified.
 
     A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across
     its half-width is told. A surface that touches as a whole has no such zone. Contacts at the rim
     of the other surface are told, since only a part of their faces bears the force.
-
-    Parameters
-    ----------
-    reduction : A reduced scene.
-    solution : Of its problem.
-
-    Returns
-    -------
-    Full sentences; empty if every zone is resolved, and for solutions that are not certified.
     """
     if not solution.solved:
         return ()
@@ -67,16 +56,8 @@ def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
 
 
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
-    """Find the pairs of surfaces whose zone of contact is smaller than the mesh can show.
-
-    Parameters
-    ----------
-    reduction : A reduced scene.
-    solution : Of its problem.
-
-    Returns
-    -------
-    Name and number of contacts of each such pair, with the numbers of those that touch.
+    """The pairs of surfaces whose zone of contact is smaller than the mesh can show: name and
+    number of contacts of each, with the numbers of those that touch.
     """
     found = []
     for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status
-from contactopt.readings.quantities import stick_width, width
+from contactopt.readings.edges import contact_edge, stick_width
+from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.scene import COMPONENTS
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
@@ -22,7 +22,9 @@ ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
-    """A force (dim,) and its moment about the origin: (1,) about the third axis in 2D, (3,) in 3D."""
+    """A force (dim,) and its moment about the origin, in 2D (1,) about the third axis, in space
+    (3,).
+    """
 
     force: np.ndarray
     moment: np.ndarray
@@ -33,28 +35,14 @@ class Resultant:
         return {"force": self.force.tolist(), "moment": self.moment.tolist()}
 
 
-def _resultant(
-    points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]
-) -> Resultant:
-    """Compute the resultant of nodal forces, those of all mirror images together or of whole rings.
-
-    Mirror images across `planes` and the parts of a ring balance each other but for what acts along
-    the planes and along the axis.
-
-    Parameters
-    ----------
-    points : (dim, m) where the forces act [length].
-    forces : (dim, m) nodal forces, those of all mirror images together or of whole rings [force].
-    axisymmetric : Whether the points stand for rings, with components r and z.
-    planes : The planes of symmetry.
-
-    Returns
-    -------
-    The force and its moment about the origin.
+def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> Resultant:
+    """The resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images
+    together or of whole rings, with components r and z. Mirror images across `planes` and the parts
+    of a ring balance each other but for what acts along the planes and along the axis.
     """
-    if axisymmetric:
+    if reduction.scene.kind == "axisymmetric":
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
-    for plane in planes:
+    for plane in reduction.planes:
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
         points = np.hstack([points, points - 2 * n * apart])
         forces = np.hstack([forces, forces - 2 * n * (plane.inward @ forces)]) / 2
@@ -64,17 +52,9 @@ def _resultant(
 
 
 def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
-    """Find the planes beyond which mirror images make the bodies whole.
-
-    Parameters
-    ----------
-    reduction : A reduced scene.
-
-    Returns
-    -------
-    {"axis": name of a coordinate, "place": [length]} for every plane. The axis of revolution counts
-    as one in its section. The list is empty where the bodies are whole, and where a plane does not
-    lie across an axis.
+    """The planes beyond which mirror images make the bodies whole, each as {"axis": name of a
+    coordinate, "place": [length]}. The axis of revolution counts as one in its section. The list is
+    empty where the bodies are whole, and where a plane does not lie across an axis.
     """
     scene = reduction.scene
     if scene.kind == "axisymmetric":
@@ -84,86 +64,42 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
         axis = int(np.argmax(np.abs(plane.inward)))
         if abs(plane.inward[axis]) < 1 - ALONG:
             return []
-        made.append(
-            {
-                "axis": scene.components[axis],
-                "place": float(plane.offset / plane.inward[axis]) + 0.0,
-            }
-        )
+        place = float(plane.offset / plane.inward[axis]) + 0.0
+        made.append({"axis": scene.components[axis], "place": place})
     return made if 2 ** len(made) == scene.copies else []
 
 
 def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
-    """Turn the contact forces on the upper bodies into the coordinates of space.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene, with the frames of its k contacts.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    (dim, k) contact forces [force].
-    """
+    """(dim, k) contact forces on the upper bodies in the coordinates of space [force]."""
     return np.asarray(np.einsum("kad,ka->dk", reduction.frames, solution.reactions))
 
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """Compute for every pair of surfaces the resultant of the contact forces on its upper body.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    The resultants by the names of the pairs.
+    """For every pair of surfaces, by its name, the resultant of the contact forces on its upper
+    body.
     """
     forces, points = space_forces(reduction, solution), reduction.problem.coordinates
-    ring, planes = reduction.scene.kind == "axisymmetric", reduction.planes
     return {
-        pair.name: _resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
+        pair.name: _resultant(reduction, points[:, pair.contacts], forces[:, pair.contacts])
         for pair in reduction.problem.pairs
     }
 
 
 def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """Compute for every support and plate the resultant of its forces on the body.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    The resultants by names such as "body 'block', support 'bottom'".
+    """For every support and plate the resultant of its forces on the body, by names such as "body
+    'block', support 'bottom'".
     """
-    ring, planes = reduction.scene.kind == "axisymmetric", reduction.planes
-    found = {}
-    displaced = reduction.displaced(solution)
+    found, displaced = {}, reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        for name, (points, forces) in body.held_by(U, B.T @ solution.reactions.ravel()).items():
-            found[f"body '{body.name}', {name}"] = _resultant(points, forces, ring, planes)
+        for name, held in body.held_by(U, B.T @ solution.reactions.ravel()).items():
+            found[f"body '{body.name}', {name}"] = _resultant(reduction, *held)
     return found
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """Take the reduction and solution of every pair of surfaces by itself, for readers of its
-    surface.
-
-    A view has no displacements of the bodies, since these need the forces of all pairs.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    A reduction and a solution for each pair. Where there is one pair only, they are those of the
-    scene.
+    """The reduction and solution of every pair of surfaces by itself, for readers of its surface;
+    those of the scene where there is one pair only. A view has no displacements of the bodies,
+    since these need the forces of all pairs.
     """
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]
@@ -175,16 +111,8 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
 
 
 def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
-    """Put the contact force of every pair into words: normal forces of a curved surface add up to
-    more than it.
-
-    Parameters
-    ----------
-    summary : Of a result, with its `kind` and `pairs`.
-
-    Returns
-    -------
-    For the name of each pair the components of the force on its upper body, without their unit.
+    """For the name of each pair the components of the force on its upper body, without their unit,
+    from the summary of a result: normal forces of a curved surface add up to more than it.
     """
     axes = COMPONENTS[summary["kind"]]
     words = {}
@@ -197,29 +125,20 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
 
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
-    """Make the tables `pairs` and `holders` of a summary.
-
-    Parameters
-    ----------
-    reduction : The reduction of the scene.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    'pairs': for each pair of surfaces its resultant, normal force [force], largest pressure
-    [stress], half-widths [length], coupling and counts of contacts. 'holders': the resultant of
-    each support and plate.
+    """The tables of a summary. 'pairs': for each pair of surfaces its resultant, normal force
+    [force], largest pressure [stress], half-widths [length], coupling and counts of contacts.
+    'holders': the resultant of each support and plate.
     """
     pairs = {}
     for (view, own), (name, found) in zip(
         views(reduction, solution), pair_resultants(reduction, solution).items()
     ):
         problem, r = view.problem, own.reactions
-        status, loaded = contact_status(problem, r), problem.areas > 0
+        status = contact_status(problem, r)
         pairs[name] = found.table | {
             "normal_force": float(r[:, 0].sum()),
-            "max_pressure": float((r[loaded, 0] / problem.areas[loaded]).max(initial=0.0)),
-            "contact_half_width": width(view, own),
+            "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
+            "contact_half_width": contact_edge(view.scene, problem, r),
             "stick_half_width": stick_width(view, own)[0],
             "coupling": view.coupling.kind,
             "carrier": view.coupling.carrier,

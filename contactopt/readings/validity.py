@@ -32,7 +32,7 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 
 def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(k,) longest edge of the cells around each contact [length]; infinite where there are none."""
+    """(k,) longest edge of the cells around each contact [length]; infinite without any."""
     size = np.zeros(points.shape[1])
     for own, other in zip(cells, np.roll(cells, 1, axis=0)):
         length = np.linalg.norm(points[:, own] - points[:, other], axis=0)
@@ -44,16 +44,9 @@ def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
 def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], list[str]]:
     """Measure how far an answer goes beyond what is assumed.
 
-    Parameters
-    ----------
-    reduction : A reduced scene.
-    solution : A solution of its problem.
-
-    Returns
-    -------
-    The table `bodies` of a summary, with the imbalance, strain and rotation of every body, and that
-    of the pairs, with slip and closure over the size of the facets and the misfit; and one sentence
-    for every value beyond its bound.
+    Returned are the table `bodies` of a summary, with the imbalance, strain and rotation of every
+    body, and that of the pairs, with slip and closure over the size of the facets and the misfit;
+    and one sentence for every value beyond its bound.
     """
     displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
     bodies: dict[str, dict[str, float]] = {}
@@ -62,9 +55,8 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     scale = np.zeros(len(moved))
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
         known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
-        remarks += [
-            _beyond(key, f"body '{body.name}'", known[key]) for key in ("strain", "rotation")
-        ]
+        for key in ("strain", "rotation"):
+            remarks += _beyond(key, f"body '{body.name}'", known[key])
         if known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
                 f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces"
@@ -83,34 +75,31 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         closure = np.where(made.gap > SHARE * extent, made.gap / size, 0.0)
         # the others open as they slip
         close = status.stick[own] if reduction.problem.law.dilatant else touching
-        misfit = np.abs(moved[own, 0])[close].max(initial=0.0) / max(
-            scale[own].max(initial=0.0), 1e-300
-        )
-        found = {"slip": slip, "closure": closure}
-        pairs[pair.name] = {
-            key: float(value[touching].max(initial=0.0)) for key, value in found.items()
+        missed = np.abs(moved[own, 0])[close].max(initial=0.0)
+        misfit = float(missed / max(scale[own].max(initial=0.0), 1e-300))
+        largest = pairs[pair.name] = {
+            "slip": float(slip[touching].max(initial=0.0)),
+            "closure": float(closure[touching].max(initial=0.0)),
+            "misfit": misfit,
         }
-        remarks += [
-            _beyond(key, f"pair '{pair.name}'", value) for key, value in pairs[pair.name].items()
-        ]
-        pairs[pair.name]["misfit"] = float(misfit)
+        for key in ("slip", "closure"):
+            remarks += _beyond(key, f"pair '{pair.name}'", largest[key])
         if solution.solved and misfit > BOUNDS["misfit"]:
             remarks.append(
                 f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other"
                 f" by {misfit:.1e} of their displacement: a body is so thin or so weakly held that"
                 " rounding moves it."
             )
-    return {"bodies": bodies, "pairs": pairs}, [remark for remark in remarks if remark]
+    return {"bodies": bodies, "pairs": pairs}, remarks
 
 
-def _beyond(key: str, where: str, value: float) -> str:
-    """The sentence for a value beyond its bound, or an empty text."""
+def _beyond(key: str, where: str, value: float) -> list[str]:
+    """The sentence for a value beyond its bound, if it is."""
     if value <= BOUNDS[key]:
-        return ""
-    what = {"slip": "slips by up to", "closure": "closes a gap of up to"}.get(
-        key, f"has a {key} of up to"
-    )
-    return (
+        return []
+    known = {"slip": "slips by up to", "closure": "closes a gap of up to"}
+    what = known.get(key, f"has a {key} of up to")
+    return [
         f"displacements are assumed to be small, but {where} {what} {value:.3g}{UNITS[key]}, more"
         f" than {BOUNDS[key]:g}: read the answer as a first step at most."
-    )
+    ]

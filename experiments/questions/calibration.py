@@ -12,10 +12,10 @@ import numpy as np
 
 import contactopt
 from contactopt import HalfSpace, Material, plots
-from contactopt.derivatives.outputs import seeds_of
-from contactopt.derivatives.parameters import parameter, put_all
 from contactopt.derivatives.states import along, solved_chain
 from contactopt.problem.contact_status import contact_status
+from contactopt.readings.quantities import seeds_of
+from contactopt.scenes.parameters import parameter, put_all
 from experiments.report import write
 
 E, MU, FORCE = 5.0, 0.5, 100.0  # MPa, -, N

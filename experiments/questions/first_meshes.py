@@ -33,7 +33,7 @@ from contactopt import (
     load_mesh,
 )
 from contactopt.accuracy import refine
-from contactopt.derivatives.outputs import find_quantity
+from contactopt.readings.quantities import find_quantity
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.adaptivity.parts import rounded, save

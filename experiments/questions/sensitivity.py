@@ -15,12 +15,12 @@ import numpy as np
 import contactopt
 from contactopt import InterfaceProblem, Solution, Status, natural_map_residual, scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.derivatives.outputs import seeds_of
-from contactopt.derivatives.parameters import parameters
 from contactopt.derivatives.states import chain_of
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.readings.quantities import seeds_of
+from contactopt.scenes.parameters import parameters
 from contactopt.solving.solve_scene import Solved
 from experiments.report import REPORTS, environment, merged, write
 

@@ -12,7 +12,7 @@ from typing import Any
 from contactopt import Scene, analytic
 from contactopt.accuracy import Estimate, refine
 from contactopt.accuracy.marking import divisible, with_bent_edges
-from contactopt.derivatives.outputs import find_quantity
+from contactopt.readings.quantities import find_quantity
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 from experiments.questions.adaptivity.parts import STEEL, ball, bearing, bracket, pin_in_bush

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from contactopt import reduce_bodies, scenes, solve
-from contactopt.readings.quantities import stick_width
+from contactopt.readings.edges import stick_width
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
 from contactopt.solving.follow import follow

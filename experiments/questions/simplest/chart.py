@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from contactopt import HalfSpace, Part, Rigid, Scene, Support, analytic
 from contactopt.accuracy import refine
 from contactopt.meshes.structured import contact_grid, graded, rename, tensor_mesh
-from contactopt.readings.quantities import peak_pressure
+from contactopt.readings.quantities import value_of
 from contactopt.scenes.common import RUBBER
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
@@ -72,7 +72,7 @@ def half_plane(count: float, force: float) -> Answer:
 def solved(scene: Scene) -> Answer:
     """Unknowns and peak pressure."""
     found = solve_scene(scene)
-    return found.reduction.dofs, peak_pressure(found.reduction, found.solution)
+    return found.reduction.dofs, value_of("pressure", found.reduction, found.solution)
 
 
 def adaptive(goal: float, force: float) -> Answer:

@@ -29,8 +29,7 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.errors import InputError
-from contactopt.material import Material
-from contactopt.scenes.scene import BodyForce, HalfSpace, Plate, Rigid, Scene, Support, Traction
+from contactopt.scenes.scene import BodyForce, Plate, Scene, Support, Traction
 
 MATERIAL = ("E", "nu")
 LOADS = ("force", "displacement", "traction", "weight")
@@ -43,6 +42,15 @@ FORM = {
     "traction": "traction:BODY:BOUNDARY:COMPONENT",
     "weight": "weight:BODY:COMPONENT",
 }
+
+
+ITEMS: dict[str, Any] = {
+    "force": Plate,
+    "displacement": Support,
+    "traction": Traction,
+    "weight": BodyForce,
+}
+Entry = tuple[str, Mapping[str, float]]  # name of a field, and its components
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ class Parameter:
 
     def read(self, scene: Scene) -> float:
         """Its value in a scene; InputError where it does not enter."""
-        found = [value for part in scene.parts for value in self._values(part, scene)]
+        found = [value for part in scene.parts for value in self._in_part(part, scene)[0]]
         if self.kind == "mu":
             found = [self._friction(pair) for pair in self.pairs(scene)]
         if not found:
@@ -89,7 +97,7 @@ class Parameter:
         """The scene with another value of the parameter; its meshes stay as they are."""
         self.read(scene)
         if self.kind != "mu":
-            return scene.with_parts(lambda part: self._changed(part, scene, value))
+            return scene.with_parts(lambda part: self._in_part(part, scene, value)[1])
         if scene.upper is not None:
             return replace(scene, mu=value)
         named = {pair.name for pair in self.pairs(scene)}
@@ -100,11 +108,8 @@ class Parameter:
 
     def pairs(self, scene: Scene) -> list[Any]:
         """The pairs of surfaces whose friction it is."""
-        return [
-            pair
-            for pair in scene.pairs
-            if self.owner in ("", pair.name) and pair.law not in ("frictionless", "tied")
-        ]
+        rough = [pair for pair in scene.pairs if pair.law not in ("frictionless", "tied")]
+        return [pair for pair in rough if self.owner in ("", pair.name)]
 
     def _friction(self, pair: Any) -> float:
         if np.ndim(pair.mu) or callable(pair.mu):
@@ -114,95 +119,67 @@ class Parameter:
             )
         return float(pair.mu)
 
-    def _values(self, part: Any, scene: Scene) -> list[float]:
-        """Its values in one body: none or one, unless the name is ambiguous."""
+    def _in_part(
+        self, part: Any, scene: Scene, value: float | None = None
+    ) -> tuple[list[float], Any]:
+        """Its values in one body, none or one unless the name is ambiguous, and the body with
+        another value.
+        """
+        material: Any = getattr(part, "material", None)
+        if not self.concerns(part) or (self.kind in MATERIAL and material is None):
+            return [], part
         if self.kind in MATERIAL:
-            named = self.owner in ("", part.name) and not isinstance(part, Rigid)
-            return [float(getattr(part.material, self.kind))] if named else []
-        if self.kind not in LOADS or part.name != self.owner:
-            return []
-        if isinstance(part, (Rigid, HalfSpace)):
-            held: Mapping[str, float] = (
-                part.force if self.kind == "force" else part.displacement
-            ) or {}
-            movable = (
-                self.kind == "displacement"
-                and self.component not in (part.force or {})
-                and not self.boundary
-            )
-            given = self.kind == "force" and self.component in held
-            return [float(held.get(self.component, 0.0))] if given or movable else []
-        place = scene.components.index(self.component)
-        return [
-            self._value_of(item, scene, place)
-            for item in (*part.supports, *part.loads)
-            if self._is(item)
-        ]
+            if value is not None:
+                check_number(self.kind, value)
+                part = replace(part, material=replace(material, **{self.kind: value}))
+            return [float(getattr(material, self.kind))], part
+        if not hasattr(part, "supports"):
+            return self._in_item(part, self._held_as_one(part), value)
+        found: list[float] = []
+        changes = {}
+        for name in ("supports", "loads"):
+            items = getattr(part, name)
+            rows = [self._in_item(item, self._entry(item, scene), value) for item in items]
+            found += [known for own, _ in rows for known in own]
+            changes[name] = tuple(item for _, item in rows)
+        return found, replace(part, **changes) if found and value is not None else part
 
-    def _is(self, item: Any) -> bool:
-        """Whether a support or load of the body is the one that is meant."""
-        kind = {"force": Plate, "displacement": Support, "traction": Traction, "weight": BodyForce}[
-            self.kind
-        ]
-        if not isinstance(item, kind):
-            return False
-        if isinstance(item, Plate):
-            return self.component in item.force and self.boundary in ("", item.boundary)
-        if isinstance(item, Support):
-            known = item.displacement is None or self.component in item.displacement
-            return known and item.boundary == self.boundary
-        return isinstance(item, BodyForce) or (
-            isinstance(item, Traction) and item.boundary == self.boundary
-        )
+    def _in_item(self, item: Any, entry: Entry | None, value: float | None) -> tuple[list, Any]:
+        """Its value in what holds or loads a body, and that with another value."""
+        if entry is None or self.component not in entry[1]:
+            return [], item
+        field, held = entry
+        if value is not None:
+            made = dict(held) | {self.component: value}
+            item = replace(item, **{field: tuple(made.values()) if field == "value" else made})
+        return [float(held[self.component])], item
 
-    def _value_of(self, item: Any, scene: Scene, place: int) -> float:
-        if isinstance(item, Plate):
-            return float(item.force[self.component])
-        if isinstance(item, Support):
-            return float((item.displacement or {}).get(self.component, 0.0))
-        return float(item.value[place])
+    def _held_as_one(self, part: Any) -> Entry | None:
+        """The field of a rigid body or a half-space that holds the parameter."""
+        force, held = part.force or {}, part.displacement or {}
+        if self.kind == "force":
+            return "force", force
+        if self.kind != "displacement" or self.boundary or self.component in force:
+            return None
+        return "displacement", {self.component: 0.0} | dict(held)
 
-    def _changed(self, part: Any, scene: Scene, value: float) -> Any:
-        if not self._values(part, scene):
-            return part
-        if self.kind in MATERIAL:
-            return replace(part, material=_material(part.material, self.kind, value))
-        if isinstance(part, (Rigid, HalfSpace)):
-            old = (part.force if self.kind == "force" else part.displacement) or {}
-            values = dict(old) | {self.component: value}
-            return (
-                replace(part, force=values)
-                if self.kind == "force"
-                else replace(part, displacement=values)
-            )
-        place = scene.components.index(self.component)
-
-        def put(item: Any) -> Any:
-            if not self._is(item):
-                return item
-            if isinstance(item, Plate):
-                return replace(item, force=dict(item.force) | {self.component: value})
-            if isinstance(item, Support):
-                held = (
-                    dict.fromkeys(scene.components, 0.0)
-                    if item.displacement is None
-                    else dict(item.displacement)
-                )
-                return replace(item, displacement=held | {self.component: value})
-            return replace(
-                item, value=tuple(value if i == place else v for i, v in enumerate(item.value))
-            )
-
-        return replace(
-            part, supports=tuple(map(put, part.supports)), loads=tuple(map(put, part.loads))
-        )
+    def _entry(self, item: Any, scene: Scene) -> Entry | None:
+        """The field of a support or load that holds the parameter; None if it is another one."""
+        there = self.boundary == getattr(item, "boundary", "")
+        if not isinstance(item, ITEMS[self.kind]):
+            return None
+        if self.kind == "force":
+            return ("force", item.force) if there or not self.boundary else None
+        if not there:
+            return None
+        if self.kind == "displacement":
+            fixed = dict.fromkeys(scene.components, 0.0)
+            return "displacement", fixed if item.displacement is None else item.displacement
+        return "value", dict(zip(scene.components, item.value))
 
     def _missing(self, scene: Scene) -> str:
-        names = (
-            [pair.name for pair in scene.pairs]
-            if self.kind == "mu"
-            else [part.name for part in scene.parts]
-        )
+        named: Any = scene.pairs if self.kind == "mu" else scene.parts
+        names = [one.name for one in named]
         if self.owner and self.owner not in names:
             return (
                 f"it has no {'contact' if self.kind == 'mu' else 'body'} '{self.owner}', only"
@@ -216,20 +193,9 @@ class Parameter:
 
 
 def parameter(name: Any, scene: Scene) -> Parameter:
-    """Find one parameter of a scene by its name.
+    """Find one parameter of a scene by its name, in the form that this module's head lists.
 
-    Parameters
-    ----------
-    name : A name in the form that this module's head lists.
-    scene : The scene that the parameter belongs to.
-
-    Returns
-    -------
-    The parameter.
-
-    Raises
-    ------
-    InputError : If the name is unknown or what it names does not enter the scene.
+    InputError if the name is unknown or what it names does not enter the scene.
     """
     if not isinstance(name, str) or not name:
         raise InputError(
@@ -257,20 +223,9 @@ def parameter(name: Any, scene: Scene) -> Parameter:
 
 
 def parameters(names: Any, scene: Scene) -> tuple[Parameter, ...]:
-    """Find the parameters of a scene by their names.
+    """Find the parameters of a scene by their names, one or several, in their order.
 
-    Parameters
-    ----------
-    names : One name or several, in the form that this module's head lists.
-    scene : The scene that they belong to.
-
-    Returns
-    -------
-    The parameters in the order of the names.
-
-    Raises
-    ------
-    InputError : If a parameter is named twice or does not enter the scene, or if none is named.
+    InputError if a parameter is named twice or does not enter the scene, or if none is named.
     """
     if isinstance(names, str):
         names = (names,)
@@ -281,22 +236,7 @@ def parameters(names: Any, scene: Scene) -> tuple[Parameter, ...]:
 
 
 def put_all(scene: Scene, values: Mapping[Parameter, float]) -> Scene:
-    """Give a scene other values of several parameters.
-
-    Parameters
-    ----------
-    scene : The scene, which stays as it is.
-    values : The values by their parameters, in the units of each.
-
-    Returns
-    -------
-    The scene with these values.
-    """
+    """Give a scene other values of several parameters, in the units of each."""
     for which, value in values.items():
         scene = which.put(scene, float(value))
     return scene
-
-
-def _material(old: Material, constant: str, value: float) -> Material:
-    check_number(constant, value)
-    return Material(value, old.nu) if constant == "E" else Material(old.E, value)

@@ -1,0 +1,215 @@
+"""The largest pressure, read so that its error falls smoothly with the mesh.
+
+A single node jumps from mesh to mesh, and the estimate of an error lives on differences between
+meshes: the value at a peak comes from a fit through several nodes, weighted by the nodal areas.
+Every reading says how uncertain it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations_with_replacement
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from contactopt.coupling.reduction import Reduction
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.chart import ON_PLANE
+from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
+
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """A local maximum of a quantity.
+
+    value        [its unit];   uncertainty  of the reading [its unit]
+    place        (dim,) [length];   size  distance of the nodes there [length]
+    contacts     (m,) numbers of the contacts from which it was read
+    body, elements  where it lies inside a body: the number of the body and the elements around it
+    """
+
+    value: float
+    uncertainty: float
+    place: np.ndarray
+    size: float
+    contacts: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    body: int = -1
+    elements: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A quantity as it is read from one solution.
+
+    value        [its unit];   uncertainty  of the reading alone, not of the solution [its unit]
+    peaks        of a largest value: its local maxima, the largest first; of an edge, the contacts
+                 next to it
+    missing      one sentence if the quantity does not exist in this solution
+    """
+
+    value: float
+    uncertainty: float = 0.0
+    peaks: tuple[Peak, ...] = ()
+    missing: str = ""
+
+
+def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
+    """Read the largest pressure of one pair of surfaces from a local fit around the node where it
+    is largest [stress].
+
+    The square of the pressure is quadratic under Hertz's ellipse, and near the top of any smooth
+    pressure. A quadratic polynomial is fitted to it through the few nodes around every local
+    maximum of the nodal pressures, with the nodal areas as weights. What the nodes scatter about
+    the fit is the uncertainty, so that the reading agrees with the nodal values within its own
+    error. Nodes on the axis of an axisymmetric mesh are left out: the strain u_r / r is poorly
+    resolved there, on a ring without area. At the rim of the contact surface the nodal value is
+    returned.
+    """
+    problem = reduction.problem
+    pressure = nodal_pressure(problem, solution)
+    if not np.any(pressure > 0):
+        return Reading(0.0, missing="nothing touches, so that there is no pressure")
+    usable = problem.areas > 0
+    if reduction.scene.kind == "axisymmetric":
+        radius = np.abs(problem.coordinates[0])
+        usable &= radius > ON_PLANE * radius.max(initial=0.0)
+    noise = solution.residual * float(np.linalg.norm(solution.reactions))
+    found = []
+    for top in _maxima(problem, np.where(usable, pressure, 0.0)):
+        value, uncertainty, near, size = _fitted_top(problem, pressure, usable, top)
+        uncertainty += noise / float(problem.areas[top])
+        found.append(Peak(value, uncertainty, problem.coordinates[:, top], size, near))
+    found.sort(key=lambda peak: -peak.value)
+    return Reading(found[0].value, found[0].uncertainty, tuple(found))
+
+
+def nodal_pressure(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
+    """Divide the normal forces by the nodal areas, (k,) [stress]; 0 at contacts without an area."""
+    forces = solution.reactions[:, 0]
+    return np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
+
+
+def neighbours(problem: InterfaceProblem) -> np.ndarray:
+    """(k, m) numbers of the contacts nearest to each, itself among them."""
+    places, node = _surroundings(problem)
+    count = min(NEIGHBOURS[problem.dim], len(node))
+    near = cKDTree(places.T).query(problem.chart.places.T, k=count)[1]
+    return np.asarray(node[near.reshape(problem.contacts, count)])
+
+
+def _maxima(problem: InterfaceProblem, pressure: np.ndarray) -> np.ndarray:
+    """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them
+    first, MOST_PEAKS at most.
+    """
+    largest = pressure[neighbours(problem)].max(axis=1)
+    chosen = np.flatnonzero((pressure > 0) & (pressure >= largest))
+    return chosen[np.argsort(-pressure[chosen], kind="stable")[:MOST_PEAKS]]
+
+
+def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Places (dim - 1, m) of the whole surface with all mirror images and once around closed lines,
+    and the contact of each.
+    """
+    chart = problem.chart
+    if chart.period is None:
+        return chart.images()
+    shifts = chart.period * np.array([-1.0, 0.0, 1.0])
+    places = (chart.places[0] + shifts[:, None]).reshape(1, -1)
+    return places, np.tile(np.arange(problem.contacts), 3)
+
+
+def _fitted_top(
+    problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
+) -> tuple[float, float, np.ndarray, float]:
+    """Value and uncertainty of the pressure near a node, the contacts next to it, and their
+    distance.
+
+    Beside an axis the value is that of the widest fit that agrees with all narrower ones within
+    their uncertainties (after Lepski): the nodes next to the axis are poor, and those farther away
+    mend a smooth pressure.
+    """
+    count, widest = FITTED[problem.dim], 0
+    if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
+        widest = len(_surroundings(problem)[1])
+    value, doubt, near, size = _fit_to(count, problem, pressure, usable, top)
+    best, found = (value, value), list[tuple[float, float]]()
+    while np.isfinite(doubt) and all(abs(value - v) <= doubt + around for v, around in found):
+        best = value, doubt
+        found.append(best)
+        count *= 2
+        if count > widest:
+            break
+        value, doubt = _fit_to(count, problem, pressure, usable, top)[:2]
+    return *best, near, size
+
+
+def _fit_to(
+    count: int, problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
+) -> tuple[float, float, np.ndarray, float]:
+    """As _fitted_top, from a quadratic fit to the square of the pressure at `count` contacts.
+
+    The uncertainty is infinite where these are too few, or not all pressed.
+    """
+    places, node = _surroundings(problem)
+    dim, offset = len(places), places - problem.chart.places[:, [top]]
+    distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
+    near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
+    own, nodal = np.unique(node[near]), float(pressure[top])
+    pressed, areas = pressure[node[near]], problem.areas[node[near]]
+    reach = float(distance[near].max(initial=0.0))
+    size = reach / max(len(near) / 2, 1) ** (1 / dim) or float(problem.areas[top] ** (1 / dim))
+    # with a first coordinate of 1
+    powers = list(combinations_with_replacement(range(dim + 1), 2))
+    if len(near) <= len(powers) or not np.all(pressed > 0):
+        return nodal, np.inf, own, size  # too few contacts to know
+    terms = np.concatenate([np.ones((1, len(near))), offset[:, near] / reach])
+    terms = np.array([terms[i] * terms[j] for i, j in powers]).T
+    square, root = pressed**2, np.sqrt(areas / areas.mean())
+    fit = np.linalg.lstsq(terms * root[:, None], square * root, rcond=None)[0]
+    left = float(np.linalg.norm((terms @ fit - square) * root))
+    scatter = left / (len(near) - len(powers)) ** 0.5
+    value = nodal
+    if not _outermost(offset[:, near]):
+        inner = terms[distance[near] <= reach / 2]
+        value = max(float((inner @ fit).max()), 0.0) ** 0.5
+        value = max(value, _stationary(fit, powers, dim))
+    at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
+    # rings at an axis bear little
+    at_top *= min(1.0, float(np.sqrt(problem.areas[top] / areas.mean())))
+    return value, max(scatter, at_top) / (2 * value or 1.0), own, size
+
+
+def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> float:
+    """The root of a quadratic polynomial at its top, if it has one within half the fitted nodes,
+    else 0; powers as in _fit_to().
+    """
+    H = np.zeros((dim + 1, dim + 1))
+    for coefficient, (i, j) in zip(fit, powers):
+        H[i, j] += coefficient / 2
+        H[j, i] += coefficient / 2
+    if np.any(np.linalg.eigvalsh(H[1:, 1:]) >= 0):
+        return 0.0
+    at = -np.linalg.solve(H[1:, 1:], H[1:, 0])
+    top = float(H[0, 0] + H[0, 1:] @ at)
+    return top**0.5 if np.linalg.norm(at) <= 0.5 and top > 0 else 0.0
+
+
+def at_rim(reduction: Reduction, solution: Solution) -> bool:
+    """Whether the largest pressure is at the rim of the candidate surface, where it may be
+    infinite: a node inside has neighbours in all directions.
+    """
+    problem = reduction.problem
+    top = int(np.argmax(nodal_pressure(problem, solution)))
+    offsets = _surroundings(problem)[0] - problem.chart.places[:, [top]]
+    return _outermost(offsets[:, np.argsort(np.linalg.norm(offsets, axis=0), kind="stable")[:9]])
+
+
+def _outermost(offsets: np.ndarray) -> bool:
+    """Whether the nodes (dim - 1, m) around a node all lie on one side of it."""
+    if len(offsets) == 1:
+        return bool((offsets > 0).any() != (offsets < 0).any())
+    near = offsets[:, np.any(offsets != 0, axis=0)]
+    angles = np.sort(np.arctan2(near[1], near[0]))
+    gaps = np.diff(np.append(angles, angles[:1] + 2 * np.pi))
+    return bool(np.max(gaps, initial=0.0) > 0.8 * np.pi)

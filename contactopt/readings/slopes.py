@@ -1,0 +1,127 @@
+"""Slopes of what is read from many forces: the pressure, and the half-widths of contact and stick.
+
+They are formulas over several forces. Their derivative by the force at each closed contact is a
+central difference of the reading, which solves nothing; what the parameters do to the forces is
+exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from contactopt.coupling.reduction import Reduction
+from contactopt.errors import InputError
+from contactopt.problem import Solution
+from contactopt.problem.laws.law import Law
+from contactopt.readings.edges import contact_edge, stick_edge
+from contactopt.readings.peaks import Reading
+from contactopt.readings.resultants import views
+from contactopt.readings.state import Seeds, State
+from contactopt.scenes.parameters import Parameter
+
+STEP = 1e-5  # of a reading's central differences, over the force at the contact
+MOST = 3000  # contacts at which a reading is differentiated
+
+
+def by_normal_forces(
+    read: Callable[[Reduction, Solution], Reading], state: State, pair: int
+) -> Seeds:
+    """A quantity that reads the normal forces of one pair, at closed contacts."""
+    reduction, solution = views(state.reduction, state.solution)[pair]
+    r = solution.reactions
+    by_r = np.zeros(r.shape)
+
+    def at(i: int, h: float) -> float:
+        there = r.copy()
+        there[i, 0] += h
+        return read(reduction, replace(solution, reactions=there)).value
+
+    for i in _few(reduction.problem.law.pressed(r)):
+        by_r[i, 0] = _central(partial(at, i), STEP * float(np.abs(r[i]).max()))
+    return Seeds(read(reduction, solution).value, _on_all(state, pair, by_r))
+
+
+def of_stick(state: State, pair: int) -> Seeds:
+    """Half-width of the stick zone over that of contact, differentiated where contacts stay open,
+    stick or slip as they do.
+
+    It depends on the forces at closed contacts, on the slip of the step, and on the friction bound.
+    A contact that slips stays at its bound: its tangential force changes with the normal one, and
+    may turn.
+    """
+    reduction, solution = views(state.reduction, state.solution)[pair]
+    scene, problem, r = reduction.scene, reduction.problem, solution.reactions
+    u, d = problem.displacements(r, solution.multipliers), problem.dim
+    sticks = problem.law.sticking(r)
+    slips = problem.law.pressed(r) & ~sticks
+
+    def read(there: np.ndarray, moved: np.ndarray, law: Law) -> float:
+        at = replace(problem, law=law)
+        edge = contact_edge(scene, at, there)
+        return stick_edge(scene, at, there, moved[:, 1:])[0] / edge if edge > 0 else 0.0
+
+    def along(i: int, force: np.ndarray, slip: np.ndarray, t: float) -> float:
+        there, moved = r.copy(), u.copy()
+        there[i] += t * force
+        moved[i] += t * slip
+        return read(there, moved, problem.law)
+
+    by_r, by_u = np.zeros(r.shape), np.zeros(u.shape)
+    axes, still = np.eye(d), np.zeros(d)
+    for i in _few(sticks | slips):
+        h, size = STEP * float(np.abs(r[i]).max()), float(np.abs(u[i, 1:]).max())
+        if sticks[i]:
+            by_r[i] = [_central(partial(along, i, way, still), h) for way in axes]
+            continue
+        way, friction = axes[0].copy(), float(np.linalg.norm(r[i, 1:]))
+        if friction > 0:  # a small step along the edge of the cone
+            bound = problem.law.bound_along(r + h * np.eye(len(r), r.shape[1], -i))[i]
+            way[1:] = (bound / friction - 1) * r[i, 1:] / h
+        by_r[i, 0] = _central(partial(along, i, way, still), h)
+        if d == 3 and friction > 0:
+            turn = np.array([0.0, -r[i, 2], r[i, 1]]) / friction
+            by_r[i] += turn * _central(partial(along, i, turn, still), h)
+        if size > 0:
+            by_u[i, 1:] = [_central(partial(along, i, still, way), STEP * size) for way in axes[1:]]
+
+    def explicit(which: Parameter) -> float:
+        if which.kind != "mu":
+            return 0.0
+        change = state.law_change(which)[state.problem.pairs[pair].contacts]
+
+        def at(h: float) -> float:
+            law, there = problem.law.shifted(h * change), r.copy()
+            old, new = problem.law.bound_along(r), law.bound_along(r)
+            grows = np.divide(new, old, out=np.ones(len(old)), where=old > 0)
+            there[slips, 1:] *= grows[slips, None]
+            return read(there, u, law)
+
+        return _central(at, STEP * float(problem.law.bound(np.ones(len(r))).max(initial=0.0)))
+
+    slip = _on_all(state, pair, by_u)
+    return Seeds(read(r, u, problem.law), _on_all(state, pair, by_r), slip=slip, explicit=explicit)
+
+
+def _on_all(state: State, pair: int, own: np.ndarray) -> np.ndarray:
+    """Weights (k_i, dim) of the contacts of one pair among all contacts (k, dim)."""
+    whole = np.zeros(state.problem.q.shape)
+    whole[state.problem.pairs[pair].contacts] = own
+    return whole
+
+
+def _few(closed: np.ndarray) -> np.ndarray:
+    contacts = np.flatnonzero(closed)
+    if len(contacts) > MOST:
+        raise InputError(
+            "pressure and half-widths can be differentiated at"
+            f" {MOST} closed contacts at most; got {len(contacts)}."
+        )
+    return contacts
+
+
+def _central(function: Callable[[float], float], step: float) -> float:
+    return (function(step) - function(-step)) / (2 * step)
