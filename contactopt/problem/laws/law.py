@@ -357,8 +357,19 @@ class Law:
         return self.select(first)
 
     def spread(self, k: int) -> Self:
-        """The law of k contacts: numbers become arrays (k,); InputError on arrays of another
-        length.
+        """The law of k contacts, whose numbers become arrays.
+
+        Parameters
+        ----------
+        k : number of contacts
+
+        Returns
+        -------
+        A law of the same kind, with parameters (k,).
+
+        Raises
+        ------
+        InputError : if a parameter is an array of another length
         """
         for name in self.parameters:
             if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
