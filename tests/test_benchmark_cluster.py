@@ -2,12 +2,11 @@
 
 import sys
 
+import distributed
 import pytest
 
 from contactopt import InputError, benchmark
 from tests.test_benchmark import FAKES, SMALL, written
-
-distributed = pytest.importorskip("distributed")
 
 
 @pytest.mark.slow

@@ -53,13 +53,13 @@ def bodies():
 
 
 BODIES = bodies()
+# solvers of packages that the tests do not ask for
+OPTIONAL = {"pardiso": "pypardiso", "petsc": "petsc4py"}
 
 
 def made(name, args):
-    if name != "superlu":
-        pytest.importorskip(
-            {"pardiso": "pypardiso", "multigrid": "pyamg", "petsc": "petsc4py"}[name]
-        )
+    if name in OPTIONAL:
+        pytest.importorskip(OPTIONAL[name])
     return make_solver(name, args)
 
 
@@ -369,7 +369,6 @@ def test_a_block_is_the_matrix_without_the_other_rows():
     """Multigrid for a Block, which copies nothing, is multigrid for the rows and columns
     themselves.
     """
-    pytest.importorskip("pyamg")
     A, *rest = BODIES["solid punch"]
     n = A.shape[0]
     whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from coulomb_check import violations
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
+from contactopt.benchmark.packings import packing
 from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
 from contactopt.methods.kernels.homotopy import Homotopy, homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import DenseBlocks, SparseBlocks
 from contactopt.problem import dimensionless
-from experiments.questions.coulomb_check import violations
-from experiments.questions.granular import packing
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.benchmark.catalogue import arguments_of
+from contactopt.benchmark.packings import packing
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
@@ -338,6 +339,7 @@ def in_units(
 
 FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
     "rigid_bodies": rigid_bodies,
+    "packing": packing,
     "half_plane": half_plane,
     "tangential": tangential,
     "redundant": redundant,

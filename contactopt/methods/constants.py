@@ -118,9 +118,8 @@ LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product
 # where the shifts of slipping contacts begin to grow, and by how much
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0
 
-# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp). What single precision is worth
-# shows
-# `python -m experiments.questions.dense_speed`.
+# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp). Single precision halves the bytes that
+# a product reads, which is what a product costs where Q does not fit the processor's cache.
 # on the estimate of the largest eigenvalue, which power steps approach from below
 EIGENVALUE_MARGIN = 1.1
 SINGLE_ACCURACY = 1e-4  # relative accuracy asked of one round in single precision

@@ -8,7 +8,7 @@ is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that the
 (Eisenstat, Walker 1996), some ten products with Q each (contactopt.methods.kernels.krylov). Where
 the bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
 (contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution; the number of
-steps hardly depends on the mesh (reports/newton_steps). Motions that friction alone holds, and no
+steps hardly depends on the mesh. Motions that friction alone holds, and no
 sticking contact, follow from a convex problem before each step
 (contactopt.methods.kernels.balance). Not globally convergent: rank-deficient Q (rigid bodies,
 redundant contacts) or strong friction may make it cycle, which is what `proximal` is for. Sources:

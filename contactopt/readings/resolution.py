@@ -13,7 +13,7 @@ from contactopt.readings.resultants import views
 
 FEWEST = (
     # elements across the half-width of contact; with so few the largest pressure is some percent
-    # off (reports/hertz)
+    # off (reports/accuracy)
     4
 )
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends

@@ -17,11 +17,11 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import InterfaceProblem, solve  # noqa: E402
+from contactopt.benchmark.packings import packing  # noqa: E402
 from contactopt.methods.kernels.homotopy import homotopy_iterates  # noqa: E402
 from contactopt.methods.kernels.interior import Path, interior_iterates  # noqa: E402
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix  # noqa: E402
 from contactopt.problem import dimensionless  # noqa: E402
-from experiments.questions.granular import packing  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 # dimension, bodies, contacts of a pair of bodies

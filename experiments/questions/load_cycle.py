@@ -11,7 +11,7 @@ from contactopt import scenes
 from contactopt.figures.animation import animate, energies, loop
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.solving.paths import PathResult, follow
-from experiments.questions.cattaneo import exact_loss, loop_area
+from experiments.questions.accuracy.sheared import exact_loss, loop_area
 from experiments.report import REPORTS, write
 
 SHEAR = 45.0  # .9 mu force

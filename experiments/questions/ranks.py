@@ -233,8 +233,7 @@ array Q is made once, and then the steps send nothing.
 
 With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration
 such as conjugate gradients) send an order for each operation on them, and receive scalar products
-and displacements on the interface. How many V-cycles slices of any height need is measured by
-`python -m experiments.questions.several_pairs`:
+and displacements on the interface:
 
 
 {coupled}

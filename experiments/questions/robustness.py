@@ -12,9 +12,9 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import time  # noqa: E402
 
 import numpy as np  # noqa: E402
-import scipy.linalg as la  # noqa: E402
 
-from contactopt import InterfaceProblem, solve  # noqa: E402
+from contactopt import solve  # noqa: E402
+from contactopt.benchmark.problems import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 METHODS = ("auto", "newton", "proximal", "acary_cadoux", "admm", "nsgs")
@@ -24,28 +24,11 @@ SEEDS = range(15)
 TOL, LIMIT, ITERATIONS = 1e-8, 1.0, 2000
 
 
-def rigid_bodies(seed: int, bodies: int, contacts: int, mu: float) -> InterfaceProblem:
-    """Q = H' M^-1 H of random rigid bodies and contact frames, q = H' v, so that a solution exists."""
-    rng = np.random.default_rng(seed)
-    H = np.zeros((3 * contacts, 6 * bodies))
-    for c in range(contacts):
-        frame = la.qr(rng.normal(size=(3, 3)))[0]
-        i, j = rng.choice(bodies, 2, replace=False)
-        for body, sign in ((i, 1.0), (j, -1.0)):
-            arm = rng.normal(size=3)
-            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 3] = sign * frame
-            H[3 * c : 3 * c + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
-    inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
-    return InterfaceProblem(
-        (H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), mu
-    )
-
-
 def measure(method: str, mu: float) -> dict[str, object]:
     solved, seconds = 0, []
     for bodies, contacts in SIZES:
         for seed in SEEDS:
-            problem = rigid_bodies(seed, bodies, contacts, mu)
+            problem = rigid_bodies(bodies, contacts, mu, seed)
             start = time.perf_counter()
             solution = solve(problem, method, tol=TOL, time_limit=LIMIT, max_iterations=ITERATIONS)
             seconds.append(time.perf_counter() - start)

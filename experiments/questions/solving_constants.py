@@ -20,10 +20,10 @@ from importlib import import_module  # noqa: E402
 from typing import Any  # noqa: E402
 
 from contactopt import InterfaceProblem, reduce, scenes, solve  # noqa: E402
+from contactopt.benchmark.packings import packing  # noqa: E402
+from contactopt.benchmark.problems import rigid_bodies  # noqa: E402
 from contactopt.methods import constants, find_method  # noqa: E402
 from contactopt.methods.nested import Nested  # noqa: E402
-from experiments.questions.granular import packing  # noqa: E402
-from experiments.questions.robustness import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 HOME = "contactopt.methods"
@@ -87,7 +87,7 @@ def problems() -> dict[str, list[InterfaceProblem]]:
         reduce(scenes.flat_punch(2, mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)
     ]
     spheres = [reduce(scenes.sphere(mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)]
-    rigid = [rigid_bodies(seed, 10, 40, mu) for seed in range(3) for mu in (0.3, 1.0, 3.0)]
+    rigid = [rigid_bodies(10, 40, mu, seed) for seed in range(3) for mu in (0.3, 1.0, 3.0)]
     grains = [
         packing(dim, 40, seed, mu, points)
         for seed in range(2)

@@ -1,8 +1,7 @@
 """Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by
 SciPy elsewhere.
 
-One oneMKL product of single precision is faster than one of SciPy (`python -m
-experiments.questions.solver_constants`). Neither holds Python's lock, so that the pieces of one
+One oneMKL product of single precision is faster than one of SciPy. Neither holds Python's lock, so that the pieces of one
 product can be made in several threads.
 """
 

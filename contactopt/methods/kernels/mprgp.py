@@ -210,8 +210,7 @@ def box_qp(
     tol: float = 1e-10,
     max_iterations: int = 10_000,
 ) -> BoxResult:
-    """Solve the same problem as `mprgp`, in less time where P does not fit the processor's cache
-    (reports/dense_speed).
+    """Solve the same problem as `mprgp`, in less time where P does not fit the processor's cache.
 
     Iterative refinement: the correction d of x minimises d'Pd/2 + (P x + c)'d, d >= low - x, in
     single precision to a few digits, scaled so that no digit is lost; its gradient is taken anew in

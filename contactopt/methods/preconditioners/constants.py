@@ -9,12 +9,10 @@ EIGENVECTORS was chosen by the times of both ways, `python -m experiments.questi
 roots`; a solve takes up to thousands of products.
 
 DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the
-bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md). On
-bodies that had no part in that fit, `neumann` is judged by `python -m
-experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
+bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md).
 
-WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m
-experiments.questions.several_pairs`.
+WAVES and MOST_WAVES were chosen for few iterations on a body that is cut into thin slices, such as
+those of `python -m experiments.questions.ranks` (reports/ranks/report.md).
 """
 
 # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is

@@ -4,7 +4,6 @@ true errors.
 
 from __future__ import annotations
 
-import csv
 import time
 from dataclasses import replace
 from multiprocessing import get_context
@@ -20,7 +19,6 @@ from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Rigid, Scene
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL, flat, indenter
-from experiments.report import REPORTS
 
 KINDS = {"point": "axisymmetric", "line": "plane-strain"}
 FRICTION = (0.1, 0.3, 0.5, 0.7)
@@ -209,23 +207,6 @@ def locking(nu: float, mu: float) -> dict[str, object]:
             f"{name}, error": value_of("stick", reduction, solution) - exact(scene)["stick"],
         }
     return row
-
-
-def cattaneo() -> list[dict[str, object]]:
-    """Rows of the report on sheared contacts, made by experiments.questions.cattaneo."""
-    with open(REPORTS / "cattaneo" / "loads.csv") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    keys = (
-        "scene",
-        "T / (mu P)",
-        "unknowns",
-        "c / a, rel. error",
-        "p in L2",
-        "q in L2",
-        "loss, rel. error",
-    )
-    kinds = {"scene": str, "unknowns": int}
-    return [{key: kinds.get(key, float)(row[key]) for key in keys} for row in rows]
 
 
 def sphere() -> list[dict[str, object]]:

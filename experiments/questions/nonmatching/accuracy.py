@@ -12,7 +12,7 @@ from contactopt.readings.quantities import stick_width
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
 from contactopt.solving.paths import follow
-from experiments.questions.cattaneo import error
+from experiments.questions.accuracy.sheared import error
 from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
 
 METHODS = ("newton", "auto")
