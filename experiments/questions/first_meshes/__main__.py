@@ -18,10 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt import (
-    InputError,
-    Scene,
-)
+from contactopt import InputError, Scene
 from contactopt.accuracy import refine
 from contactopt.derivatives.outputs import find_quantity
 from contactopt.solving.limits import Limits
