@@ -1,4 +1,6 @@
-"""Problems of other codes, read where they lie; the files themselves are not part of the project."""
+"""Problems of other codes, read where they lie; the files themselves are not part of the
+project.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,6 @@
-"""Scene files: they say what the Python API says, and every mistake in them is named with its line."""
+"""Scene files: they say what the Python API says, and every mistake in them is named with
+its line.
+"""
 
 import os
 import tomllib

@@ -148,11 +148,12 @@ def growth(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return made
 
 
-TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and walls of bricks. Each body has 16 x 16 linear
-elements. The bodies rest on each other and on a rigid floor, held by contact and friction alone.
-Under their own weight the lowest joints bear everything above them. In low chains and walls nothing
-slips. In the rows `pressed` there is no weight. Instead a plate presses every body of the highest
-row. Rows of stiff and soft bodies take turns, so that every joint slips at its edges.
+TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and
+walls of bricks. Each body has 16 x 16 linear elements. The bodies rest on each other and on a rigid
+floor, held by contact and friction alone. Under their own weight the lowest joints bear everything
+above them. In low chains and walls nothing slips. In the rows `pressed` there is no weight. Instead
+a plate presses every body of the highest row. Rows of stiff and soft bodies take turns, so that
+every joint slips at its edges.
 
 {runs}
 

@@ -111,12 +111,13 @@ def measure(name: str, solver: str) -> dict[str, Any]:
     }
 
 
-TEXT = f"""What does friction cost? The time from assembled bodies to certified contact forces (residual at most 1e-8) is compared with that of one linear
-solve. For the frictional problem two cores factorise both bodies at the same time, and Newton's
-method follows. The linear solve is one direct solve of the same two bodies, glued together at the
-contact nodes, with a given motion of the plate. It has the same solver and ordering, and one
-forward and backward substitution. Times are medians of {REPEATS} runs in turn, with
-`OMP_NUM_THREADS=1`. The second ratio counts the seconds of both threads.
+TEXT = f"""What does friction cost? The time from assembled bodies to certified contact forces
+(residual at most 1e-8) is compared with that of one linear solve. For the frictional problem two
+cores factorise both bodies at the same time, and Newton's method follows. The linear solve is one
+direct solve of the same two bodies, glued together at the contact nodes, with a given motion of the
+plate. It has the same solver and ordering, and one forward and backward substitution. Times are
+medians of {REPEATS} runs in turn, with `OMP_NUM_THREADS=1`. The second ratio counts the seconds of
+both threads.
 
 {{ratios}}
 

@@ -132,11 +132,11 @@ def figure(kept: dict[str, contactopt.Design]) -> Any:
     return made
 
 
-TEXT = f"""Which profile makes the pressure under a punch even? A rigid flat punch of the half-width {HALF:g} mm carries {FORCE:g} N. Its pressure is infinite at
-the corners. On a mesh the pressure is largest at the last contact. `contactopt.design` looks for
-the profile whose largest pressure is as small as possible. The profile has one free height per
-contact, or it is a sum of six Legendre polynomials. The mean pressure is the force over the face of
-the punch.
+TEXT = f"""Which profile makes the pressure under a punch even? A rigid flat punch of the half-width
+{HALF:g} mm carries {FORCE:g} N. Its pressure is infinite at the corners. On a mesh the pressure is
+largest at the last contact. `contactopt.design` looks for the profile whose largest pressure is as
+small as possible. The profile has one free height per contact, or it is a sum of six Legendre
+polynomials. The mean pressure is the force over the face of the punch.
 
 On a half-plane without friction the answer is known: it is the displacement under a uniform
 pressure (Johnson 1985, section 2.5). For the block of finite elements, and with friction, the best

@@ -363,12 +363,13 @@ def meshes(count: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     return worst, missed or [{"shape": "none"}]
 
 
-TEXT = """Does every contact keep the area of its faces, whatever the gap between two surfaces is beside the size of their facets? {count} random
-pairs of surfaces: linear and quadratic faces, triangles and quadrilaterals, even, graded and random
-ones, turned, moved, and in units from 1e-6 to 1e6. The gap is 1e-4 to 1e3 facets. One surface
-covers the other, or is parallel and shifted. *area* is the relative error of the sum of the areas
-of all contacts. *share* is that of the area of one contact. *uniform pressure* is the error of the
-nodal forces that a uniform pressure exerts, over the mean one: the patch test.
+TEXT = """Does every contact keep the area of its faces, whatever the gap between two surfaces is
+beside the size of their facets? {count} random pairs of surfaces: linear and quadratic faces,
+triangles and quadrilaterals, even, graded and random ones, turned, moved, and in units from 1e-6 to
+1e6. The gap is 1e-4 to 1e3 facets. One surface covers the other, or is parallel and shifted. *area*
+is the relative error of the sum of the areas of all contacts. *share* is that of the area of one
+contact. *uniform pressure* is the error of the nodal forces that a uniform pressure exerts, over
+the mean one: the patch test.
 
 {{pairs}}
 

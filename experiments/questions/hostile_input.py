@@ -284,11 +284,11 @@ def judge(seed: int) -> tuple[str, str, str]:
     return door.__name__, "answered", ""
 
 
-TEXT = """What does contactopt do with input that makes no sense? {cases} random inputs (seeds 0 to {last}) are given in turn to the constructors, to
-`solve` with every method, to its start, to the readers of files, to scenes, and to the command
-line. Each input has at least one value that is not of the kind, the shape or the size that is asked
-for, or it is a degenerate problem. The time limits are {limit:g} s. Every input should be solved,
-or be refused by one of contactopt's own errors.
+TEXT = """What does contactopt do with input that makes no sense? {cases} random inputs (seeds 0 to
+{last}) are given in turn to the constructors, to `solve` with every method, to its start, to the
+readers of files, to scenes, and to the command line. Each input has at least one value that is not
+of the kind, the shape or the size that is asked for, or it is a degenerate problem. The time limits
+are {limit:g} s. Every input should be solved, or be refused by one of contactopt's own errors.
 
 Exceptions that are not contactopt's own: {broken}. Time limits overrun by more than {slack:g} s:
 {overrun}.

@@ -148,7 +148,9 @@ def isolated(elements: int, way: str, mu: float) -> dict[str, object]:
 
 
 def runs(sizes: list[int]) -> list[tuple[int, str, float]]:
-    """All sizes with the largest friction; at those COMPARED all coefficients, and products with Q."""
+    """All sizes with the largest friction; at those COMPARED all coefficients, and
+    products with Q.
+    """
     chosen = [(n, "coupled", FRICTION[-1]) for n in sizes]
     more = [n for n in sizes if n in COMPARED]
     chosen += [(n, "coupled", mu) for n in more for mu in FRICTION[:-1]]
@@ -169,8 +171,9 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d with `elements` elements across the half-width of the
-punch. It is solved from a cold start to a certificate of 1e-8. Both bodies are solved by multigrid.
+TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d
+with `elements` elements across the half-width of the punch. It is solved from a cold start to a
+certificate of 1e-8. Both bodies are solved by multigrid.
 
 There are two ways. `coupled` is Newton's method on displacements and contact forces at once.
 `products` is Newton's method that takes products with Q, and each of these products solves with
@@ -182,10 +185,12 @@ wall times.
 
 {sizes}
 
-- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over all sizes at mu = .5).
-- CPU time of the frictional problem over that of one linear solve with both bodies (a product with Q at 1e-8), set-up included in
-  both, at mu = .5: {ratios}.
-- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
+- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over all
+  sizes at mu = .5).
+- CPU time of the frictional problem over that of one linear solve with both bodies (a product with
+  Q at 1e-8), set-up included in both, at mu = .5: {ratios}.
+- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most},
+  over all sizes and mu.
 - CPU time of `products` over that of `coupled`, set-up included: {faster}.
 
 The last table has the wall time over the CPU time of every phase. One half is the best that two

@@ -1,4 +1,6 @@
-"""What does a load path cost in accuracy and time: how many states, and where does the energy go?"""
+"""What does a load path cost in accuracy and time: how many states, and where does the
+energy go?
+"""
 
 from __future__ import annotations
 
@@ -94,9 +96,9 @@ def draw_growing(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared to and fro by .9 of the friction bound. At every
-step the energies balance to rounding: external work = elastic energy + friction work + error of the
-steps.
+TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared
+to and fro by .9 of the friction bound. At every step the energies balance to rounding: external
+work = elastic energy + friction work + error of the steps.
 
 ![film](film.gif)
 

@@ -285,16 +285,19 @@ def draw_costs(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """How many iterations do linear systems with Q take, if Q is known by its products only? The paper (A. Lotfi, section 5.2) claims a condition number that
-grows like log^2 N with the number N of contacts. The best preconditioner here does not grow. PCG
-stands for preconditioned conjugate gradients.
+TEXT = """How many iterations do linear systems with Q take, if Q is known by its products only? The
+paper (A. Lotfi, section 5.2) claims a condition number that grows like log^2 N with the number N of
+contacts. The best preconditioner here does not grow. PCG stands for preconditioned conjugate
+gradients.
 
-1. `neumann`, with the smooth motions deflated (solved for exactly), needs at most {worst_2d} PCG iterations in 2D and {worst_3d} in 3D,
-   whatever the number of contacts. Without a preconditioner there are {none_2d} at {last} contacts.
-2. On a contact zone that is a part of the surface, the inverse of the block G_AA of the model is as good as on the whole surface. The
-   rows and columns of P, which the paper takes, are not.
-3. All preconditioners become worse if Poisson's ratio nu comes near .5. Short tangential waves then lock in bilinear elements, and the
-   models of Q do not contain this. (At nu = .49 the eigenvectors of the smallest eigenvalues are alternating tangential forces.)
+1. `neumann`, with the smooth motions deflated (solved for exactly), needs at most {worst_2d} PCG
+   iterations in 2D and {worst_3d} in 3D, whatever the number of contacts. Without a preconditioner
+   there are {none_2d} at {last} contacts.
+2. On a contact zone that is a part of the surface, the inverse of the block G_AA of the model is as
+   good as on the whole surface. The rows and columns of P, which the paper takes, are not.
+3. All preconditioners become worse if Poisson's ratio nu comes near .5. Short tangential waves then
+   lock in bilinear elements, and the models of Q do not contain this. (At nu = .49 the eigenvectors
+   of the smallest eigenvalues are alternating tangential forces.)
 
 **2D.** A punch, 4 wide and 4 high and held at its top, stands on a foundation of 16 x 8 that is
 clamped below. Both are in plane strain with E = 5 and nu = .3. The nodes are evenly spaced on the

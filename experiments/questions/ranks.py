@@ -202,9 +202,10 @@ def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     }
 
 
-TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the bodies of a scene among N processes, which are called ranks. Each process assembles its
-bodies and solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on
-the interfaces travel.
+TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the
+bodies of a scene among N processes, which are called ranks. Each process assembles its bodies and
+solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on the
+interfaces travel.
 
 ## Two bodies of equal size on two ranks
 

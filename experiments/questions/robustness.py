@@ -42,10 +42,10 @@ def measure(method: str, mu: float) -> dict[str, object]:
     }
 
 
-TEXT = """Which methods solve problems whose contact forces are not unique? The problems are random rigid bodies: {sizes} (bodies, contacts), with {seeds} seeds
-each. Their matrix Q does not have full rank, and friction is strong or very strong. The certificate
-is 1e-8. Each method has at most {limit:g} s and {iterations} iterations per problem, and one BLAS
-thread.
+TEXT = """Which methods solve problems whose contact forces are not unique? The problems are random
+rigid bodies: {sizes} (bodies, contacts), with {seeds} seeds each. Their matrix Q does not have full
+rank, and friction is strong or very strong. The certificate is 1e-8. Each method has at most
+{limit:g} s and {iterations} iterations per problem, and one BLAS thread.
 
 {{rows}}
 """

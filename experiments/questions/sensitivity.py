@@ -362,9 +362,9 @@ def table(part: str, rows: list[dict[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-TEXT = f"""Are the derivatives of certified solutions right, and what do they cost? `contactopt.sensitivity` and `contactopt.gradient` are compared with
-differences of solved problems. A relative error is the largest error over all forces, over the
-largest derivative of a force.
+TEXT = f"""Are the derivatives of certified solutions right, and what do they cost?
+`contactopt.sensitivity` and `contactopt.gradient` are compared with differences of solved problems.
+A relative error is the largest error over all forces, over the largest derivative of a force.
 
 {{random}}
 

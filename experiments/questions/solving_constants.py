@@ -166,13 +166,14 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
     return rows
 
 
-TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one at a time: how many problems are certified
-(residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value
-itself. Of shares near one the distance from one is halved and doubled. The problems: {elastic} of
-elastic bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of
-random rigid bodies, {packing} packings of rigid bodies with a sparse Q, {products} of elastic
-bodies known by products with Q, {bodies} of bodies that are solved by iteration, {halves} of
-half-spaces; one run each, one thread; the same run twice differs by up to {noise:.0%}.
+TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one at a
+time: how many problems are certified (residual at most 1e-8, at most {limit} iterations), and the
+processor time over that with the value itself. Of shares near one the distance from one is halved
+and doubled. The problems: {elastic} of elastic bodies (`punch-2d` and `sphere`, of which the {coarse}
+coarse ones for `apg`), {rigid} of random rigid bodies, {packing} packings of rigid bodies with a sparse
+Q, {products} of elastic bodies known by products with Q, {bodies} of bodies that are solved by
+iteration, {halves} of half-spaces; one run each, one thread; the same run twice differs by up to
+{noise:.0%}.
 
 {{rows}}
 """

@@ -147,11 +147,12 @@ def cheapest(m: int, n: int, dim: int, solver: str) -> str:
     )
 
 
-TEXT = """Which way to the solution is the cheapest? The scenes are punch-2d and punch-3d with mu = {mu}. Newton's method solves them from a cold start to a
-certificate of 1e-8. There are three ways: an array Q (`dense`), `products` with Q by the factors of
-both bodies, or bodies and contact at once by multigrid (`coupled`). Times are CPU seconds of one
-run each, with the set-up and with one thread of BLAS. Other programs had a share of the machine. n
-is the number of unknowns of the larger body, and m is the number of those on its contact surface.
+TEXT = """Which way to the solution is the cheapest? The scenes are punch-2d and punch-3d with mu =
+{mu}. Newton's method solves them from a cold start to a certificate of 1e-8. There are three ways:
+an array Q (`dense`), `products` with Q by the factors of both bodies, or bodies and contact at once
+by multigrid (`coupled`). Times are CPU seconds of one run each, with the set-up and with one thread
+of BLAS. Other programs had a share of the machine. n is the number of unknowns of the larger body,
+and m is the number of those on its contact surface.
 
 {{rows}}
 

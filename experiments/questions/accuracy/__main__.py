@@ -103,9 +103,9 @@ def judged(rows: list[dict[str, object]]) -> str:
     )
 
 
-TEXT = """How accurate are the answers, and are the estimated errors honest? Errors are relative to exact solutions (`contactopt.analytic`), unless a unit is
-given. `a` is the half-width or radius of the contact, `c` is that of the stick zone, and `p` is the
-pressure.
+TEXT = """How accurate are the answers, and are the estimated errors honest? Errors are relative to
+exact solutions (`contactopt.analytic`), unless a unit is given. `a` is the half-width or radius of
+the contact, `c` is that of the stick zone, and `p` is the pressure.
 
 ## Accuracy asked for: `run(scene, accuracy=..., quantity=...)`
 

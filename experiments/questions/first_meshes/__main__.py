@@ -154,11 +154,12 @@ def main(arguments: list[str]) -> None:
         for row in rows
         if row["said"]
     ]
-    text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that agrees with the reference within their
-claimed error. {len(reached)} of them reached the target, {sum(row["within"] for row in reached)} of
-these agree. The effectivity, the claimed error over the true one, lies between {EFFECTIVE[0]} and
-{EFFECTIVE[1]} for {good} of {len(sized)} searches that reached the target with a true error above
-{TARGET / 20:g}. Smaller true errors are luck, or those of the reference.
+    text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that agrees
+with the reference within their claimed error. {len(reached)} of them reached the target,
+{sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed error over the
+true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)} searches that reached
+the target with a true error above {TARGET / 20:g}. Smaller true errors are luck, or those of the
+reference.
 
 Outside their claims are: {"; ".join(missed) or "none"}. No answer came from:
 {"; ".join(refused) or "none"}.

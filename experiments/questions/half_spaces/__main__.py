@@ -36,10 +36,11 @@ TABLES = {
 }
 MISSING: list[Row] = [{"not measured": "run the command below with the name of this table"}]
 
-TEXT = """How accurate and how fast are half-spaces? Every transform has one thread. Times are CPU seconds of the process, on a machine on which other
-programs ran as well. "CPU s, problem" is the time to make the interface problem. "solve" is the
-time of `contactopt.solve`, with its certificate. The tables were made one by one, while other
-programs ran. Therefore compare times within a table only.
+TEXT = """How accurate and how fast are half-spaces? Every transform has one thread. Times are CPU
+seconds of the process, on a machine on which other programs ran as well. "CPU s, problem" is the
+time to make the interface problem. "solve" is the time of `contactopt.solve`, with its certificate.
+The tables were made one by one, while other programs ran. Therefore compare times within a table
+only.
 
 ## Influence coefficients
 

@@ -14,10 +14,10 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 from experiments.questions.nonmatching import accuracy, beside, cost, exact  # noqa: E402
 from experiments.report import merged, write  # noqa: E402
 
-TEXT = """How accurate is contact between meshes whose nodes do not match? contactopt chooses a mortar coupling with dual multipliers for them
-(`contactopt/coupling/mortar.py`). In the tables `a:b` are the numbers of elements of the upper and
-of the lower body across the contact half-width. The finer side carries the contacts, unless a
-column says otherwise.
+TEXT = """How accurate is contact between meshes whose nodes do not match? contactopt chooses a
+mortar coupling with dual multipliers for them (`contactopt/coupling/mortar.py`). In the tables
+`a:b` are the numbers of elements of the upper and of the lower body across the contact half-width.
+The finer side carries the contacts, unless a column says otherwise.
 
 ## Exact to rounding
 

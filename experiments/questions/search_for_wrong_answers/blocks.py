@@ -100,7 +100,9 @@ class Blocks:
         return Scene("search", bodies=(*bodies, *self.rigid), contacts=pairs, degree=degree, **own)
 
     def matching(self, rng: Random, depth: float | None = None) -> Way:
-        """The first way: quadrilaterals or triangles cut from them, or bricks, whose nodes match."""
+        """The first way: quadrilaterals or triangles cut from them, or bricks, whose nodes
+        match.
+        """
         cut, degree = rng.random() < 0.3, int(rng.integers(1, 3 if depth is None else 2))
         marks = [
             x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")

@@ -235,9 +235,9 @@ def judge(seed: int, case: Case) -> Verdict:
     """Compare the two ways of a case, and the second with itself where it is not moved.
 
     Where they disagree, both are compared once more on finer meshes, and then with quadratic
-    displacements: linear elements lock in thin lips, and three of their levels may then differ less than the last
-    one errs. Where friction leaves several solutions, two ways may find two of them, and both are
-    right.
+    displacements: linear elements lock in thin lips, and three of their levels may then differ less
+    than the last one errs. Where friction leaves several solutions, two ways may find two of them, and
+    both are right.
     """
     try:
         wrong, widths = compared(case, read_levels(case, LEVELS))

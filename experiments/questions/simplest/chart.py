@@ -58,7 +58,9 @@ def uniform(count: float, force: float) -> Answer:
 
 
 def graded_by_hand(count: float, force: float) -> Answer:
-    """Squares on the contact, growing away from it; the finer they are, the more slowly they grow."""
+    """Squares on the contact, growing away from it; the finer they are, the more slowly
+    they grow.
+    """
     growth = 1 + 1.6 / count
     side = contact_grid(1.5 * A, round(1.5 * count), SIZE, growth)
     mesh = tensor_mesh(np.concatenate([-side[:0:-1], side]), -graded(SIZE, A / count, growth)[::-1])

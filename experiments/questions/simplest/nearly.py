@@ -83,7 +83,9 @@ def block(rng: np.random.Generator, spoil: float) -> Scene:
 
 
 def punch(rng: np.random.Generator, spoil: float) -> Scene:
-    """A punch on a larger block, of squares or of triangles: its load, a traction or a node is off."""
+    """A punch on a larger block, of squares or of triangles: its load, a traction or a
+    node is off.
+    """
     across, way = int(rng.integers(3, 7)), rng.integers(4) if spoil else -1
     fine = rng.integers(1, 3)
     upper = tensor_mesh(np.linspace(-2, 2, 2 * across + 1), np.linspace(0, 2, across + 1))
