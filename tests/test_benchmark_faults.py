@@ -284,8 +284,12 @@ from contactopt.benchmark import method
 
 @method
 def leaves_children(problem):
-    code = "import os, time; os.fork() and os._exit(0); print(os.getpid(), flush=True); time.sleep(1e4)"
-    own = subprocess.Popen([sys.executable, "-c", code], start_new_session=True, stdout=subprocess.PIPE)
+    code = (
+        "import os, time; os.fork() and os._exit(0); print(os.getpid(), flush=True);"
+        " time.sleep(1e4)"
+    )
+    command = [sys.executable, "-c", code]
+    own = subprocess.Popen(command, start_new_session=True, stdout=subprocess.PIPE)
     Path(__file__).with_name("numbers").open("a").write(own.stdout.readline().decode())
     if Path(__file__).with_name("stay").exists():
         time.sleep(1e4)

@@ -143,8 +143,14 @@ def test_warm_start_from_the_answer_ends_at_once(name, punch):
 
 
 @pytest.mark.parametrize(
-    "wrong", [lambda: Penalty(0.0), lambda: Penalty(1e6, -1.0), lambda: AugmentedLagrangian(np.nan), lambda: Lagrangian(2.0)]
-)  # fmt: skip
+    "wrong",
+    [
+        lambda: Penalty(0.0),
+        lambda: Penalty(1e6, -1.0),
+        lambda: AugmentedLagrangian(np.nan),
+        lambda: Lagrangian(2.0),
+    ],
+)
 def test_settings_without_sense(wrong):
     with pytest.raises(InputError):
         wrong()

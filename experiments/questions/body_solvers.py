@@ -229,9 +229,10 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
 
 
 TEXT = """Which solver of a body's linear system is the fastest? The body is the foundation of
-`punch-3d`. Its hexahedra grow by 1.3 away from the contact, and it is held on three sides. One load
-is random on the unknowns of the contact. Multigrid and the defaults of pyamg ({versions}) iterate to
-a relative accuracy of 1e-10. It is measured by (r' B r)^1/2 with the V-cycle B for the one, and by
+`punch-3d`. Its hexahedra grow by 1.3 away from the contact, and it is held on three sides. One
+load is random on the unknowns of the contact. Multigrid and the defaults of pyamg ({versions})
+iterate to a relative accuracy of 1e-10. It is measured by (r' B r)^1/2 with the V-cycle B for
+the one, and by
 |r| for the other. The table has processor seconds of one thread, and the memory that the solver
 keeps, without the matrix. "complexity" is the number of entries of all levels over those of the
 matrix. "residual" is |b - A x| / |b|. {large} {{rows}}

@@ -179,11 +179,12 @@ def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
     return made
 
 
-TEXT = f"""How well do measurements of a sheared contact determine friction and stiffness? Two
-cylinders are pressed by {FORCE:g} N and pushed to and fro by {len(LOADS)} shear forces up to
-{max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu = 0.3 and mu = {MU:g}. One has a radius of
-{RADIUS:g} mm, and the other is flat. The shift of the upper one is measured. From it `contactopt.fit`
-finds E of both bodies and mu. It starts from E = {START["E"]:g}, mu = {START["mu"]:g}.
+TEXT = f"""How well do measurements of a sheared contact determine friction and stiffness?
+Two cylinders are pressed by {FORCE:g} N and pushed to and fro by {len(LOADS)} shear forces up
+to {max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu = 0.3 and mu = {MU:g}. One has a
+radius of {RADIUS:g} mm, and the other is flat. The shift of the upper one is measured. From
+it `contactopt.fit` finds E of both bodies and mu. It starts from E = {START["E"]:g}, mu =
+{START["mu"]:g}.
 
 **Without noise.** The data come from the same grid of 40 points, or from a finer grid. In the
 second case the error that is left is that of the coarse grid:

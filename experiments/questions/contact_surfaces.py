@@ -264,8 +264,8 @@ motions are solved for exactly. The only number that was fitted to stubs is ALON
 1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number
    {most:.1f}. No surface takes more than {steps} iterations. On the disc the condition numbers are
    {disc}. {beyond}
-2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most {plainsteps}
-   iterations. Without any preconditioner, conjugate gradients take up to {none}.
+2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most
+   {plainsteps} iterations. Without any preconditioner, conjugate gradients take up to {none}.
 3. The ratio of the stiffnesses of the two bodies, from 1e-4 to 1e4, changes a condition number by
    at most {spread:.0f} %.
 4. From the coarsest to the finest mesh, the deflated condition number changes by a factor of

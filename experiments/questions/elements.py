@@ -347,11 +347,11 @@ def findings(rows: list[dict], ripple: list[dict]) -> str:
     return "\n".join(said)
 
 
-TEXT = """Which elements should you take? A rigid sphere and a rigid flat disc press on a half-space
-without friction, with E = 5 MPa and nu = .3. The scenes are axisymmetric or in 3D. The axisymmetric
-body is 3,000 contact radii large. Its finite size changes the approach, by {size:.3f} % on the disc.
-A body ten times as large shows this, and the change is taken out. The body in 3D is a quarter model
-of 20 contact radii, and its approach is not compared.
+TEXT = """Which elements should you take? A rigid sphere and a rigid flat disc press on a
+half-space without friction, with E = 5 MPa and nu = .3. The scenes are axisymmetric or in 3D.
+The axisymmetric body is 3,000 contact radii large. Its finite size changes the approach, by
+{size:.3f} % on the disc. A body ten times as large shows this, and the change is taken out. The
+body in 3D is a quarter model of 20 contact radii, and its approach is not compared.
 
 Q stands for quadrilaterals or hexahedra. P stands for the same elements cut into triangles or
 tetrahedra. The number behind the letter is the degree of the displacement. n is the number of

@@ -115,10 +115,10 @@ def totals(rows: list[dict[str, Any]], key: str) -> list[dict[str, Any]]:
 
 
 TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone,
-medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the published
-measure, which depends on units. The last columns quote the seconds that Siconos' solvers take for
-the same files on a machine of the same kind, as an order of magnitude; - where they do not reach
-1e-8 in 20 s or were not measured.
+medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the
+published measure, which depends on units. The last columns quote the seconds that Siconos'
+solvers take for the same files on a machine of the same kind, as an order of magnitude; - where
+they do not reach 1e-8 in 20 s or were not measured.
 
 ## The default method
 

@@ -142,11 +142,11 @@ def summary(rows: list[dict[str, object]]) -> list[dict[str, object]]:
     return table
 
 
-TEXT = """Is a body found that nothing but friction holds? A rigid paraboloid or an elastic body is
-pressed on an elastic block, along the block's normal or inside the friction cone about it.
+TEXT = """Is a body found that nothing but friction holds? A rigid paraboloid or an elastic body
+is pressed on an elastic block, along the block's normal or inside the friction cone about it.
 Directions, meshes, materials, units and the friction coefficient, from {least:g} to {most:g}, are
-random. The default method solves {count} problems in the plane and as many in space to a certificate
-of {tol:g}. Times are CPU seconds of one thread, the least of {repeats} solves.
+random. The default method solves {count} problems in the plane and as many in space to a
+certificate of {tol:g}. Times are CPU seconds of one thread, the least of {repeats} solves.
 
 {{rows}}
 

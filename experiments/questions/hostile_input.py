@@ -37,10 +37,41 @@ LIMIT, SLACK = 0.3, 1.0  # seconds
 OWN = (co.InputError, co.BackendError)
 
 JUNK: tuple[Any, ...] = (
-    None, True, -1, 0, 3, 1e308, -1e308, float("nan"), float("inf"), 1j, "", "x", "nan", b"x", [], [[]], [[1.0], [1.0, 2.0]],
-    {}, {"a": 1}, object(), lambda: 0, np.zeros(0), np.zeros((2, 2)), np.full((2, 2), np.nan), np.eye(2) * 1j, np.array("x"),
-    np.array(["a", "b"]), np.array([object()]), sp.eye_array(4), 10**30, range(3), Path("."), np.ma.masked, ValueError,
-)  # fmt: skip
+    None,
+    True,
+    -1,
+    0,
+    3,
+    1e308,
+    -1e308,
+    float("nan"),
+    float("inf"),
+    1j,
+    "",
+    "x",
+    "nan",
+    b"x",
+    [],
+    [[]],
+    [[1.0], [1.0, 2.0]],
+    {},
+    {"a": 1},
+    object(),
+    lambda: 0,
+    np.zeros(0),
+    np.zeros((2, 2)),
+    np.full((2, 2), np.nan),
+    np.eye(2) * 1j,
+    np.array("x"),
+    np.array(["a", "b"]),
+    np.array([object()]),
+    sp.eye_array(4),
+    10**30,
+    range(3),
+    Path("."),
+    np.ma.masked,
+    ValueError,
+)
 
 
 def good(rng: np.random.Generator) -> dict[str, Any]:

@@ -85,11 +85,11 @@ def measure(dim: int, bodies: int, points: int, mu: float) -> dict[str, Any]:
     return row
 
 
-TEXT = """Packings of {seeds} seeds in each row. How many end at a solution: on the two interior-point
-paths that the default method begins with, and on the path that turns back where it must
-(`contactopt.methods.kernels.homotopy`, at most {systems} linear systems), with an error of at most
-{reached:g}; and how many the default method certifies within {limit} iterations. Medians of processor
-seconds, one thread.
+TEXT = """Packings of {seeds} seeds in each row. How many end at a solution: on the two
+interior-point paths that the default method begins with, and on the path that turns back where
+it must (`contactopt.methods.kernels.homotopy`, at most {systems} linear systems), with an error of
+at most {reached:g}; and how many the default method certifies within {limit} iterations. Medians of
+processor seconds, one thread.
 
 {{rows}}
 """

@@ -185,12 +185,12 @@ wall times.
 
 {sizes}
 
-- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over all
-  sizes at mu = .5).
+- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over
+  all sizes at mu = .5).
 - CPU time of the frictional problem over that of one linear solve with both bodies (a product with
   Q at 1e-8), set-up included in both, at mu = .5: {ratios}.
-- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most},
-  over all sizes and mu.
+- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to
+  {most}, over all sizes and mu.
 - CPU time of `products` over that of `coupled`, set-up included: {faster}.
 
 The last table has the wall time over the CPU time of every phase. One half is the best that two

@@ -250,9 +250,9 @@ def judge(seed: int) -> tuple[str, str, str]:
 
 
 TEXT = """Does contactopt ever call an answer solved that is wrong? This report looks for such
-answers. It solves {cases} random problems (seeds 0 to {last}). The families of problems take turns, and
-so do the methods: {methods}. Forces and lengths are in units from 1e-12 to 1e12. The certificate
-asked for is {tol:g}, with at most 100 iterations or 1 s.
+answers. It solves {cases} random problems (seeds 0 to {last}). The families of problems take turns,
+and so do the methods: {methods}. Forces and lengths are in units from 1e-12 to 1e12. The
+certificate asked for is {tol:g}, with at most 100 iterations or 1 s.
 
 A *lie* is one of the following:
 
@@ -260,8 +260,8 @@ A *lie* is one of the following:
   times the tolerance (`experiments/questions/coulomb_check.py` checks this without the
   certificate);
 - an answer called solved to a problem that was made without a solution;
-- an answer called solved that differs from the only contact forces there are by more than {forces:g}
-  of the largest force;
+- an answer called solved that differs from the only contact forces there are by more than
+  {forces:g} of the largest force;
 - a problem with a solution that is called infeasible.
 
 In one family a plate is held by contacts that move with it as one. There a solution exists if and

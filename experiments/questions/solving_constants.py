@@ -29,7 +29,8 @@ from experiments.report import write  # noqa: E402
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
 USERS = {
-    "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
+    "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND "
+    "PATHS TURNING GENTLE_ALPHA LARGER": (
         "auto",
         "auto",
         ("elastic", "rigid", "packing"),
@@ -43,7 +44,9 @@ USERS = {
     "LOOSE": ("kernels.alart_curnier", "newton", ("elastic",)),
     "SMALL FULL": ("kernels.sparse_blocks", "auto", ("packing",)),
     "SHARPER SHARPEST": ("apg", "apg", ("coarse",)),
-    "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK": (
+    "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING "
+    "MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING "
+    "STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK": (
         "kernels.interior",
         "auto",
         ("rigid", "packing"),
@@ -166,14 +169,14 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
     return rows
 
 
-TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one at a
-time: how many problems are certified (residual at most 1e-8, at most {limit} iterations), and the
-processor time over that with the value itself. Of shares near one the distance from one is halved
-and doubled. The problems: {elastic} of elastic bodies (`punch-2d` and `sphere`, of which the {coarse}
-coarse ones for `apg`), {rigid} of random rigid bodies, {packing} packings of rigid bodies with a sparse
-Q, {products} of elastic bodies known by products with Q, {bodies} of bodies that are solved by
-iteration, {halves} of half-spaces; one run each, one thread; the same run twice differs by up to
-{noise:.0%}.
+TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one
+at a time: how many problems are certified (residual at most 1e-8, at most {limit}
+iterations), and the processor time over that with the value itself. Of shares near one the
+distance from one is halved and doubled. The problems: {elastic} of elastic bodies (`punch-2d`
+and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies,
+{packing} packings of rigid bodies with a sparse Q, {products} of elastic bodies known by
+products with Q, {bodies} of bodies that are solved by iteration, {halves} of half-spaces; one
+run each, one thread; the same run twice differs by up to {noise:.0%}.
 
 {{rows}}
 """

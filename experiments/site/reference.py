@@ -142,8 +142,9 @@ def room_pages(root: Path) -> Pages:
     yield Path("api.md"), index("Reference", text, [f"api/{name}" for name in names], hidden=True)
 
 
-ROOMS_TEXT = """The folders of the package are the stages through which data flows. A room imports only from the rooms that
-stand above it in this table; a contract of the import linter checks this.
+ROOMS_TEXT = """The folders of the package are the stages through which data flows. A room
+imports only from the rooms that stand above it in this table; a contract of the import linter
+checks this.
 """
 
 
@@ -214,8 +215,9 @@ def plug_in_pages(site: Path) -> Pages:
     yield Path("plug_ins.md"), index("What can be chosen by its name", PLUG_INS_TEXT, list(present))
 
 
-PLUG_INS_TEXT = """Each of these pages is made from a table of the package, so it lists all that there is. A new entry costs one
-file and one line in its table: [how to add one](../contributing.md).
+PLUG_INS_TEXT = """Each of these pages is made from a table of the package, so it lists all that
+there is. A new entry costs one file and one line in its table: [how to add
+one](../contributing.md).
 """
 
 
@@ -225,8 +227,9 @@ def methods_index() -> str:
     return index("Methods", text, [f"methods/{name}" for name in METHODS], hidden=True)
 
 
-METHODS_TEXT = """Every method is called by its name, `contactopt.solve(problem, "newton")`, and every answer of every method
-gets the same certificate. The letters and signs are those of [the mathematics](../mathematics.md).
+METHODS_TEXT = """Every method is called by its name, `contactopt.solve(problem, "newton")`, and
+every answer of every method gets the same certificate. The letters and signs are those of [the
+mathematics](../mathematics.md).
 """
 SCENES_TEXT = """A named scene is run by `contactopt run NAME` or `contactopt.run("NAME")`. Its
 arguments are those of the function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene

@@ -191,16 +191,16 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
         for row in others
     )
     return f"""1. **Two independent codes agree.** For bonded bodies all displacements differ by
-   {check["displacements, largest difference"]:.0e} of the largest: mesh, thickness, supports and load
-   are the same. With friction and ccx's mortar contact, hard and without a normal factor,
+   {check["displacements, largest difference"]:.0e} of the largest: mesh, thickness, supports and
+   load are the same. With friction and ccx's mortar contact, hard and without a normal factor,
    {agreement}. Node-to-surface penalty, put into contactopt as a compliance added to Q, gives the
    same forces to {same:.0e} wherever ccx converged.
 2. **A penalty trades accuracy for convergence.** This is about the L2 error of the normal forces.
    {" ".join(decay(sweep, law) for law in DECADES)} contactopt has no factor to choose.
-3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]} iterations
-   and {own["memory [MB]"]:.0f} MB, with Python. {prices} Each iteration of ccx factorises both bodies
-   anew. Each iteration of contactopt solves a dense
-system of the contact unknowns alone."""
+3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]}
+   iterations and {own["memory [MB]"]:.0f} MB, with Python. {prices} Each iteration of ccx
+   factorises both bodies anew. Each iteration of contactopt solves a dense system of the
+   contact unknowns alone."""
 
 
 TEXT = """{findings}

@@ -116,15 +116,22 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
                 true = abs(found.value / truth[quantity] - 1)
                 claim = np.inf if found.error is None else found.error
                 rows.append(
-                    row | {
-                        "value": found.value, "reference": truth[quantity], "true error": true, "of the reference": slack,
+                    row
+                    | {
+                        "value": found.value,
+                        "reference": truth[quantity],
+                        "true error": true,
+                        "of the reference": slack,
                         "claimed": claim,
-                        "geometry": found.geometry_error, "reached": found.reached,
+                        "geometry": found.geometry_error,
+                        "reached": found.reached,
                         "within": bool(true <= claim + slack),
                         "effectivity": claim / max(true, slack),
-                        "unknowns": found.levels[-1].unknowns, "seconds": time.process_time() - begin, "said": "",
+                        "unknowns": found.levels[-1].unknowns,
+                        "seconds": time.process_time() - begin,
+                        "said": "",
                     }
-                )  # fmt: skip
+                )
                 print(
                     {key: f"{x:.4g}" if isinstance(x, float) else x for key, x in rows[-1].items()},
                     flush=True,
@@ -154,12 +161,12 @@ def main(arguments: list[str]) -> None:
         for row in rows
         if row["said"]
     ]
-    text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that agrees
-with the reference within their claimed error. {len(reached)} of them reached the target,
-{sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed error over the
-true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)} searches that reached
-the target with a true error above {TARGET / 20:g}. Smaller true errors are luck, or those of the
-reference.
+    text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that
+agrees with the reference within their claimed error. {len(reached)} of them reached the
+target, {sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed
+error over the true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)}
+searches that reached the target with a true error above {TARGET / 20:g}. Smaller true errors
+are luck, or those of the reference.
 
 Outside their claims are: {"; ".join(missed) or "none"}. No answer came from:
 {"; ".join(refused) or "none"}.

@@ -148,10 +148,15 @@ def dovetail(first: First, small: float = 0.3) -> Scene:
     blade = [(0, 6, 0), (4.5, 6, 0), (4.5, 1.5, 0.8), (9, -3, 0.8), (9, -6, 0), (0, -6, 0)]
     disc = [(5.5, 0.5, 0.8), (11, -5, 0), (14, -5, 0), (14, 4, 0), (5.5, 4, 0)]
     bodies = (
-        Part("blade", mesh("blade", lambda g: rounded(g, blade), side), STEEL, (Support("axis", {"x": 0.0}),),
-             (Traction("top", (0.0, 100.0)),)),
+        Part(
+            "blade",
+            mesh("blade", lambda g: rounded(g, blade), side),
+            STEEL,
+            (Support("axis", {"x": 0.0}),),
+            (Traction("top", (0.0, 100.0)),),
+        ),
         Part("disc", mesh("disc", lambda g: rounded(g, disc), side), STEEL, (Support("wall"),)),
-    )  # fmt: skip
+    )
     return Scene("dovetail", *bodies, 0.2, degree=first.order, copies=2)
 
 

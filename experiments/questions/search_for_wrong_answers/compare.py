@@ -169,9 +169,14 @@ def scale_of(name: str, values: list[Values]) -> float:
     others by themselves.
     """
     kind = name.split()[0]
-    groups = {"force": ("force", "normal"), "friction": ("normal",), "moved": ("moved",), "mean_stress": ("von_mises",
-              "mean_stress", "pressure"), "von_mises": ("von_mises", "mean_stress", "pressure"),
-              "centre": ("reach",)}  # fmt: skip
+    groups = {
+        "force": ("force", "normal"),
+        "friction": ("normal",),
+        "moved": ("moved",),
+        "mean_stress": ("von_mises", "mean_stress", "pressure"),
+        "von_mises": ("von_mises", "mean_stress", "pressure"),
+        "centre": ("reach",),
+    }
     same = groups.get(kind, (name,))
     if kind == "stick":
         return 1.0
@@ -236,8 +241,8 @@ def judge(seed: int, case: Case) -> Verdict:
 
     Where they disagree, both are compared once more on finer meshes, and then with quadratic
     displacements: linear elements lock in thin lips, and three of their levels may then differ less
-    than the last one errs. Where friction leaves several solutions, two ways may find two of them, and
-    both are right.
+    than the last one errs. Where friction leaves several solutions, two ways may find two of them,
+    and both are right.
     """
     try:
         wrong, widths = compared(case, read_levels(case, LEVELS))

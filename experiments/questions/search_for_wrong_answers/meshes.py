@@ -252,8 +252,13 @@ def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -
             if isinstance(part, Part)
             for support in part.supports
         ]
-        given += [load.force for part in scene.bodies if isinstance(part, Part) for load in part.loads
-                  if isinstance(load, Plate)]  # fmt: skip
+        given += [
+            load.force
+            for part in scene.bodies
+            if isinstance(part, Part)
+            for load in part.loads
+            if isinstance(load, Plate)
+        ]
         given += [
             value
             for part in scene.bodies

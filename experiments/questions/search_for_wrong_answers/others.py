@@ -197,8 +197,14 @@ def roller(rng: Random) -> Case:
         disc = type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(
             made.boundaries
         )
-        flat = [(-c, -high, far, "bottom"), (c, -high, far, "right"), (c, 0.0, far, "over"), (1.3 * a, 0.0, h, "over"),
-                (-1.3 * a, 0.0, h, "over"), (-c, 0.0, far, "left")]  # fmt: skip
+        flat = [
+            (-c, -high, far, "bottom"),
+            (c, -high, far, "right"),
+            (c, 0.0, far, "over"),
+            (1.3 * a, 0.0, h, "over"),
+            (-1.3 * a, 0.0, h, "over"),
+            (-c, 0.0, far, "left"),
+        ]
         load = Plate("straight top", {"y": -force})
         bodies = [
             Part("cylinder", disc, one, (), (load,), curve={"arc": circle(1.0, 1.0)}),
@@ -403,8 +409,16 @@ def large(rng: Random) -> Case:
 
     def finite(level: int) -> Scene:
         c, h = 15.0 * 2**level, share / (8 * 2**level)
-        ends = [(-c, -c, "bottom"), (c, -c, "right"), (c, 0, "top"), (2, 0, "over"), (1.3, 0, "over"), (-1.3, 0, "over"),
-                (-2, 0, "top"), (-c, 0, "left")]  # fmt: skip
+        ends = [
+            (-c, -c, "bottom"),
+            (c, -c, "right"),
+            (c, 0, "top"),
+            (2, 0, "over"),
+            (1.3, 0, "over"),
+            (-1.3, 0, "over"),
+            (-2, 0, "top"),
+            (-c, 0, "left"),
+        ]
         mesh = outlined(
             [(x, y, 3.0 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends]
         )
