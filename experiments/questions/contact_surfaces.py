@@ -362,10 +362,8 @@ def roots() -> list[dict[str, object]]:
             for _ in range(PRODUCTS):
                 act(X)
             times[way] = made - began, (time.process_time() - made) / PRODUCTS
-        slower, faster = (
-            times["eigenvectors"][0] - times["poles"][0],
-            times["poles"][1] - times["eigenvectors"][1],
-        )
+        slower = times["eigenvectors"][0] - times["poles"][0]
+        faster = times["poles"][1] - times["eigenvectors"][1]
         seconds = {
             f"{way}, {what} [s]": s
             for way, own in times.items()

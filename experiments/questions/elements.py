@@ -114,10 +114,8 @@ def measure(case: str, n: int, degree: int, shape: str, **options: object) -> di
         times.append(time.process_time() - start)
     problem, exact = reduction.problem, made.reference
     assert solution.solved
-    pressure, x = (
-        solution.reactions[:, 0] / problem.areas,
-        np.linalg.norm(problem.coordinates[: dim - 1], axis=0),
-    )
+    pressure = solution.reactions[:, 0] / problem.areas
+    x = np.linalg.norm(problem.coordinates[: dim - 1], axis=0)
     row: dict[str, object] = {
         "case": case,
         "shape": shape,

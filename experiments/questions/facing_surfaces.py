@@ -63,10 +63,8 @@ def surface(rng: np.random.Generator, dim: int, ends: np.ndarray, shape: Any, up
     """A random mesh of a surface between `ends` (dim - 1, 2), lifted to z = shape(x); `up`: its
     body lies below.
     """
-    kind, degree = (
-        str(rng.choice(["RefTri", "RefQuad"] if dim == 2 else ["RefTet", "RefHex"])),
-        int(rng.integers(1, 3)),
-    )
+    kind = str(rng.choice(["RefTri", "RefQuad"] if dim == 2 else ["RefTet", "RefHex"]))
+    degree = int(rng.integers(1, 3))
     if dim == 2:
         mesh = skfem.MeshLine(grid(rng, *ends[0]))
     else:

@@ -75,10 +75,8 @@ def held(seed: int, dim: int) -> tuple[InterfaceProblem, float, int]:
     slope *= random.choice([0.0, random.uniform(0, 0.8)]) * mu / np.linalg.norm(slope)
     press = stress * length ** (dim - 1) * 10.0 ** random.uniform(-4, -2)
     force = press * (turned[:, :-1] @ slope - turned[:, -1])
-    radius, middle = (
-        length * 10.0 ** random.uniform(0, 2),
-        random.uniform(-0.2, 0.2, dim - 1) * length,
-    )
+    radius = length * 10.0 ** random.uniform(0, 2)
+    middle = random.uniform(-0.2, 0.2, dim - 1) * length
     soft = Material(stress, random.uniform(0, 0.45))
 
     def gap(x: np.ndarray) -> np.ndarray:

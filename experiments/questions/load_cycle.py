@@ -27,11 +27,9 @@ def cycle(steps: int) -> dict[str, object]:
     states = scenes.shear_cycle(2, steps=steps, shear=SHEAR)
     history = follow(states).history
     exact = exact_loss(2, states[-1], SHEAR)
-    lost, area, step = (
-        float(history["friction_work"][-1] - history["friction_work"][steps]),
-        loop_area(history, steps),
-        float(history["step_work"][-1] - history["step_work"][steps]),
-    )
+    lost = float(history["friction_work"][-1] - history["friction_work"][steps])
+    area = loop_area(history, steps)
+    step = float(history["step_work"][-1] - history["step_work"][steps])
     return {
         "steps to the largest shear": steps,
         "states": len(states),

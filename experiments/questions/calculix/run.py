@@ -87,11 +87,8 @@ def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> 
         cycles = _rows(folder / "job.cvg", 4)
         attempts = _rows(folder / "job.sta", 2)
         failure = _failure(process.returncode, log_text, wall >= LIMIT)
-        displacement, forces, reactions = (
-            np.zeros((2, 0)),
-            (np.zeros(0),) * 2,
-            (np.zeros((0, 2)),) * 2,
-        )
+        displacement, forces = np.zeros((2, 0)), (np.zeros(0),) * 2
+        reactions = (np.zeros((0, 2)),) * 2
         if not failure:
             tables = printed(folder / "job.dat")
             displacement = tables["displacements"][:, 1:3].T

@@ -286,10 +286,8 @@ def crown(rng: Random, ring: bool = False) -> Case:
     )
     kind = "axisymmetric" if ring else "plane-strain"
     scene = Blocks(blocks, (("upper", "lower"),), mu, a / 4, settings=(("kind", kind),))
-    ways, points = (
-        (scene.matching(rng), scene.unlike(rng)),
-        {"upper": [(0.3, 0.6 * high)], "lower": [(0.2, -0.5 * low)]},
-    )
+    ways = (scene.matching(rng), scene.unlike(rng))
+    points = {"upper": [(0.3, 0.6 * high)], "lower": [(0.2, -0.5 * low)]}
     return Case(
         f"crown, {kind}", ways, points, not ring, True, loose=a**2 / radius, strain=a / radius
     )
@@ -297,16 +295,10 @@ def crown(rng: Random, ring: bool = False) -> Case:
 
 def wedge(rng: Random) -> Case:
     """A wedge pressed obliquely between two flanks."""
-    angle, high, half = (
-        np.radians(rng.uniform(15, 60)),
-        float(rng.uniform(0.6, 1.2)),
-        float(rng.uniform(0.15, 0.5)),
-    )
-    mu, side, out = (
-        float(rng.uniform(0, 0.6)),
-        high * np.tan(angle),
-        half + high * np.tan(angle) + 1.0,
-    )
+    angle, high = np.radians(rng.uniform(15, 60)), float(rng.uniform(0.6, 1.2))
+    half = float(rng.uniform(0.15, 0.5))
+    mu, side = float(rng.uniform(0, 0.6)), high * np.tan(angle)
+    out = half + high * np.tan(angle) + 1.0
     load = Plate("top", {"x": float(rng.uniform(-3e-3, 3e-3)), "y": -0.01})
     corners = [(-half, 0.0), (half, 0.0), (half + side, high), (-half - side, high)]
     left = [(-out, 0.0), (-half, 0.0), (-half - side, high), (-out, high)]
@@ -324,11 +316,8 @@ def wedge(rng: Random) -> Case:
 
 def bridge(rng: Random) -> Case:
     """A beam on two piers: one surface in two pairs."""
-    mu, long, (thick, high) = (
-        friction(rng),
-        float(rng.uniform(3, 5)),
-        map(float, rng.uniform(0.4, 1.2, 2)),
-    )
+    mu, long = friction(rng), float(rng.uniform(3, 5))
+    (thick, high) = map(float, rng.uniform(0.4, 1.2, 2))
     feet = {
         "left": (0.0, float(rng.uniform(0.4, 1))),
         "right": (long - float(rng.uniform(0.4, 1)), long),
@@ -353,18 +342,12 @@ def floor(rng: Random) -> Case:
     """An uneven block on a rigid floor: its shape is a function of the gap, or the shape of its
     mesh.
     """
-    mu, own, wide, high = (
-        friction(rng),
-        material(rng),
-        float(rng.uniform(1, 3)),
-        float(rng.uniform(0.5, 2)),
-    )
+    mu, own, wide = friction(rng), material(rng), float(rng.uniform(1, 3))
+    high = float(rng.uniform(0.5, 2))
     depth, waves = float(10 ** rng.uniform(-5, -3.5)) * wide, rng.uniform(0.5, 4, 3) * np.pi / wide
     phase, sizes, pushed = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.2, 1, 3), rng.random() < 0.3
-    force, lift = (
-        own.E * depth * float(10 ** rng.uniform(-0.7, 0.7)),
-        depth * float(rng.uniform(0.2, 2)),
-    )
+    force = own.E * depth * float(10 ** rng.uniform(-0.7, 0.7))
+    lift = depth * float(rng.uniform(0.2, 2))
 
     def shape(x: np.ndarray) -> np.ndarray:
         at = np.concatenate([np.linspace(0, wide, 1000), x[0]])
@@ -374,10 +357,8 @@ def floor(rng: Random) -> Case:
     def bend(x: np.ndarray) -> np.ndarray:
         return np.stack([x[0], x[1] + shape(x) * (1 - x[1] / high)])
 
-    corners, touch = (
-        [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)],
-        {"under": ("bottom", 0.0, wide)},
-    )
+    corners = [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)]
+    touch = {"under": ("bottom", 0.0, wide)}
     block = Block("block", corners, own, touch, (), (Plate("top", oblique(rng, mu, force)),))
     ground = Rigid("floor", (0.0, 1.0), shape)
     if pushed:  # the floor is lifted in one way, the block pushed down in the other

@@ -97,10 +97,8 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
             points = [geo.addPoint(x, y, 0, size) for x, y, size, _ in loop]
             lines = []
             for i, (*_, name) in enumerate(loop):
-                ends, bent = (
-                    (points[i], points[(i + 1) % len(loop)]),
-                    arcs and not name.startswith("straight"),
-                )
+                ends = (points[i], points[(i + 1) % len(loop)])
+                bent = arcs and not name.startswith("straight")
                 lines.append(
                     geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends)
                 )
@@ -174,10 +172,8 @@ class Move:
         if isinstance(part, HalfSpace):
             force = None if part.force is None else self.vector(part.force, names, S * L**2)
             height = None if part.height is None else lambda x: L * part.height(x / L)
-            points, depth = (
-                tuple(L * row for row in part.points),
-                None if part.depth is None else L * part.depth,
-            )
+            points = tuple(L * row for row in part.points)
+            depth = None if part.depth is None else L * part.depth
             own = replace(part.material, E=part.material.E * S)
             return replace(
                 part, points=points, height=height, force=force, depth=depth, material=own

@@ -58,12 +58,8 @@ def pin(rng: Random) -> Case:
     """A pin with a hole, loaded obliquely, in a bush that is held outside; with or without
     clearance.
     """
-    hole, outer, mu, turn = (
-        float(rng.uniform(0.3, 0.6)),
-        float(rng.uniform(1.6, 2.5)),
-        friction(rng),
-        rng.uniform(0, 6),
-    )
+    hole, outer, mu = float(rng.uniform(0.3, 0.6)), float(rng.uniform(1.6, 2.5)), friction(rng)
+    turn = rng.uniform(0, 6)
     play = 0.0 if rng.random() < 0.3 else float(10 ** rng.uniform(-4, -1))
     one, two, angle = material(rng), material(rng), rng.uniform(0, 2 * np.pi)
     force = min(one.E, two.E) * min(play or 1e-3, 1e-3) * float(rng.uniform(0.3, 3))
@@ -114,17 +110,11 @@ def pin(rng: Random) -> Case:
 
 def fit(rng: Random) -> Case:
     """A press fit: a quarter of two rings against Lame's solution."""
-    bore, outer, d = (
-        float(rng.uniform(0.3, 0.7)),
-        float(rng.uniform(1.4, 2.5)),
-        float(10 ** rng.uniform(-4, -2.5)),
-    )
+    bore, outer = float(rng.uniform(0.3, 0.7)), float(rng.uniform(1.4, 2.5))
+    d = float(10 ** rng.uniform(-4, -2.5))
     shaft, hub, share, mu = material(rng), material(rng), float(rng.uniform(0, 1)), friction(rng)
-    rims, order, sizes = (
-        (1 + share * d, 1 - (1 - share) * d),
-        int(rng.integers(1, 3)),
-        rng.uniform(0.1, 0.2, 2),
-    )
+    rims, order = (1 + share * d, 1 - (1 - share) * d), int(rng.integers(1, 3))
+    sizes = rng.uniform(0.1, 0.2, 2)
     given, exact = mortar(rng, order), press_fit(d, bore, 1.0, outer, shaft, hub).peak or 0.0
     sides = (Support("straight x", {"y": 0.0}), Support("straight y", {"x": 0.0}))
 
@@ -166,20 +156,12 @@ def roller(rng: Random) -> Case:
     surfaces are apart.
     """
     one, two, mu = material(rng), material(rng), friction(rng)
-    a, wide, high = (
-        float(rng.uniform(0.03, 0.1)),
-        float(rng.uniform(1.5, 4)),
-        float(rng.uniform(1, 3)),
-    )
-    force, fine, far = (
-        np.pi * contact_modulus(one, two) * a**2 / 4,
-        float(rng.uniform(0.8, 1.3)),
-        float(rng.uniform(0.1, 0.5)),
-    )
-    given, sizes = (
-        mortar(rng),
-        {"foundation_width": wide, "foundation_height": high, "force": force},
-    )
+    a, wide = float(rng.uniform(0.03, 0.1)), float(rng.uniform(1.5, 4))
+    high = float(rng.uniform(1, 3))
+    force, fine = np.pi * contact_modulus(one, two) * a**2 / 4, float(rng.uniform(0.8, 1.3))
+    far = float(rng.uniform(0.1, 0.5))
+    given = mortar(rng)
+    sizes = {"foundation_width": wide, "foundation_height": high, "force": force}
 
     def half(level: int) -> Scene:
         return cylinder(
@@ -220,11 +202,8 @@ def roller(rng: Random) -> Case:
 def ball(rng: Random) -> Case:
     """A round body with a crowned face on a plate: its section, and the half of it in space."""
     one, two, mu, a = material(rng), material(rng), friction(rng), float(rng.uniform(0.3, 0.5))
-    radius, heights, share = (
-        float(rng.uniform(50, 500)),
-        rng.uniform(0.6, 1.2, 2),
-        (1.0, float(rng.uniform(0.8, 1.3))),
-    )
+    radius, heights = float(rng.uniform(50, 500)), rng.uniform(0.6, 1.2, 2)
+    share = (1.0, float(rng.uniform(0.8, 1.3)))
     force = 4 / 3 * contact_modulus(one, two) * a**3 / radius
 
     def build(level: int, section: bool) -> Scene:
@@ -270,17 +249,10 @@ def exact(rng: Random) -> Case:
     half-plane, against Westergaard.
     """
     solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
-    rigid, radius, a, shift = (
-        wave or rng.random() < 0.4,
-        float(rng.uniform(5, 50)),
-        1.0,
-        rng.uniform(-0.1, 0.1, 2),
-    )
-    modulus, share, wide = (
-        contact_modulus(None if rigid else one, two),
-        float(rng.uniform(0.1, 0.8)),
-        float(rng.uniform(1.3, 3)),
-    )
+    rigid, radius, a = wave or rng.random() < 0.4, float(rng.uniform(5, 50)), 1.0
+    shift = rng.uniform(-0.1, 0.1, 2)
+    modulus, share = contact_modulus(None if rigid else one, two), float(rng.uniform(0.1, 0.8))
+    wide = float(rng.uniform(1.3, 3))
     solid = solid and not wave
     if wave:  # of amplitude a^2 / radius and period 2 a / share
         length, tall = 2 * a / share, a**2 / radius
@@ -298,11 +270,8 @@ def exact(rng: Random) -> Case:
     else:
         force = np.pi * modulus * a**2 / (4 * radius)
         peak = hertz_line(force, radius, modulus).peak or 0.0
-        mean, reach, bearing = (
-            8 / (3 * np.pi) * peak,
-            a / 2,
-            2 * (gamma(1.25) / gamma(1.75)) ** 2 * a,
-        )
+        mean, reach = 8 / (3 * np.pi) * peak, a / 2
+        bearing = 2 * (gamma(1.25) / gamma(1.75)) ** 2 * a
     known = {
         "pressure 0": mean,
         "reach 0": reach,
@@ -345,17 +314,10 @@ def heights(rng: Random) -> Case:
     """A rigid uneven body on a half-space: as a gap, or as the height of the half-space; with
     friction.
     """
-    solid, periodic, mu, own = (
-        rng.random() < 0.4,
-        bool(rng.random() < 0.4),
-        friction(rng),
-        material(rng),
-    )
-    tall, k, phase = (
-        float(10 ** rng.uniform(-4, -3)),
-        rng.integers(1, 4, (4, 2)),
-        rng.uniform(0, 2 * np.pi, 4),
-    )
+    solid, periodic, mu = rng.random() < 0.4, bool(rng.random() < 0.4), friction(rng)
+    own = material(rng)
+    tall, k = float(10 ** rng.uniform(-4, -3)), rng.integers(1, 4, (4, 2))
+    phase = rng.uniform(0, 2 * np.pi, 4)
     force = contact_modulus(None, own) * tall * float(10 ** rng.uniform(-1, 0.3))
     load, axes, first = oblique(rng, mu, force), (0, 1, 2) if solid else (0, 1), 10 if solid else 40
     load = {"z" if solid and name == "y" else name: value for name, value in load.items()}
@@ -387,12 +349,8 @@ def large(rng: Random) -> Case:
     """A rigid profile on a half-plane, and on a body of finite elements that is larger from level
     to level.
     """
-    own, mu, radius, bumps = (
-        material(rng),
-        friction(rng),
-        float(rng.uniform(10, 50)),
-        float(rng.uniform(0, 0.5)),
-    )
+    own, mu, radius = material(rng), friction(rng), float(rng.uniform(10, 50))
+    bumps = float(rng.uniform(0, 0.5))
     phase, period, share, degree = (
         *map(float, rng.uniform([0, 0.5, 0.8], [6, 1.5, 1.2])),
         int(rng.integers(1, 3)),
@@ -422,10 +380,8 @@ def large(rng: Random) -> Case:
         mesh = outlined(
             [(x, y, 3.0 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends]
         )
-        part, body = (
-            Part("ground", mesh, own, (Support("bottom"),)),
-            Rigid("body", (0.0, 1.0), gap, load),
-        )
+        part = Part("ground", mesh, own, (Support("bottom"),))
+        body = Rigid("body", (0.0, 1.0), gap, load)
         return scene_of([body, part], ("body", "ground:over"), mu, degree=degree)
 
     second = Way(finite)

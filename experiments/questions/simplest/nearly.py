@@ -177,10 +177,8 @@ def bridge(rng: np.random.Generator, spoil: float) -> Scene:
             name, rename(tensor_mesh(*ticks), contact="y-", top="y+"), material, loads=loads
         )
 
-    left, right = (
-        solid("left", (-5, -3), (0, 4), 5.0, False),
-        solid("right", (3, 5), (0, 4), 5.0, True),
-    )
+    left = solid("left", (-5, -3), (0, 4), 5.0, False)
+    right = solid("right", (3, 5), (0, 4), 5.0, True)
     beam = solid("beam", (-6, 6), (4, 6), 20.0, False)
     mu = rng.uniform(0.3, 0.7)
     pairs = [
@@ -241,10 +239,8 @@ def numbers(solved: Solved) -> np.ndarray:
     """Energy, approach and peak pressure of the whole, whatever part of it is modelled."""
     problem, solution = solved.reduction.problem, solved.solution
     r = solution.reactions
-    energy, peak = (
-        elastic_energy(solved.reduction, solution),
-        float((r[:, 0] / problem.areas).max()),
-    )
+    energy = elastic_energy(solved.reduction, solution)
+    peak = float((r[:, 0] / problem.areas).max())
     return np.array([energy, approach(problem, solution) or 0.0, peak])
 
 
