@@ -2,19 +2,16 @@
 of stiffness?
 
 `python -m experiments.questions.contact_surfaces` makes the tables and the report; it needs the
-package gmsh. With `roots` it prints how long both ways to the square root take instead.
+package gmsh.
 """
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import gmsh
 import numpy as np
-import scipy.sparse as sp
 from matplotlib.figure import Figure
 from scipy.sparse.linalg import LinearOperator
 from skfem import MeshQuad, MeshTet
@@ -23,9 +20,8 @@ from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.methods.preconditioners import surface as surface_room
 from experiments.questions.preconditioners import condition, iterations
-from experiments.report import markdown, write
+from experiments.report import write
 
 POISSON, HEIGHT, GROWTH = 0.3, 1.0, 1.3
 RATIOS = (1e-4, 1.0, 1e4)  # stiffness of the lower body over that of the upper one
@@ -35,7 +31,6 @@ AROUND = (100, 1000)  # nodes around the ring
 LANCZOS = 25  # steps that estimate a condition number without the entries of Q
 MANY = 10_000  # nodes around the ring without the entries of Q
 UPPER, LOWER = 1.0, -1.0
-PRODUCTS = 20  # whose mean time is taken
 
 
 def disc() -> None:
@@ -340,43 +335,5 @@ def main() -> None:
     )
 
 
-def roots() -> list[dict[str, object]]:
-    """Time of `laplacian` on discs, by eigenvectors and by poles, and after how many products
-    eigenvectors have paid off.
-    """
-    rows = []
-    for size in (0.3, 0.2, 0.13, 0.09):
-        points, cells = triangles(next(iter(SURFACES)), size)
-        k = points.shape[1]
-        problem = InterfaceProblem(
-            sp.eye(3 * k, format="csr"), np.zeros((k, 3)), 0.3, coordinates=points
-        )
-        problem = replace(problem, chart=replace(problem.chart, cells=cells))
-        X, held = np.random.default_rng(0).normal(size=(k, 3)), np.zeros((k, 3), dtype=bool)
-        times = {}
-        for way, most in (("eigenvectors", 3 * k), ("poles", 0)):
-            surface_room.EIGENVECTORS = most  # type: ignore[attr-defined]
-            began = time.process_time()
-            act = surface_room.laplacian(problem, held)[1]
-            made = time.process_time()
-            for _ in range(PRODUCTS):
-                act(X)
-            times[way] = made - began, (time.process_time() - made) / PRODUCTS
-        slower = times["eigenvectors"][0] - times["poles"][0]
-        faster = times["poles"][1] - times["eigenvectors"][1]
-        seconds = {
-            f"{way}, {what} [s]": s
-            for way, own in times.items()
-            for what, s in zip(("set-up", "product"), own)
-        }
-        rows.append(
-            {"unknowns": 2 * k} | seconds | {"products that pay": max(slower, 0.0) / faster}
-        )
-    return rows
-
-
 if __name__ == "__main__":
-    if sys.argv[1:] == ["roots"]:
-        print(markdown(roots()))
-    else:
-        main()
+    main()

@@ -36,42 +36,23 @@ CASES, PROCESSES = 5000, 2
 LIMIT, SLACK = 0.3, 1.0  # seconds
 OWN = (co.InputError, co.BackendError)
 
-JUNK: tuple[Any, ...] = (
-    None,
-    True,
-    -1,
-    0,
-    3,
-    1e308,
-    -1e308,
-    float("nan"),
-    float("inf"),
-    1j,
-    "",
-    "x",
-    "nan",
-    b"x",
-    [],
-    [[]],
-    [[1.0], [1.0, 2.0]],
-    {},
-    {"a": 1},
-    object(),
-    lambda: 0,
-    np.zeros(0),
-    np.zeros((2, 2)),
-    np.full((2, 2), np.nan),
-    np.eye(2) * 1j,
-    np.array("x"),
-    np.array(["a", "b"]),
-    np.array([object()]),
-    sp.eye_array(4),
-    10**30,
-    range(3),
-    Path("."),
-    np.ma.masked,
-    ValueError,
+NUMBERS: tuple[Any, ...] = (None, True, -1, 0, 3, 1e308, -1e308, float("nan"), float("inf"), 1j)
+TEXTS: tuple[Any, ...] = ("", "x", "nan", b"x")
+CONTAINERS: tuple[Any, ...] = ([], [[]], [[1.0], [1.0, 2.0]], {}, {"a": 1}, object(), lambda: 0)
+NANS, LETTERS = np.full((2, 2), np.nan), np.array(["a", "b"])
+ARRAYS: tuple[Any, ...] = (np.zeros(0), np.zeros((2, 2)), NANS, np.eye(2) * 1j, np.array("x"))
+OTHERS: tuple[Any, ...] = (10**30, range(3), Path("."), np.ma.masked, ValueError)
+JUNK = (
+    *(*NUMBERS, *TEXTS, *CONTAINERS, *ARRAYS),
+    *(LETTERS, np.array([object()]), sp.eye_array(4), *OTHERS),
 )
+SETTINGS = ("method", "tol", "time_limit", "max_iterations", "change_tol", "start", "relaxation")
+PLACES = ["material", "support", "traction", "replace", "part", "follow", "reduce", "name"]
+PLACES += ["body force"]
+WORDS = ["x", "-1", "0", "nan", "1e308", "1000000000", "", "../..", "--zz", "punch-2d"]
+WORDS += ["é", "\x00", "inf"]
+OPTIONS = ["--mu", "--force", "--elements", "--tol", "--method", "--degree", "--q", "--solver"]
+OPTIONS += ["--accuracy", "--quantity"]
 
 
 def good(rng: np.random.Generator) -> dict[str, Any]:
@@ -112,21 +93,7 @@ def solves(rng: np.random.Generator, folder: Path) -> None:
         tol=10.0 ** rng.integers(-16, -3), time_limit=LIMIT, max_iterations=200
     )
     method: Any = any_of(rng, list(METHODS))
-    spoilt = any_of(
-        rng,
-        [
-            "",
-            "",
-            "",
-            "method",
-            "tol",
-            "time_limit",
-            "max_iterations",
-            "change_tol",
-            "start",
-            "relaxation",
-        ],
-    )
+    spoilt = any_of(rng, ["", "", "", *SETTINGS])
     if spoilt == "method":
         method = any_of(rng, JUNK)
     elif spoilt:
@@ -192,20 +159,7 @@ def scenes(rng: np.random.Generator, folder: Path) -> None:
     states.
     """
     scene = co.scenes.flat_punch(dim=2)
-    kind = any_of(
-        rng,
-        [
-            "material",
-            "support",
-            "traction",
-            "replace",
-            "part",
-            "follow",
-            "reduce",
-            "name",
-            "body force",
-        ],
-    )
+    kind = any_of(rng, PLACES)
     if kind == "material":
         co.Material(any_of(rng, [1.0, *JUNK]), any_of(rng, [0.3, *JUNK]))
     elif kind in ("support", "traction", "body force"):
@@ -236,49 +190,16 @@ def commands(rng: np.random.Generator, folder: Path) -> None:
     """The command line."""
     from contactopt.cli import main
 
-    words = [
-        "x",
-        "-1",
-        "0",
-        "nan",
-        "1e308",
-        "1000000000",
-        "",
-        "../..",
-        "--zz",
-        "punch-2d",
-        "é",
-        "\x00",
-        "inf",
-    ]
-    options = [
-        "--mu",
-        "--force",
-        "--elements",
-        "--tol",
-        "--method",
-        "--degree",
-        "--q",
-        "--solver",
-        "--accuracy",
-        "--quantity",
-    ]
     command = any_of(rng, ["run", "run", "list", "benchmark", "report", "solve", "x", ""])
-    line = [command, any_of(rng, ["punch-2d", *words])]
-    line += [any_of(rng, options), any_of(rng, words)] if rng.random() < 0.8 else []
+    line = [command, any_of(rng, ["punch-2d", *WORDS])]
+    line += [any_of(rng, OPTIONS), any_of(rng, WORDS)] if rng.random() < 0.8 else []
     line += ["--elements", "1"] if command == "run" and "--elements" not in line else []
     line += ["--out", str(folder / "out")] if command == "run" else []
     main(line)
 
 
-DOORS: tuple[Callable[[np.random.Generator, Path], None], ...] = (
-    problems,
-    solves,
-    starts,
-    files,
-    scenes,
-    commands,
-)
+Door = Callable[[np.random.Generator, Path], None]
+DOORS: tuple[Door, ...] = (problems, solves, starts, files, scenes, commands)
 
 
 def judge(seed: int) -> tuple[str, str, str]:

@@ -4,16 +4,12 @@ cost?
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from statistics import median
-
 import numpy as np
 import scipy.linalg as la
 from matplotlib.figure import Figure
 from scipy.sparse.linalg import LinearOperator, cg
 
-from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce, scenes, solve
+from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.linear.operators import Interface
 from contactopt.meshes.structured import graded, rename, tensor_mesh
@@ -44,7 +40,6 @@ STIFFNESS = (
     (5.0, 5.0, 0.499),
 )
 BODIES = "E1 = {:g}, E2 = {:g}, nu = {:g}"
-ELEMENTS = {2: (32, 64, 128, 256, 512, 1024), 3: (6, 8, 12, 16, 20)}
 COLOURS = {"none": GREY, "p21": ORANGE, "p22": GREEN, "neumann": BLUE}
 
 
@@ -194,36 +189,6 @@ def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
     return row
 
 
-def product_costs(dim: int, elements: int) -> dict[str, object]:
-    """Seconds of one product with Q in each form and with the preconditioner, and of whole
-    frictional solves.
-    """
-    scene = scenes.flat_punch(dim, elements=elements, mu=0.3)
-    row: dict[str, object] = {"dim": dim}
-    for form in ("explicit", "implicit"):
-        begin = time.perf_counter()
-        problem = reduce(scene, Q=form)
-        solution = solve(problem)
-        total = time.perf_counter() - begin
-        assert solution.solved, solution.message
-        row |= {
-            "contacts": problem.contacts,
-            f"{form}: product [s]": seconds(lambda p=problem: p.Q @ p.q.ravel()),
-        }
-        row |= {f"{form}: scene solved [s]": total, "products": solution.products}
-    P = preconditioner(problem, "neumann")
-    return row | {"neumann: product [s]": seconds(lambda: P @ problem.q.ravel())}
-
-
-def seconds(act: Callable[[], object], repeats: int = 7) -> float:
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        act()
-        times.append(time.perf_counter() - begin)
-    return median(times)
-
-
 def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
     figure = Figure(figsize=(6.4, 8.4), layout="constrained")
     figure.suptitle(title)
@@ -256,32 +221,6 @@ def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
         ax.set(xlabel="contact nodes N [-]", ylabel=key + " [-]")
         ax.set_xticks(sizes, [str(k) for k in sizes])
         ax.minorticks_off()
-    return figure
-
-
-def draw_costs(rows: list[dict]) -> Figure:
-    figure = Figure(figsize=(6.4, 8.4), layout="constrained")
-    for ax, kind in zip(figure.subplots(2, 1), ("product", "scene solved")):
-        for dim, style in ((2, "o-"), (3, "s--")):
-            chosen = [row for row in rows if row["dim"] == dim]
-            for form, colour in (("explicit", ORANGE), ("implicit", BLUE), ("neumann", GREEN)):
-                key = f"{form}: {kind} [s]"
-                if key in chosen[0]:
-                    what = "preconditioner" if form == "neumann" else f"{form} Q"
-                    k = [row["contacts"] for row in chosen]
-                    ax.loglog(
-                        k,
-                        [row[key] for row in chosen],
-                        style,
-                        color=colour,
-                        mfc="white",
-                        label=f"{what}, {dim}D",
-                    )
-        ax.set(
-            xlabel="contact nodes N [-]",
-            ylabel=f"one {kind} [s]" if kind == "product" else "scene reduced and solved [s]",
-        )
-        ax.legend(frameon=False, fontsize=8)
     return figure
 
 
@@ -333,12 +272,6 @@ inverse of the block G_AA of the model, by an inner PCG that needs no body.
 
 {zones}
 
-**Cost.** Times are medians of 7 products. The scenes punch-2d and punch-3d have mu = .3, and are
-reduced and solved to 1e-8 once each. An implicit product is one solve with each body, from its
-factors. An explicit product is one with an array.
-
-{costs}
-
 Another report measures what a whole frictional solve costs, over one linear solve of the bonded
 bodies: [the price of friction](../cost_ratio/report.md).
 """
@@ -364,7 +297,6 @@ def main() -> None:
     plane, solid = blocks(129, *STIFFNESS[0]), solids(13, 5.0, 5.0)
     zones = [in_zone(p, share) for p in (plane, solid) for share in (0.8, 0.4, 0.2)]
     zones = [{key: row.get(key, "") for key in zones[0]} for row in zones]
-    costs = [product_costs(dim, elements) for dim, sizes in ELEMENTS.items() for elements in sizes]
     best = [
         row["PCG iterations, full"] for row in rows if row["preconditioner"] == "neumann, deflated"
     ]
@@ -389,12 +321,10 @@ def main() -> None:
         "surface": surface,
         "ratios": ratios,
         "zones": zones,
-        "costs": costs,
     }
     figures = {
         "line": draw(rows, SIZES, "contact line (2D)"),
         "surface": draw(surface, tuple(n * n for n in SIDES), "contact surface (3D)"),
-        "costs": draw_costs(costs),
     }
     write(
         "preconditioners",
@@ -402,7 +332,6 @@ def main() -> None:
         text,
         tables,
         figures,
-        "{name}.md",
     )
 
 

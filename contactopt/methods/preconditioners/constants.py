@@ -5,8 +5,7 @@ ALONG was chosen for small condition numbers of `laplacian` on the disc of
 (reports/contact_surfaces/report.md). They judge PIECE, THINNEST and DISTORTED, too, which were
 chosen by trial.
 
-EIGENVECTORS was chosen by the times of both ways, `python -m experiments.questions.contact_surfaces
-roots`; a solve takes up to thousands of products.
+EIGENVECTORS was chosen by the times of both ways; a solve takes up to thousands of products.
 
 DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the
 bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md).

@@ -9,7 +9,6 @@ import numpy as np
 
 from contactopt import reduce_bodies, scenes, solve
 from contactopt.readings.quantities import stick_width
-from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
 from contactopt.solving.paths import follow
 from experiments.questions.accuracy.sheared import error
@@ -20,40 +19,6 @@ FINE = 192
 SIZES = ((16, 16), (24, 24), (16, 24), (24, 16), (32, 32), (48, 48), (32, 48))
 SHEARS = (10.0, 30.0, 45.0)
 OTHERS = (5.0, 15.0, 25.0, 35.0)
-
-
-def hertz() -> list[dict[str, Any]]:
-    """Line and point; quadratic elements coarse away from the contact, linear ones as in the named
-    scenes.
-    """
-    rows = []
-    growth = round_bodies.GROWTH[2]
-    for name, force in (("cylinder", 30.0), ("sphere", 1.0)):
-        for degree in (2, 1):
-            round_bodies.GROWTH[2] = 1.5 if degree == 2 else growth
-            for sizes in ((8, 8), (12, 12), (8, 12), (12, 8), (16, 16), (24, 24), (16, 24)):
-                scene = getattr(scenes, name)(mu=0.0, force=force)
-                exact = scene.reference
-                reduction = reduce_bodies(apart(scene, *sizes, degree), zone=exact.half_width)
-                problem, solution = reduction.problem, solve(reduction.problem)
-                x, p = problem.coordinates[0], solution.reactions[:, 0] / problem.areas
-                inner = (x > 0.3 * exact.half_width) & (x < 0.9 * exact.half_width)
-                slope, value = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
-                rows.append(
-                    {
-                        "scene": name,
-                        "degree": degree,
-                        "elements": f"{sizes[0]}:{sizes[1]}",
-                        "unknowns": reduction.dofs,
-                        "contacts": problem.contacts,
-                        "peak, rel. error": float(p.max() / exact.peak - 1),
-                        "width, rel. error": float(np.sqrt(-value / slope) / exact.half_width - 1),
-                        "p in L2": error(p, exact.pressure(x), problem.areas),
-                        "steps": solution.iterations,
-                    }
-                )
-            round_bodies.GROWTH[2] = growth
-    return rows
 
 
 def press_fits() -> list[dict[str, Any]]:
@@ -219,40 +184,3 @@ def cattaneo() -> list[dict[str, Any]]:
 def _squares(found: list[tuple[float, float, bool]]) -> np.ndarray:
     """Mean squares (2,) of the errors of pressure and traction."""
     return np.asarray(np.mean(np.array([f[:2] for f in found]) ** 2, axis=0))
-
-
-def solids() -> list[dict[str, Any]]:
-    """Two bodies in space, pressed and then sheared in one step, linear bricks; the exact tractions
-    are those of Mindlin.
-    """
-    rows = []
-    for sizes, carrier in (
-        ((6, 6), None),
-        ((8, 8), None),
-        ((6, 8), "lower"),
-        ((8, 6), "upper"),
-        ((6, 8), "upper"),
-    ):
-        scene = apart(scenes.cattaneo(3, shear=30.0), *sizes, 1)
-        states = [_sheared(scene, share) for share in (0.0, 1.0)]
-        path = follow(states if carrier is None else [carried(state, carrier) for state in states])
-        problem, r = path.reduction.problem, path.solution.reactions
-        x, exact = np.linalg.norm(problem.coordinates[:2], axis=0), scene.reference
-        p, q = r[:, 0] / problem.areas, np.linalg.norm(r[:, 1:], axis=1) / problem.areas
-        own = sizes[0] if carrier == "upper" else sizes[1]
-        row: dict[str, Any] = {"elements": f"{sizes[0]}:{sizes[1]}"}
-        row |= {
-            "contacts on": "matching nodes"
-            if carrier is None
-            else "fine side"
-            if own == 8
-            else "coarse side"
-        }
-        row |= {"unknowns": path.reduction.dofs, "contacts": problem.contacts}
-        row |= {"peak, rel. error": float(p.max() / exact.peak - 1)}
-        row |= {"p in L2": error(p, exact.pressure(x), problem.areas)}
-        rows.append(
-            row
-            | {"q in L2": error(q, np.abs(exact.shear(x)), problem.areas), "solved": path.solved}
-        )
-    return rows

@@ -64,30 +64,3 @@ def equilibrium() -> list[dict[str, Any]]:
             row[f"{label}: force"], row[f"{label}: moment"] = resultants(reduction, forces)
         rows.append(row)
     return rows
-
-
-def units() -> list[dict[str, Any]]:
-    """The elastic punch, 32:48, in other units of length and force."""
-    rows, first = [], None
-    for length, force in (
-        (1.0, 1.0),
-        (1e-6, 1.0),
-        (1e6, 1.0),
-        (1.0, 1e-6),
-        (1.0, 1e6),
-        (1e-6, 1e6),
-        (1e6, 1e-6),
-    ):
-        solution = solve(reduce(apart(punch(length=length, force=force), 32, 48)))
-        r = solution.reactions / force
-        first = r if first is None else first
-        rows.append(
-            {
-                "unit of length": 1 / length,
-                "unit of force": 1 / force,
-                "status": solution.status.label,
-                "steps": solution.iterations,
-                "forces, largest difference": float(np.abs(r - first).max() / np.abs(first).max()),
-            }
-        )
-    return rows
