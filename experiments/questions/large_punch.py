@@ -1,34 +1,26 @@
 """What does friction cost beside one linear solve, up to a punch of a million unknowns in 3D?
 
 `python -m experiments.questions.large_punch [elements ...]` measures the sizes and writes the
-report, `--phases [elements]` measures the phases on one core and on two. Wall times mean something
-only where no other program has a share of the cores. The phases come first.
+report.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import resource
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes, solve
-from contactopt.bodies import assemble
-from contactopt.coupling.back_to_bodies import recover
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.linear.concurrency import each
-from contactopt.linear.threads import one_blas_thread
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import REPORTS, markdown, merged, write
+from experiments.report import merged, write
 
 SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch
 FRICTION = (0.1, 0.2, 0.3, 0.4, 0.5)
@@ -38,8 +30,6 @@ ACCURACY = 1e-8  # of the product whose V-cycles are counted
 WAYS = {"coupled": "coupled", "products": "krylov"}  # -> Newton's linear solver
 KEYS = ("elements", "way", "mu")
 MODULE = "experiments.questions.large_punch"
-PHASES_AT = 32  # elements
-PHASES = REPORTS / "large_punch" / "phases.json"  # what `--phases` measured last
 
 
 def once(elements: int, way: str, mu: float) -> dict[str, object]:
@@ -87,58 +77,6 @@ def cycles_of_product(reduction) -> int:  # type: ignore[no-untyped-def]
             solver.A, solver.cycle, (B.T @ r)[body.body.free], ACCURACY
         ).cycles
     return total
-
-
-CONFIGURATIONS = {
-    "one core": (1, True),
-    "two cores": (2, True),
-    "two cores, BLAS threads left alone": (2, False),
-}
-
-
-def phases(elements: int, cores: int) -> list[dict[str, object]]:
-    """Wall and CPU time of every phase of one run on so many cores; run in a process of its own."""
-    os.sched_setaffinity(0, set(sorted(os.sched_getaffinity(0))[:cores]))
-    rows = []
-
-    def timed(phase: str, act: Callable[[], Any]) -> Any:
-        begin = time.perf_counter(), time.process_time()
-        made = act()
-        rows.append(
-            {
-                "phase": phase,
-                "wall [s]": time.perf_counter() - begin[0],
-                "CPU [s]": time.process_time() - begin[1],
-            }
-        )
-        return made
-
-    scene = scenes.flat_punch(3)
-    assembled = timed(
-        "assembly", lambda: each(lambda part: assemble(scene, part, elements, None), scene.parts)
-    )
-    with one_blas_thread():
-        timed("hierarchies", lambda: each(lambda body: body.prepare("multigrid", False), assembled))
-    reduction = reduce_bodies(scene, elements, solver="multigrid")
-    solution = timed("solution", lambda: solve(reduction.problem, "newton"))
-    timed("displacements and stresses", lambda: recover(reduction, solution))
-    return rows
-
-
-def phase_table(elements: int) -> list[dict[str, object]]:
-    table: dict[str, dict[str, object]] = {}
-    for name, (cores, limited) in CONFIGURATIONS.items():
-        limits = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} if limited else {}
-        environment = {
-            key: value for key, value in os.environ.items() if not key.endswith("NUM_THREADS")
-        } | limits
-        command = [sys.executable, "-m", MODULE, "--phases-once", str(elements), str(cores)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
-        for row in json.loads(done.stdout.splitlines()[-1]):
-            own = table.setdefault(row["phase"], {"elements": elements, "phase": row["phase"]})
-            own |= {f"{name}: wall [s]": row["wall [s]"], f"{name}: CPU [s]": row["CPU [s]"]}
-            own[f"{name}: wall / CPU"] = row["wall [s]"] / row["CPU [s]"]
-    return list(table.values())
 
 
 def isolated(elements: int, way: str, mu: float) -> dict[str, object]:
@@ -192,13 +130,6 @@ wall times.
 - V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to
   {most}, over all sizes and mu.
 - CPU time of `products` over that of `coupled`, set-up included: {faster}.
-
-The last table has the wall time over the CPU time of every phase. One half is the best that two
-cores can reach. These runs had real-time priority, so that other programs did not disturb them. The
-threads are those that share the bodies and the products. BLAS has one thread, except in the last
-columns.
-
-{phases}
 """
 
 
@@ -234,17 +165,11 @@ def report(rows: list[dict]) -> str:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--once"]:
         print(json.dumps(once(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]))))
-    elif sys.argv[1:2] == ["--phases-once"]:
-        print(json.dumps(phases(int(sys.argv[2]), int(sys.argv[3]))))
-    elif sys.argv[1:2] == ["--phases"]:
-        measured = phase_table(int(sys.argv[2]) if len(sys.argv) > 2 else PHASES_AT)
-        PHASES.write_text(json.dumps(measured, indent=1) + "\n")
-        print(markdown(measured))
     else:
         rows = [isolated(*run) for run in runs([int(size) for size in sys.argv[1:]] or list(SIZES))]
         rows = merged("large_punch", "sizes", rows, KEYS)
         rows = sorted(rows, key=lambda row: (int(row["unknowns"]), row["way"], float(row["mu"])))
-        tables = {"sizes": rows, "phases": json.loads(PHASES.read_text())}
+        tables = {"sizes": rows}
         write(
             "large_punch",
             "Friction beside one linear solve",

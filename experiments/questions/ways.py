@@ -8,7 +8,6 @@ was measured before.
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import subprocess
@@ -23,7 +22,7 @@ from scipy.optimize import nnls
 from contactopt import reduce_bodies, scenes, solve
 from contactopt.coupling.costs import MOST_EXPLICIT, WAYS, seconds, terms
 from contactopt.figures.plots import BLUE, GREEN, ORANGE
-from experiments.report import REPORTS, number, write
+from experiments.report import stored, write
 
 SIZES = {2: (64, 128, 256, 512, 1024), 3: (6, 8, 12, 16, 20, 26)}  # elements across the half-width
 FORMS = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
@@ -221,16 +220,8 @@ def main(rows: list[dict]) -> None:
     )
 
 
-def before() -> list[dict]:
-    with open(REPORTS / "ways" / "rows.csv", newline="") as file:
-        return [
-            {k: number(v) for k, v in row.items()}
-            for row in csv.DictReader(x for x in file if not x.startswith("#"))
-        ]
-
-
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--once"]:
         print(json.dumps(once(int(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5])))
     else:
-        main(before() if sys.argv[1:2] == ["--fit"] else measured())
+        main(stored("ways", "rows") if sys.argv[1:2] == ["--fit"] else measured())

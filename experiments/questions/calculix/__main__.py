@@ -42,27 +42,8 @@ ABSENT = (
     " calculix-ccx` provides its solver, ccx."
 )
 DECADES = {"node-to-surface": range(-1, 10), "surface-to-surface": range(-1, 7)}
-STRAINS = (5.0, 500.0, 5e4)  # MPa
 SIZES = (32, 64)
 REPEATS = 3
-
-
-def strain(program: str, modulus: float) -> dict[str, Any]:
-    """How much of a difference comes with the displacement of the surfaces, which contactopt leaves
-    out.
-    """
-    bench = Bench(program, punch(modulus=modulus))
-    row: dict[str, Any] = {
-        "E [MPa]": modulus,
-        "approach / height": -float(bench.exact.multipliers[0]) / 40.0,
-    }
-    for law, factor in (("node-to-surface", 1e3), ("surface-to-surface", 1e3), ("mortar", RIGID)):
-        measured = bench.row(law, factor)
-        failed = measured["end"] != "converged"
-        row[f"{law}: normal"] = measured["end"] if failed else measured["normal, L2"]
-        row[f"{law}: tangential"] = measured["tangential, L2"]
-        row[f"{law}: attempts"] = measured["attempts"]
-    return row
 
 
 def costs(program: str, elements: int, sweep: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -213,8 +194,7 @@ thick as the section. With full integration and no incompatible modes, this is o
 Mortar contact needs these bricks written out in the deck.
 
 The material is stiff (E = {modulus:g} MPa). The forces of contactopt do not depend on E. With
-strains of 1e-7 the comparison does not depend on what ccx does to displaced surfaces, which the
-third table shows. There is one static step with the full load in one increment. ccx may cut it down
+strains of 1e-7 the comparison does not depend on what ccx does to displaced surfaces. There is one static step with the full load in one increment. ccx may cut it down
 to {least:g} of the load, by its default criteria. The upper body is the slave. The master is the
 whole top of the foundation, because nodes would slide over the edge of a master that is as wide as
 the punch. For every contact law the nodal forces are integrated from the stresses that ccx prints
@@ -238,13 +218,6 @@ peak, and the one in L2. The other columns are:
 - `iterations`: those of all attempts.
 
 {{rows}}
-
-**Softer bodies.** The table has the same L2 differences at the factor 1e3. Those of node-to-surface
-contact grow with the displacements, even without NLGEOM. This suggests that its normals turn with
-the surfaces. Surface-to-surface contact, mortar contact and contactopt do not depend on the
-displacements.
-
-{{strain}}
 
 **Time and memory.** The table has medians of {repeats} runs in turn on one thread. The ratio is the
 median of the ratios. ccx runs at the most accurate factor of the second table at which one attempt
@@ -326,7 +299,6 @@ def main() -> None:
     laws = [(law, 10.0**decade) for law, decades in DECADES.items() for decade in decades]
     sweep = [bench.row(law, factor) for law, factor in [*laws, ("mortar", RIGID)]]
     cost = [row for elements in SIZES for row in costs(program, elements, sweep)]
-    soft = [strain(program, modulus) for modulus in STRAINS]
     text = TEXT.format(
         findings=findings(check, sweep, cost),
         mu=MU,
@@ -337,7 +309,7 @@ def main() -> None:
         rigid=RIGID,
         repeats=REPEATS,
     )
-    tables = {"linear": [check], "rows": sweep, "strain": soft, "costs": cost}
+    tables = {"linear": [check], "rows": sweep, "costs": cost}
     tables = {stem: [row | {"ccx": name} for row in rows] for stem, rows in tables.items()}
     write("calculix", "CalculiX on the same mesh", text, tables, {"penalty": figure(bench, sweep)})
 
