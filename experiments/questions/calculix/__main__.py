@@ -194,11 +194,12 @@ thick as the section. With full integration and no incompatible modes, this is o
 Mortar contact needs these bricks written out in the deck.
 
 The material is stiff (E = {modulus:g} MPa). The forces of contactopt do not depend on E. With
-strains of 1e-7 the comparison does not depend on what ccx does to displaced surfaces. There is one static step with the full load in one increment. ccx may cut it down
-to {least:g} of the load, by its default criteria. The upper body is the slave. The master is the
-whole top of the foundation, because nodes would slide over the edge of a master that is as wide as
-the punch. For every contact law the nodal forces are integrated from the stresses that ccx prints
-with seven digits. contactopt solves to a certificate of 1e-11.
+strains of 1e-7 the comparison does not depend on what ccx does to displaced surfaces. There is one
+static step with the full load in one increment. ccx may cut it down to {least:g} of the load, by
+its default criteria. The upper body is the slave. The master is the whole top of the foundation,
+because nodes would slide over the edge of a master that is as wide as the punch. For every contact
+law the nodal forces are integrated from the stresses that ccx prints with seven digits. contactopt
+solves to a certificate of 1e-11.
 
 **Bonded, without contact.** The differences are relative to the largest value:
 
