@@ -8,19 +8,15 @@ their edges and stick inside. Walls are coupled by mortar, since bricks are stag
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from dataclasses import replace
 from statistics import median
 from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[variable] = "1"
+import numpy as np
 
-import numpy as np  # noqa: E402
-
-from contactopt import (  # noqa: E402
+from contactopt import (
     BodyForce,
     Contact,
     Material,
@@ -31,8 +27,8 @@ from contactopt import (  # noqa: E402
     reduce_bodies,
     solve,
 )
-from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt.meshes.structured import rename, tensor_mesh
+from experiments.report import write
 
 BODIES = (2, 4, 8, 16, 32)
 CELLS = 16  # elements along each side of a block

@@ -8,19 +8,14 @@ within seconds; the other methods follow.
 
 from __future__ import annotations
 
-import os
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-import statistics  # noqa: E402
-import sys  # noqa: E402
-import time  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Any  # noqa: E402
-
-from contactopt import InterfaceProblem, Solution, fclib, siconos_residual, solve  # noqa: E402
-from experiments.report import markdown, write  # noqa: E402
+from contactopt import InterfaceProblem, Solution, fclib, siconos_residual, solve
+from experiments.report import markdown, write
 
 DEFAULT, OTHERS = "auto", ("proximal", "nsgs", "admm")
 TOL = 1e-8

@@ -8,29 +8,25 @@ their time limit by more than a second.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
+import scipy.sparse as sp
 
-import contextlib  # noqa: E402
-import io  # noqa: E402
-import sys  # noqa: E402
-import tempfile  # noqa: E402
-import time  # noqa: E402
-import warnings  # noqa: E402
-from collections import Counter  # noqa: E402
-from collections.abc import Callable  # noqa: E402
-from concurrent.futures import ProcessPoolExecutor  # noqa: E402
-from dataclasses import replace  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Any  # noqa: E402
-
-import numpy as np  # noqa: E402
-import scipy.sparse as sp  # noqa: E402
-
-import contactopt as co  # noqa: E402
-from contactopt.methods import METHODS  # noqa: E402
+import contactopt as co
+from contactopt.methods import METHODS
 
 CASES, PROCESSES = 5000, 2
 LIMIT, SLACK = 0.3, 1.0  # seconds

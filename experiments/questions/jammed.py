@@ -4,25 +4,20 @@ points do not?
 
 from __future__ import annotations
 
-import os
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import statistics  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Callable  # noqa: E402
-from typing import Any  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import InterfaceProblem, solve  # noqa: E402
-from contactopt.benchmark.packings import packing  # noqa: E402
-from contactopt.methods.kernels.homotopy import homotopy_iterates  # noqa: E402
-from contactopt.methods.kernels.interior import Path, interior_iterates  # noqa: E402
-from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix  # noqa: E402
-from contactopt.problem import dimensionless  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt import InterfaceProblem, solve
+from contactopt.benchmark.packings import packing
+from contactopt.methods.kernels.homotopy import homotopy_iterates
+from contactopt.methods.kernels.interior import Path, interior_iterates
+from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
+from contactopt.problem import dimensionless
+from experiments.report import write
 
 # dimension, bodies, contacts of a pair of bodies
 FAMILIES = ((2, 25, 1), (2, 64, 2), (3, 18, 3), (3, 27, 2))

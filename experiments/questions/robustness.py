@@ -4,18 +4,13 @@ freedom?
 
 from __future__ import annotations
 
-import os
+import time
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import time  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import solve  # noqa: E402
-from contactopt.benchmark.problems import rigid_bodies  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt import solve
+from contactopt.benchmark.problems import rigid_bodies
+from experiments.report import write
 
 METHODS = ("auto", "newton", "proximal", "acary_cadoux", "admm", "nsgs")
 SIZES = ((10, 30), (10, 40), (15, 90))  # bodies, contacts

@@ -8,20 +8,15 @@ making says: that it has no solution, or which reactions are the only ones.
 
 from __future__ import annotations
 
-import os
+import sys
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import sys  # noqa: E402
-from collections import Counter  # noqa: E402
-from concurrent.futures import ProcessPoolExecutor  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import InterfaceProblem, Solution, solve  # noqa: E402
-from contactopt.linear.operators import dense  # noqa: E402
-from experiments.questions.coulomb_check import violations  # noqa: E402
+from contactopt import InterfaceProblem, Solution, solve
+from contactopt.linear.operators import dense
+from experiments.questions.coulomb_check import violations
 
 METHODS = ("auto", "auto", "newton", "proximal", "nsgs")
 TOL, SLACK = 1e-8, 20.0  # the check's own conditions are combinations of the certificate's

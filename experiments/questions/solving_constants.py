@@ -7,24 +7,19 @@ is written.
 
 from __future__ import annotations
 
-import os
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from importlib import import_module
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-import time  # noqa: E402
-from collections.abc import Iterator  # noqa: E402
-from contextlib import ExitStack, contextmanager  # noqa: E402
-from importlib import import_module  # noqa: E402
-from typing import Any  # noqa: E402
-
-from contactopt import InterfaceProblem, reduce, scenes, solve  # noqa: E402
-from contactopt.benchmark.packings import packing  # noqa: E402
-from contactopt.benchmark.problems import rigid_bodies  # noqa: E402
-from contactopt.methods import constants, find_method  # noqa: E402
-from contactopt.methods.nested import Nested  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt import InterfaceProblem, reduce, scenes, solve
+from contactopt.benchmark.packings import packing
+from contactopt.benchmark.problems import rigid_bodies
+from contactopt.methods import constants, find_method
+from contactopt.methods.nested import Nested
+from experiments.report import write
 
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them

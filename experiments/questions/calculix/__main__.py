@@ -4,27 +4,22 @@ and at what cost?
 
 from __future__ import annotations
 
-import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[variable] = "1"
+import numpy as np
 
-import shutil  # noqa: E402
-import subprocess  # noqa: E402
-import sys  # noqa: E402
-import time  # noqa: E402
-from pathlib import Path  # noqa: E402
-from statistics import median  # noqa: E402
-from typing import Any  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import solve  # noqa: E402
-from contactopt.coupling.back_to_bodies import recover  # noqa: E402
-from contactopt.coupling.reduction import reduce_bodies  # noqa: E402
-from contactopt.figures.style import BLUE, GREEN, ORANGE  # noqa: E402
-from experiments.questions.calculix.deck import LEAST  # noqa: E402
-from experiments.questions.calculix.run import (  # noqa: E402
+from contactopt import solve
+from contactopt.coupling.back_to_bodies import recover
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.figures.style import BLUE, GREEN, ORANGE
+from experiments.questions.calculix.deck import LEAST
+from experiments.questions.calculix.run import (
     MU,
     RIGID,
     STIFF,
@@ -35,7 +30,7 @@ from experiments.questions.calculix.run import (  # noqa: E402
     punch,
     softened,
 )
-from experiments.report import write  # noqa: E402
+from experiments.report import write
 
 ABSENT = (
     "CalculiX is not installed, so nothing was compared: on Debian or Ubuntu `apt-get install"

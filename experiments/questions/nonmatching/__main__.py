@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import logging
-import os
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[variable] = "1"
-
-from experiments.questions.nonmatching import accuracy, exact  # noqa: E402
-from experiments.report import measure  # noqa: E402
+from experiments.questions.nonmatching import accuracy, exact
+from experiments.report import measure
 
 TEXT = """How accurate is contact between meshes whose nodes do not match? contactopt chooses a
 mortar coupling with dual multipliers for them (`contactopt/coupling/mortar.py`). In the tables

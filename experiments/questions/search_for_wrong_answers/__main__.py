@@ -7,20 +7,15 @@ another way can say.
 
 from __future__ import annotations
 
-import os
+import logging
+import sys
+import time
+from collections.abc import Iterator
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import logging  # noqa: E402
-import sys  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Iterator  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from experiments.questions.search_for_wrong_answers.compare import Verdict, judge  # noqa: E402
-from experiments.questions.search_for_wrong_answers.families import FAMILIES  # noqa: E402
+from experiments.questions.search_for_wrong_answers.compare import Verdict, judge
+from experiments.questions.search_for_wrong_answers.families import FAMILIES
 
 SCENES = 300  # ten of them suffice for a first look
 TEXT = """Is an answer right whose certificate is right? This report solves random scenes (seeds
