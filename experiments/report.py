@@ -1,6 +1,4 @@
-"""What every experiment writes: reports/NAME/report.md, its table as CSV with the environment, its
-figures.
-"""
+"""What every experiment writes: reports/NAME/ with report, tables as CSV, and figures."""
 
 from __future__ import annotations
 
@@ -109,9 +107,7 @@ def measure(
 def merged(
     name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    """The committed table of an experiment with these rows in place of those that have the same
-    values of `keys`.
-    """
+    """The committed table with these rows in place of those with the same `keys`."""
     new = {tuple(str(row[key]) for key in keys): row for row in rows}
     kept = stored(name, table)
     return [new.pop(tuple(str(row[key]) for key in keys), row) for row in kept] + list(new.values())

@@ -54,9 +54,7 @@ def chain(count: int) -> Scene:
 
 
 def wall(count: int) -> Scene:
-    """Rows of WALL bricks, every second one moved by a quarter of a brick, pushed sideways a
-    little.
-    """
+    """Rows of WALL bricks, every second one a quarter of a brick aside, pushed sideways."""
     bodies: list[Part] = []
     contacts: list[Contact] = []
     below: list[tuple[str, float]] = []
@@ -78,9 +76,7 @@ def wall(count: int) -> Scene:
 
 
 def pressed(scene: Scene) -> Scene:
-    """The scene without weight: plates press its highest bodies, and bodies are stiff or soft, row
-    by row.
-    """
+    """The scene without weight, pressed by plates from above; rows are stiff and soft by turns."""
     parts = [part for part in scene.parts if isinstance(part, Part)]
     rows = [round(float(part.build_mesh(CELLS, None).p[1].min())) for part in parts]
     made: list[Any] = [FLOOR]

@@ -1,6 +1,4 @@
-"""What do the solvers of a body's linear system cost as the mesh is refined? `--large`: up to a
-million unknowns.
-"""
+"""What do the solvers of a body's linear system cost? `--large`: up to a million unknowns."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ COLOURS = {"superlu": "#0072B2", "pardiso": "#009E73", "multigrid": "#D55E00", P
 
 
 def system(part: str, elements: int) -> tuple[System, np.ndarray]:
-    """What the solvers of one body of the 3D punch are made from, and a random load on its contact
-    unknowns.
-    """
+    """What a solver of a body of the 3D punch is made from, and a random load on its contacts."""
     scene = scenes.flat_punch(3)
     body = build_body(scene, getattr(scene, part), elements, None)
     dofs, free = np.asarray(body.basis.nodal_dofs), body.free

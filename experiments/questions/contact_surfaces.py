@@ -13,7 +13,6 @@ from dataclasses import replace
 import gmsh
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.sparse.linalg import LinearOperator
 from skfem import MeshQuad, MeshTet
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
@@ -28,8 +27,6 @@ RATIOS = (1e-4, 1.0, 1e4)  # stiffness of the lower body over that of the upper 
 SIZES = (0.3, 0.13)  # of the triangles
 FINER = 0.075  # on the first two surfaces, at a ratio of one
 AROUND = (100, 1000)  # nodes around the ring
-LANCZOS = 25  # steps that estimate a condition number without the entries of Q
-MANY = 10_000  # nodes around the ring without the entries of Q
 UPPER, LOWER = 1.0, -1.0
 
 
@@ -97,9 +94,7 @@ def triangles(name: str, size: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def extruded(points: np.ndarray, cells: np.ndarray, levels: np.ndarray) -> MeshTet:
-    """The prisms over triangles, each cut into three tetrahedra; neighbours agree because corners
-    are sorted.
-    """
+    """Prisms over triangles, each cut into three tetrahedra; sorted corners make them agree."""
     k, cells = points.shape[1], np.sort(cells, axis=0)
     p = np.concatenate([np.concatenate([points, np.full((1, k), z)]) for z in levels], axis=1)
     tetrahedra = []
@@ -179,50 +174,6 @@ def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, objec
     return row
 
 
-def lanczos(P: LinearOperator, Q: LinearOperator) -> float:
-    """Condition of P Q from below, by Lanczos' method in the inner product of P, orthogonalised
-    twice.
-    """
-    w = np.random.default_rng(0).normal(size=Q.shape[0])
-    basis: list[np.ndarray] = []
-    images: list[np.ndarray] = []
-    T = np.zeros((LANCZOS, LANCZOS))
-    for j in range(LANCZOS):
-        Pw = P @ w
-        size = np.sqrt(w @ Pw)
-        basis.append(w / size)
-        images.append(Pw / size)
-        w = Q @ images[j]
-        for _ in range(2):
-            for i in range(j + 1):
-                share = images[i] @ w
-                T[i, j] += share
-                w = w - share * basis[i]
-    values = np.linalg.eigvalsh(np.triu(T) + np.triu(T, 1).T)
-    return float(values[-1] / values[0])
-
-
-def many(n: int) -> dict[str, object]:
-    """The ring without the entries of Q."""
-    problem = reduce_bodies(ring(n), Q="implicit").problem
-    P = preconditioner(problem, "laplacian")
-    Q = LinearOperator((problem.q.size,) * 2, matvec=lambda x: problem.Q @ x.ravel(), dtype=float)
-    row: dict[str, object] = {
-        "surface": "closed ring, in the plane",
-        "contacts": problem.contacts,
-        "ratio": 1.0,
-    }
-    for title, chosen in (
-        ("laplacian", P),
-        ("deflated", deflated(P, problem.Q, smooth_motions(problem))),
-    ):
-        row |= {
-            f"{title}: condition (from below)": lanczos(chosen, Q),
-            f"{title}: iterations": iterations(chosen, Q),
-        }
-    return row
-
-
 def draw(rows: list[dict]) -> Figure:
     figure = Figure(figsize=(7, 5), layout="constrained")
     ax = figure.subplots()
@@ -267,11 +218,6 @@ motions are solved for exactly. The only number that was fitted to stubs is ALON
    {least:.2f} to {largest:.2f}.
 
 {{rows}}
-
-The last table has the ring with so many contacts that Q is known by its products only. The
-condition number is an estimate from below by the method of Lanczos:
-
-{{many}}
 """
 
 
@@ -325,7 +271,7 @@ def main() -> None:
             rows += [judge(name, *pair) for pair in pairs(stubs(name, FINER), RATIOS[1:2])]
     for n in AROUND:
         rows += [judge("closed ring, in the plane", *pair) for pair in pairs(ring(n), RATIOS)]
-    tables = {"rows": rows, "many": [many(MANY)]}
+    tables = {"rows": rows}
     write(
         "contact_surfaces",
         "`laplacian` on contact surfaces of any shape",

@@ -35,9 +35,7 @@ def timed(act: Callable[[], Any]) -> tuple[Any, float, float]:
 
 
 def bonded(upper: Assembly, lower: Assembly, solver: str) -> Callable[[], np.ndarray]:
-    """The direct solve of the bonded bodies under the plate's unit motion: order, factorise,
-    substitute once.
-    """
+    """The direct solve of the bonded bodies under the plate's unit motion, with its factors."""
     count = [b.basis.mesh.p.shape[1] for b in (upper, lower)]
     partner = {tuple(np.round(x, 9)): n for x, n in zip(lower.points.T, lower.nodes)}
     node = [np.arange(count[0]), count[0] + np.arange(count[1])]

@@ -151,9 +151,7 @@ def files(rng: np.random.Generator, folder: Path) -> None:
 
 
 def scenes(rng: np.random.Generator, folder: Path) -> None:
-    """Scenes, parts, loads and supports of wrong kinds; two bodies of one name; a path of unlike
-    states.
-    """
+    """Scenes of wrong kinds; two bodies of one name; a path of unlike states."""
     scene = co.scenes.flat_punch(dim=2)
     kind = any_of(rng, PLACES)
     if kind == "material":

@@ -1,6 +1,4 @@
-"""How often does a path that may turn back reach a solution of a jammed packing where interior
-points do not?
-"""
+"""Does a path that may turn back solve jammed packings where interior points do not?"""
 
 from __future__ import annotations
 

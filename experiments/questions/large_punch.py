@@ -86,9 +86,7 @@ def isolated(elements: int, way: str, mu: float) -> dict[str, object]:
 
 
 def runs(sizes: list[int]) -> list[tuple[int, str, float]]:
-    """All sizes with the largest friction; at those COMPARED all coefficients, and
-    products with Q.
-    """
+    """All sizes with the largest friction; those COMPARED with all, and with products."""
     chosen = [(n, "coupled", FRICTION[-1]) for n in sizes]
     more = [n for n in sizes if n in COMPARED]
     chosen += [(n, "coupled", mu) for n in more for mu in FRICTION[:-1]]

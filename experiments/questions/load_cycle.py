@@ -1,6 +1,4 @@
-"""What does a load path cost in accuracy and time: how many states, and where does the
-energy go?
-"""
+"""What does a load path cost in accuracy and time: how many states, how much energy?"""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""How good are the paper's H^1/2 preconditioners, what beats them, and what do products with Q
-cost?
-"""
+"""How good are the paper's H^1/2 preconditioners, and what beats them?"""
 
 from __future__ import annotations
 
@@ -86,9 +84,7 @@ def solids(
     Q: str = "explicit",
     nu: float = 0.3,
 ) -> InterfaceProblem:
-    """The same bodies in 3D (16 x 16 x 8 foundation, growth 1.3), the punch held on top; n x n
-    contact nodes.
-    """
+    """The same bodies in 3D, the punch held on top; growth 1.3, n x n contact nodes."""
     zone = np.linspace(-2, 2, n) if zone is None else zone
     h = zone[-1] - zone[-2]
     out = 2 + graded(6, 1.3 * h, 1.3)[1:]
@@ -125,9 +121,7 @@ def iterations(P: np.ndarray | LinearOperator | None, Q: Interface) -> int:
 
 
 def choices(problem: InterfaceProblem) -> dict[str, Preconditioner | None]:
-    """No preconditioner, each by itself, each with the smooth motions deflated; without the entries
-    of Q the best alone.
-    """
+    """None, each by itself, each with smooth motions deflated; without entries the best alone."""
     plain: dict[str, Preconditioner | None] = {"none": None}
     known = [name for name in PRECONDITIONERS if problem.dim == 2 or name != "p22"]
     plain |= {name: preconditioner(problem, name) for name in known}
@@ -165,9 +159,7 @@ def of_bodies(problem: InterfaceProblem, name: str) -> dict[str, object]:
 
 
 def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
-    """Only the contacts in the middle are active: half-width `share` of that of the contact
-    surface.
-    """
+    """Only contacts in the middle are active: half-width `share` of that of the surface."""
     x = problem.coordinates[: problem.dim - 1]
     inside = np.sqrt(np.sum(x**2, axis=0)) <= 2 * share + 1e-9
     active = np.flatnonzero(np.repeat(inside, problem.dim))

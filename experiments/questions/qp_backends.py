@@ -1,6 +1,4 @@
-"""Do all QP backends give the same answer at tight settings, and which needs the crossover
-for it?
-"""
+"""Do all QP backends give the same answer, and which needs the crossover for it?"""
 
 from __future__ import annotations
 
@@ -51,9 +49,7 @@ def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
 
 
 def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
-    """The first answer of the first try, in place of
-    contactopt.methods.kernels.semismooth.certified.
-    """
+    """The first answer of the first try, in place of `semismooth.certified`."""
     r, multipliers = next(iter(solvers))[1]()
     return r.reshape(equations.q.shape), multipliers
 

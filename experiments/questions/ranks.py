@@ -1,6 +1,4 @@
-"""Do bodies on ranks of their own give the same answers, how evenly do the ranks work, and what
-travels between them?
-"""
+"""How evenly do ranks of MPI work on bodies of their own, and what travels between them?"""
 
 from __future__ import annotations
 
@@ -54,9 +52,7 @@ class Clocks:
         self._lock = threading.Lock()
 
     def read(self, other: float = 0.0, waited: float = 0.0) -> float:
-        """The clock without the CPU time that looking for messages took, set forward to another
-        one.
-        """
+        """The clock without the CPU time of looking for messages, set forward to another one."""
         with self._lock:
             cpu = time.process_time()
             self.now, self._last = max(self.now + cpu - self._last - waited, other), cpu
@@ -140,9 +136,7 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
 
 
 def traffic(team: Team, height: float) -> dict[str, Any]:
-    """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the
-    answer.
-    """
+    """One body on each rank: what a product with Q sends, and the answer."""
     scene = sliced(
         scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height),
         "foundation",

@@ -1,6 +1,4 @@
-"""How often does each method fail on random rigid-body problems with more contact unknowns than
-freedom?
-"""
+"""How often does each method fail on rigid bodies with more contacts than freedom?"""
 
 from __future__ import annotations
 

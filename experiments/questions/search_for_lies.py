@@ -83,9 +83,7 @@ def distant(rng, k, d):  # type: ignore[no-untyped-def]
 
 
 def frictionless(Q, q, far):  # type: ignore[no-untyped-def]
-    """The normal reactions (k,) of the contacts that are not far, by trying all sets of closed
-    ones.
-    """
+    """The normal reactions (k,) of near contacts, by trying all sets of closed ones."""
     near = np.flatnonzero(~far)
     d = q.shape[1]
     for bits in range(2 ** len(near)):
@@ -150,9 +148,7 @@ FAMILIES = (
 
 
 def make(seed: int) -> tuple[str, dict]:
-    """The case of that seed: its family's name and its data, in units drawn at random from 1e-12 to
-    1e12.
-    """
+    """The case of that seed: its family's name and its data, in random units."""
     rng = np.random.default_rng(seed)
     family = FAMILIES[seed % len(FAMILIES)]
     k, d = int(rng.integers(1, 6)), int(rng.integers(2, 4))
@@ -170,9 +166,7 @@ def make(seed: int) -> tuple[str, dict]:
 
 
 def answered(case: dict, seed: int, force: float = 1.0, length: float = 1.0):  # type: ignore[no-untyped-def]
-    """The answer of the case's method, and its problem, in other units; None where the load pulls
-    the bodies apart.
-    """
+    """The answer and its problem in other units; None where the load pulls the bodies apart."""
     Q, q, s = case["Q"] * (length / force), case["q"] * length, case["s"] * force
     problem = InterfaceProblem(Q, q, case["mu"], case["V"], s)
     try:
@@ -186,9 +180,7 @@ def method_of(seed: int) -> str:
 
 
 def changed(case: dict, seed: int, answer: Solution) -> str:
-    """What is different in other units, of every UNITS_OF-th case of a family: the status, or an
-    answer that was certified.
-    """
+    """What is different in other units, of every UNITS_OF-th case: status, or certified answer."""
     if seed // len(FAMILIES) % UNITS_OF or answer.status.label == "time_limit":
         return ""
     for force, length in SCALES:

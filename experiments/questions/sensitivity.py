@@ -59,9 +59,7 @@ SCENES: dict[str, tuple[Callable[[], Any], tuple[str, ...], tuple[str, ...], dic
 
 
 def random_problem(seed: int, dim: int) -> InterfaceProblem:
-    """Positive definite Q, every third one unsymmetric, every second pressed by a plate; 8 to 20
-    contacts.
-    """
+    """Positive definite Q, every third unsymmetric, every second with a plate; 8 to 20 contacts."""
     rng = np.random.default_rng(seed)
     k = int(rng.integers(8, 21))
     n, p = k * dim, seed % 2
@@ -161,9 +159,7 @@ def value(quantity: str, result: Solved) -> float:
 
 
 def through_scenes() -> list[dict[str, Any]]:
-    """The best of central differences with two steps, so that neither rounding nor curvature of the
-    difference decides.
-    """
+    """The best of two central differences: neither rounding nor curvature decides."""
     rows = []
     for name, (make, names, quantities, settings) in SCENES.items():
         scene = make()
@@ -205,9 +201,7 @@ def cpu(act: Callable[[], Any], repeats: int = 5) -> float:
 
 
 def single_step(problem: InterfaceProblem, solution: Solution) -> float:
-    """CPU seconds of one dense Newton step at the solution, with its own factorisation; nan where Q
-    is no array.
-    """
+    """CPU seconds of one dense Newton step with its factors; nan where Q is no array."""
     if not isinstance(problem.Q, np.ndarray):
         return float("nan")
     scaled, scales = dimensionless(problem)
@@ -218,9 +212,7 @@ def single_step(problem: InterfaceProblem, solution: Solution) -> float:
 
 
 def costs() -> list[dict[str, Any]]:
-    """CPU seconds of all derivatives of one quantity, and of one step of the solve that they come
-    from.
-    """
+    """CPU seconds of all derivatives of one quantity, and of the solve before."""
     rows = []
     cases = (
         ("punch-2d, dense", lambda: scenes.flat_punch(2, elements=512), {"Q": "explicit"}),

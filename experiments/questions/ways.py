@@ -39,9 +39,7 @@ COLOURS = {"dense": BLUE, "products": GREEN, "coupled": ORANGE}
 
 
 def once(dim: int, elements: int, way: str, solver: str) -> dict[str, object]:
-    """CPU time of one run with one thread of BLAS, in a process of its own; what is imported late
-    is imported before.
-    """
+    """CPU time of one run with one BLAS thread; late imports are made before."""
     scene = scenes.flat_punch(dim, mu=MU)
     solve(reduce_bodies(scene, 3, Q=FORMS[way], solver=solver).problem, "newton")
     begin = time.process_time()
@@ -86,9 +84,7 @@ def measured() -> list[dict[str, object]]:
 
 
 def fitted(rows: list[dict]) -> list[dict[str, object]]:
-    """COSTS by least squares of relative errors over numbers that are not negative, and how far the
-    estimates are off.
-    """
+    """COSTS by least squares of relative errors, not negative, and how far they are off."""
     found: list[dict[str, object]] = []
     for dim, solver in dict.fromkeys((row["dim"], row["solver"]) for row in rows):
         mine = [row for row in rows if (row["dim"], row["solver"]) == (dim, solver)]
@@ -171,9 +167,7 @@ and methods other than Newton's. In the plane `coupled` takes less than both oth
 
 
 def crossing(places: Places, dim: int, solver: str, share: float) -> float:
-    """Unknowns from which on `coupled` takes less than that share of the time of the others, for
-    contacts as on the punches.
-    """
+    """Unknowns from which on `coupled` takes less than that share of the time of the others."""
     n, m = np.log(np.array(places[dim]).T)
     slope, start = np.polyfit(n, m, 1)
     for size in np.geomspace(3e3, 1e7, 400):

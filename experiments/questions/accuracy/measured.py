@@ -1,6 +1,4 @@
-"""What the report on accuracy measures: errors against exact solutions, and error estimates against
-true errors.
-"""
+"""Errors against exact solutions, and error estimates against true errors."""
 
 from __future__ import annotations
 
@@ -122,9 +120,7 @@ def all_effectivities() -> list[dict[str, object]]:
 
 
 def finite(size: float) -> dict[str, object]:
-    """Errors of a block `size` half-widths high and wide for a half-space, less those of the
-    largest block.
-    """
+    """Errors of a block `size` half-widths high and wide, less those of the largest block."""
     row: dict[str, object] = {"size / a": size}
     begin = time.perf_counter()
     for name, scene in (

@@ -1,6 +1,4 @@
-"""Does CalculiX, an independent finite-element code, find the same contact forces on the same mesh,
-and at what cost?
-"""
+"""Does CalculiX, another code, find the same forces on the same mesh, and at what cost?"""
 
 from __future__ import annotations
 

@@ -69,9 +69,7 @@ class Case:
     exact: Callable[[], dict[str, float]] | None = None
 
     def reference(self) -> tuple[dict[str, float], dict[str, float]]:
-        """The references, and their relative errors: that of a mesh is by how much one twice as
-        coarse differs.
-        """
+        """The references, and their relative errors, from a mesh that is twice as coarse."""
         if self.exact is not None:
             return self.exact(), dict.fromkeys(self.quantities, SURE)
         coarse, fine = (

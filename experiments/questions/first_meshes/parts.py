@@ -30,9 +30,7 @@ STEEL = Material(210e3, 0.3)
 
 @dataclass(frozen=True)
 class First:
-    """A first mesh: size of the elements over that of the part, whether it is graded to the
-    contact, order and degree.
-    """
+    """A first mesh: size over that of the part, graded to the contact or not, order."""
 
     size: float
     graded: bool
@@ -44,9 +42,7 @@ class First:
 
 
 def save(gmsh: Any, file: Path, body: list[tuple[int, int]], side: Callable[..., str]) -> Path:
-    """Mesh a body and write it, with its boundaries named by a function of their centre, kind of
-    curve, and length or area.
-    """
+    """Mesh a body and write it; `side` names boundaries by centre, kind of curve, and length."""
     gmsh.model.occ.synchronize()
     dim = body[0][0]
     gmsh.model.addPhysicalGroup(dim, [tag for _, tag in body], name=file.stem)
@@ -66,9 +62,7 @@ def save(gmsh: Any, file: Path, body: list[tuple[int, int]], side: Callable[...,
 
 
 def rounded(gmsh: Any, corners: list[tuple[float, float, float]]) -> list[tuple[int, int]]:
-    """The surface inside a polygon whose corners (x, y, radius) are rounded where the radius is not
-    zero.
-    """
+    """The surface inside a polygon with corners (x, y, radius), rounded unless the radius is 0."""
     occ = gmsh.model.occ
     ends = []
     for i, (x, y, radius) in enumerate(corners):
@@ -94,9 +88,7 @@ def rounded(gmsh: Any, corners: list[tuple[float, float, float]]) -> list[tuple[
 
 
 class Mesher:
-    """Meshes of one scene, all of one kind; a graded one is fine where `distance`, a formula in x
-    and y, is small.
-    """
+    """Meshes of one scene; a graded one is fine where `distance`, a formula, is small."""
 
     def __init__(self, first: First, size: float, distance: str, small: float):
         self.first, self.size, self.distance, self.small = first, size * first.size, distance, small
@@ -132,9 +124,7 @@ ENDS = "min(sqrt((x-5.73)^2+(y-0.27)^2),sqrt((x-8.77)^2+(y+2.77)^2))"
 
 
 def dovetail(first: First, small: float = 0.3) -> Scene:
-    """Half a blade that is pulled out of a slot; both ends of its flat flank are rounded, one on
-    each body.
-    """
+    """Half a blade that is pulled out of a slot; both ends of its flat flank are rounded."""
     mesh = Mesher(first, 1.5, ENDS, small)
 
     def side(centre: np.ndarray, kind: str, length: float) -> str:

@@ -72,9 +72,7 @@ def _summit(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 
 def cattaneo_rows() -> list[Row]:
-    """Cattaneo and Mindlin, sheared to half of mu P at nu = 0, where they are exact, and at nu =
-    .3.
-    """
+    """Sheared to half of mu P at nu = 0, where the formulas are exact, and at nu = .3."""
     rows, tractions = [], {}
     for nu, elements in ((0.0, 32), (0.0, 64), (0.0, 128), (0.3, 32), (0.3, 64), (0.3, 128)):
         material = Material(5.0, nu)

@@ -1,6 +1,4 @@
-"""The same Hertz contact by finite elements and by half-spaces: error over time, and where the
-half-space is wrong.
-"""
+"""The same Hertz contact by finite elements and by half-spaces: error over time."""
 
 from __future__ import annotations
 

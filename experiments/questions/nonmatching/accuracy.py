@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from contactopt import reduce_bodies, scenes, solve
-from contactopt.readings.quantities import stick_width
 from contactopt.scenes.sliding import _sheared
 from contactopt.solving.paths import follow
 from experiments.questions.accuracy.sheared import error
-from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
+from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch
 
 METHODS = ("newton", "auto")
 FINE = 192
@@ -50,9 +49,7 @@ def press_fits() -> list[dict[str, Any]]:
 
 
 def resultant_curve(problem: Any, reactions: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Contact forces between the axis and some places, (2, places): what converges where pressures
-    are singular.
-    """
+    """Contact forces (2, places) from the axis to some places: they converge at any pressure."""
     order = np.argsort(problem.coordinates[0])
     x = problem.coordinates[0][order]
     ends = np.concatenate([[0.0], (x[1:] + x[:-1]) / 2, x[-1:]])
@@ -74,34 +71,6 @@ def elastic_punch() -> list[dict[str, Any]]:
             row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}"}
             row |= {"normal": float(rms[0]), "tangential": float(rms[1])}
             rows.append(row | steps(found))
-    return rows
-
-
-def rigid_punch() -> list[dict[str, Any]]:
-    """Stick ratio against Spence, exact for the rigid punch; the matching row is the named scene
-    with a body without mesh.
-    """
-    rows = []
-    for kind in ("plane-strain", "axisymmetric"):
-        for mu in (0.1, 0.3, 0.5):
-            for upper in (0, 48):
-                exact = scenes.rigid_punch(kind, mu=mu).reference
-                scene = (
-                    scenes.rigid_punch(kind, mu=mu, elements=64)
-                    if not upper
-                    else stiff_punch(kind, upper, 64, mu)
-                )
-                reduction = reduce_bodies(scene)
-                found = {method: solve(reduction.problem, method=method) for method in METHODS}
-                ratio = stick_width(reduction, found["newton"])[0] / 20.0
-                row: dict[str, Any] = {
-                    "kind": kind,
-                    "mu": mu,
-                    "punch": "elastic, 48 cells" if upper else "rigid",
-                }
-                row |= {"c / a": float(ratio), "exact": exact.stick_half_width / exact.half_width}
-                row |= {"error": float(ratio - exact.stick_half_width / exact.half_width)}
-                rows.append(row | steps(found))
     return rows
 
 
@@ -143,9 +112,7 @@ def sheared(
 
 
 def cattaneo() -> list[dict[str, Any]]:
-    """Root mean squares of both errors over several shears, each on meshes made for it, and on
-    meshes made for another one.
-    """
+    """Root mean squares of both errors over several shears, on meshes for them and for others."""
     rows = []
     for made, shears in ((None, SHEARS), (45.0, OTHERS)):
         for degree in (1, 2):

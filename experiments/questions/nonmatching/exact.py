@@ -32,9 +32,7 @@ def patch_tests() -> list[dict[str, Any]]:
 
 
 def resultants(reduction: Reduction, reactions: np.ndarray) -> tuple[float, float]:
-    """Sum of the nodal forces on both bodies and of their moments, over the sum of the forces'
-    sizes (and the extent).
-    """
+    """Sums of all nodal forces and of their moments, over the forces' sizes (and the extent)."""
     force, moment, extent = np.zeros(2), 0.0, 0.0
     for body, B in zip(reduction.bodies, reduction.maps):
         f, x = (B.T @ reactions.ravel())[body.body.unknowns], body.body.locations

@@ -76,9 +76,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """A scene of blocks: contacts by names, friction, what else the scene needs, and the size of
-    its first elements.
-    """
+    """A scene of blocks: contacts by names, friction, settings, and the size of its elements."""
 
     blocks: tuple[Block, ...]
     contacts: tuple[tuple[str, str], ...]
@@ -100,9 +98,7 @@ class Blocks:
         return Scene("search", bodies=(*bodies, *self.rigid), contacts=pairs, degree=degree, **own)
 
     def matching(self, rng: Random, depth: float | None = None) -> Way:
-        """The first way: quadrilaterals or triangles cut from them, or bricks, whose nodes
-        match.
-        """
+        """The first way: quadrilaterals, triangles cut from them, or bricks; nodes match."""
         cut, degree = rng.random() < 0.3, int(rng.integers(1, 3 if depth is None else 2))
         marks = [
             x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")
@@ -121,9 +117,7 @@ class Blocks:
         return Way(build, (0, 1) if depth is None else (0, 1, 2))
 
     def unlike(self, rng: Random, depth: float | None = None, rows: int = 0) -> Way:
-        """The second way: Gmsh's triangles, or bricks and tetrahedra, by mortar, exchanged and
-        moved.
-        """
+        """The second way: Gmsh's triangles, bricks or tetrahedra, by mortar, and moved."""
         shares = {block.name: float(rng.uniform(0.7, 1.3)) for block in self.blocks}
         cut = {block.name: rng.random() < 0.3 for block in self.blocks}
         locking = depth is not None and any(cut.values())  # linear tetrahedra are too stiff
@@ -177,9 +171,7 @@ def inside(blocks: tuple[Block, ...]) -> dict[str, list[tuple[float, ...]]]:
 
 
 def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
-    """Blocks one upon another, thin ones and gaps among them: in the plane, as a slab between
-    rollers, or in space.
-    """
+    """Blocks one upon another, some thin or apart: in the plane, as a slab, or in space."""
     # Without friction nothing says where a body between two others is along them.
     mu, depth = friction(rng) or (0.3 if layers > 2 else 0.0), float(rng.uniform(0.3, 1.0))
     force = float(10 ** rng.uniform(-3, -1))
@@ -259,9 +251,7 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
 
 
 def crown(rng: Random, ring: bool = False) -> Case:
-    """A body with a slightly round face on a flat one: smooth pressure, a contact whose edge nobody
-    knows.
-    """
+    """A body with a slightly round face on a flat one: nobody knows the contact's edge."""
     one, two, mu, a = material(rng), material(rng), friction(rng), float(rng.uniform(0.25, 0.5))
     radius, high, low = float(rng.uniform(50, 500)), *map(float, rng.uniform(0.6, 1.5, 2))
     modulus, left, base = contact_modulus(one, two), 0.0 if ring else -1.0, float(rng.uniform(1, 2))
@@ -339,9 +329,7 @@ def bridge(rng: Random) -> Case:
 
 
 def floor(rng: Random) -> Case:
-    """An uneven block on a rigid floor: its shape is a function of the gap, or the shape of its
-    mesh.
-    """
+    """An uneven block on a rigid floor: uneven by the gap's function, or by its mesh."""
     mu, own, wide = friction(rng), material(rng), float(rng.uniform(1, 3))
     high = float(rng.uniform(0.5, 2))
     depth, waves = float(10 ** rng.uniform(-5, -3.5)) * wide, rng.uniform(0.5, 4, 3) * np.pi / wide

@@ -1,6 +1,4 @@
-"""What two ways say of one scene, level by level, and where they differ by more than their own
-levels do.
-"""
+"""What two ways say of one scene, and where they differ by more than their levels do."""
 
 from __future__ import annotations
 
@@ -89,9 +87,7 @@ def _turned(part: Any) -> Any:
 
 
 def read(way: Way, level: int, case: Case, moved: bool = True, degree: int | None = None) -> Values:
-    """Solve a level of a way, and read all quantities in the frame and units of the case; raises
-    what goes wrong.
-    """
+    """Solve a level of a way; all quantities in the frame and units of the case."""
     scene = way.build(level)
     scene = scene if degree is None else replace(scene, degree=degree)
     scene = swapped(scene) if way.swapped else scene
@@ -165,9 +161,7 @@ def fitted(offsets: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def scale_of(name: str, values: list[Values]) -> float:
-    """What a quantity is measured by: forces by the largest force, displacements by the largest,
-    others by themselves.
-    """
+    """What a quantity is measured by: forces by the largest force, others by their kind."""
     kind = name.split()[0]
     groups = {
         "force": ("force", "normal"),
@@ -187,9 +181,7 @@ def scale_of(name: str, values: list[Values]) -> float:
 
 
 def error(row: np.ndarray) -> float:
-    """The error of the last of three levels: the range of all, or more if the differences hardly
-    shrink (Richardson).
-    """
+    """The error of the last of three levels: their range, or more if they hardly converge."""
     if len(row) < 3:
         return 0.0
     first, last = np.abs(np.diff(row))[-2:]
@@ -217,9 +209,7 @@ class Verdict:
 
 
 def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[float]]:
-    """What the two ways disagree on beyond the errors of their last three levels, and the widths of
-    all estimates.
-    """
+    """What two ways disagree on beyond their errors, and the widths of all estimates."""
     wrong, widths = [], []
     everything = [own for way in levels for own in way]
     for name in levels[0][0].keys() & levels[1][0].keys():

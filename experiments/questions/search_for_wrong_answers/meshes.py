@@ -1,6 +1,4 @@
-"""Meshes of two makers, structured and Gmsh's, and scenes moved as a whole: turned, mirrored, in
-other units and numbers.
-"""
+"""Structured meshes and Gmsh's, and scenes moved: turned, mirrored, in other units."""
 
 from __future__ import annotations
 
@@ -82,9 +80,7 @@ def extruded(mesh: Any, z: np.ndarray) -> Any:
 
 
 def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
-    """Triangles of Gmsh within outlines, the first outer one around holes, by a file; `arcs`: of
-    circles about the origin.
-    """
+    """Triangles within outlines, by a file of Gmsh; `arcs`: of circles about the origin."""
     import gmsh
 
     gmsh.initialize(interruptible=False)
@@ -121,9 +117,7 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A scene as another user would write it: x -> length R x, stresses times stress, nodes and
-    elements renumbered.
-    """
+    """A scene as another would write it: x -> length R x, other stresses and numbers."""
 
     R: np.ndarray
     length: float = 1.0

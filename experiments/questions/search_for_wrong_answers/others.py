@@ -55,9 +55,7 @@ def circle(radius: float, y: float = 0.0) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def pin(rng: Random) -> Case:
-    """A pin with a hole, loaded obliquely, in a bush that is held outside; with or without
-    clearance.
-    """
+    """A pin with a hole in a bush that is held outside; with or without clearance."""
     hole, outer, mu = float(rng.uniform(0.3, 0.6)), float(rng.uniform(1.6, 2.5)), friction(rng)
     turn = rng.uniform(0, 6)
     play = 0.0 if rng.random() < 0.3 else float(10 ** rng.uniform(-4, -1))
@@ -152,9 +150,7 @@ def fit(rng: Random) -> Case:
 
 
 def roller(rng: Random) -> Case:
-    """A cylinder on a flat body: half of it graded around the contact, or all of it, coarse where
-    surfaces are apart.
-    """
+    """A cylinder on a flat body: half of it, graded, or all of it, coarse far from contact."""
     one, two, mu = material(rng), material(rng), friction(rng)
     a, wide = float(rng.uniform(0.03, 0.1)), float(rng.uniform(1.5, 4))
     high = float(rng.uniform(1, 3))
@@ -245,9 +241,7 @@ def ball(rng: Random) -> Case:
 
 
 def exact(rng: Random) -> Case:
-    """Round bodies on half-spaces without friction, against Hertz, and a wave on a periodic
-    half-plane, against Westergaard.
-    """
+    """Round bodies against Hertz, and a wave on a periodic half-plane against Westergaard."""
     solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
     rigid, radius, a = wave or rng.random() < 0.4, float(rng.uniform(5, 50)), 1.0
     shift = rng.uniform(-0.1, 0.1, 2)
@@ -311,9 +305,7 @@ def exact(rng: Random) -> Case:
 
 
 def heights(rng: Random) -> Case:
-    """A rigid uneven body on a half-space: as a gap, or as the height of the half-space; with
-    friction.
-    """
+    """A rigid uneven body on a half-space: as a gap, or as the height of the half-space."""
     solid, periodic, mu = rng.random() < 0.4, bool(rng.random() < 0.4), friction(rng)
     own = material(rng)
     tall, k = float(10 ** rng.uniform(-4, -3)), rng.integers(1, 4, (4, 2))
@@ -346,9 +338,7 @@ def heights(rng: Random) -> Case:
 
 
 def large(rng: Random) -> Case:
-    """A rigid profile on a half-plane, and on a body of finite elements that is larger from level
-    to level.
-    """
+    """A rigid profile on a half-plane, and on larger and larger bodies of finite elements."""
     own, mu, radius = material(rng), friction(rng), float(rng.uniform(10, 50))
     bumps = float(rng.uniform(0, 0.5))
     phase, period, share, degree = (
