@@ -191,7 +191,6 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     push = load.get("x", 0.0) / force
     free = mu > 0.1 and abs(push) * y < 0.2 * min(c[1][0] - c[0][0] for c in corners)
     kind = rng.choice(["plate", "moved", "traction", "weight"] if free else ["plate", "moved"])
-    third = (0.0,) if solid else ()
     carried: tuple[Any, ...] = (Plate("top", load),)
     if kind == "traction":
         carried = (Traction("top", (push * force / span / depth, -force / span / depth)),)
@@ -224,23 +223,7 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
         return Case(
             f"{layers} blocks", (plane.matching(rng), plane.unlike(rng)), points, loose=loose
         )
-    ends = tuple(Support(name, {"z": 0.0}) for name in ("near", "far")) if solid == "slab" else ()
-    blocks = tuple(
-        replace(
-            block,
-            supports=tuple(
-                held if held.displacement is None else Support("top", {**shift, "z": 0.0})
-                for held in block.supports
-            )
-            + ends,
-            loads=tuple(
-                own if kind == "plate" else replace(own, value=own.value + third)
-                for own in block.loads
-            ),
-        )
-        for block in plane.blocks
-    )
-    space = replace(plane, blocks=blocks, settings=(("kind", "solid"),))
+    space = in_space(plane, solid)
     if solid == "space":
         points = {name: [(*x, 0.4 * depth) for x in own] for name, own in points.items()}
         ways = space.matching(rng, depth), space.unlike(rng, depth)
@@ -248,6 +231,23 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     second = space.unlike(rng, depth, int(rng.integers(1, 3)))
     second = replace(second, move=None, simplest=True) if rng.random() < 0.3 else second
     return Case(f"slab of {layers} blocks", (plane.matching(rng), second), points, loose=loose)
+
+
+def in_space(plane: Blocks, solid: str) -> Blocks:
+    """The scene in space; a slab is held along z at both ends."""
+    ends = tuple(Support(name, {"z": 0.0}) for name in ("near", "far")) if solid == "slab" else ()
+    blocks = []
+    for block in plane.blocks:
+        held = [
+            own if own.displacement is None else Support("top", {**own.displacement, "z": 0.0})
+            for own in block.supports
+        ]
+        loads = [
+            own if isinstance(own, Plate) else replace(own, value=(*own.value, 0.0))
+            for own in block.loads
+        ]
+        blocks.append(replace(block, supports=(*held, *ends), loads=tuple(loads)))
+    return replace(plane, blocks=tuple(blocks), settings=(("kind", "solid"),))
 
 
 def crown(rng: Random, ring: bool = False) -> Case:

@@ -20,7 +20,7 @@ from experiments.questions.search_for_wrong_answers.blocks import (
     material,
     oblique,
 )
-from experiments.questions.search_for_wrong_answers.compare import Case, Way
+from experiments.questions.search_for_wrong_answers.compare import Case, Values, Way
 from experiments.questions.search_for_wrong_answers.meshes import (
     named,
     outlined,
@@ -240,6 +240,35 @@ def ball(rng: Random) -> Case:
     return replace(case, without=("reach",))  # of which a section shows one component
 
 
+def westergaard(modulus: float, tall: float, length: float, a: float) -> Values:
+    """What is known of a wave on a periodic half-plane that touches on 2 a of every `length`."""
+    t = (np.arange(4000) + 0.5) / 4000 * np.pi - np.pi / 2
+    x, dx, closed = a * np.sin(t), a * np.cos(t) * np.pi / 4000, np.sin(np.pi * a / length) ** 2
+    p = 2 * np.pi * modulus * tall / length * np.cos(np.pi * x / length)
+    p *= np.sqrt(np.maximum(closed - np.sin(np.pi * x / length) ** 2, 0))
+    force = float(p @ dx)
+    mean, reach = float(p**2 @ dx / force), float(np.sqrt(p * x**2 @ dx / force))
+    bearing = float((np.sqrt(p) @ dx) ** 2 / force)
+    return of_contact(mean, reach, float(p.max()), bearing, force)
+
+
+def hertzian(solid: bool, modulus: float, radius: float, a: float) -> Values:
+    """What is known of Hertz's contact of half-width a."""
+    if solid:
+        force = 4 / 3 * modulus * a**3 / radius
+        peak = hertz_point(force, radius, modulus).peak or 0.0
+        return of_contact(0.75 * peak, a * 0.4**0.5, peak, 0.96 * np.pi * a**2, force)
+    force = np.pi * modulus * a**2 / (4 * radius)
+    peak = hertz_line(force, radius, modulus).peak or 0.0
+    bearing = 2 * (gamma(1.25) / gamma(1.75)) ** 2 * a
+    return of_contact(8 / (3 * np.pi) * peak, a / 2, peak, bearing, force)
+
+
+def of_contact(mean: float, reach: float, peak: float, bearing: float, force: float) -> Values:
+    known = {"pressure": mean, "reach": reach, "peak": peak, "bearing": bearing, "normal": force}
+    return {f"{name} 0": value for name, value in known.items()}
+
+
 def exact(rng: Random) -> Case:
     """Round bodies against Hertz, and a wave on a periodic half-plane against Westergaard."""
     solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
@@ -248,31 +277,8 @@ def exact(rng: Random) -> Case:
     modulus, share = contact_modulus(None if rigid else one, two), float(rng.uniform(0.1, 0.8))
     wide = float(rng.uniform(1.3, 3))
     solid = solid and not wave
-    if wave:  # of amplitude a^2 / radius and period 2 a / share
-        length, tall = 2 * a / share, a**2 / radius
-        t = (np.arange(4000) + 0.5) / 4000 * np.pi - np.pi / 2
-        x, dx, closed = a * np.sin(t), a * np.cos(t) * np.pi / 4000, np.sin(np.pi * share / 2) ** 2
-        p = 2 * np.pi * modulus * tall / length * np.cos(np.pi * x / length)
-        p *= np.sqrt(np.maximum(closed - np.sin(np.pi * x / length) ** 2, 0))
-        force, peak = float(p @ dx), float(p.max())
-        mean, reach = float(p**2 @ dx / force), float(np.sqrt(p * x**2 @ dx / force))
-        bearing = float((np.sqrt(p) @ dx) ** 2 / force)
-    elif solid:
-        force = 4 / 3 * modulus * a**3 / radius
-        peak = hertz_point(force, radius, modulus).peak or 0.0
-        mean, reach, bearing = 0.75 * peak, a * 0.4**0.5, 0.96 * np.pi * a**2
-    else:
-        force = np.pi * modulus * a**2 / (4 * radius)
-        peak = hertz_line(force, radius, modulus).peak or 0.0
-        mean, reach = 8 / (3 * np.pi) * peak, a / 2
-        bearing = 2 * (gamma(1.25) / gamma(1.75)) ** 2 * a
-    known = {
-        "pressure 0": mean,
-        "reach 0": reach,
-        "peak 0": peak,
-        "bearing 0": bearing,
-        "normal 0": force,
-    }
+    length, tall = 2 * a / share, a**2 / radius  # period and amplitude of the wave
+    known = westergaard(modulus, tall, length, a) if wave else hertzian(solid, modulus, radius, a)
 
     def gap(x: np.ndarray) -> np.ndarray:
         if wave:
@@ -291,7 +297,7 @@ def exact(rng: Random) -> Case:
             if solid
             else (row - a / share * wave,)
         )
-        load = {"z" if solid else "y": -force}
+        load = {"z" if solid else "y": -known["normal 0"]}
         upper: Any = Rigid("upper", gap=gap, force=load)
         if not rigid:
             upper = HalfSpace("upper", one, points, height=lambda x: -gap(x), force=load)
