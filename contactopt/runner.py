@@ -307,7 +307,9 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": contact_edge(reduction.scene, problem, solution.reactions) if single else None,
+        "contact_half_width": contact_edge(reduction.scene, problem, solution.reactions)
+        if single
+        else None,
         "stick_half_width": stick_width(reduction, solution)[0] if single else None,
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,

@@ -1,12 +1,12 @@
-"""What every experiment writes: reports/NAME/report.md, its table as CSV with the environment, its
-figures.
-"""
+"""What every experiment writes: reports/NAME/ with report, tables as CSV, and figures."""
 
 from __future__ import annotations
 
 import csv
 import os
 import platform
+import sys
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -50,11 +50,7 @@ def write(
     folder = REPORTS / name
     folder.mkdir(parents=True, exist_ok=True)
     for stem, rows in tables.items():
-        with open(folder / f"{stem}.csv", "w", newline="") as file:
-            file.write(f"# {environment()}\n")
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        save(name, stem, rows)
     for stem, figure in figures.items():
         figure.savefig(folder / f"{stem}.png", dpi=120)
     body = text.format(**{stem: markdown(rows) for stem, rows in tables.items()})
@@ -65,19 +61,55 @@ def write(
     print(path.read_text())
 
 
+def save(name: str, table: str, rows: list[dict[str, Any]]) -> None:
+    """Write one table of a report."""
+    folder = REPORTS / name
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / f"{table}.csv", "w", newline="") as file:
+        file.write(f"# {environment()}\n")
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def stored(name: str, table: str) -> list[dict[str, Any]]:
+    """The rows of a table as they were written last; none if it is not there."""
+    path = REPORTS / name / f"{table}.csv"
+    if not path.exists():
+        return []
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return [{key: number(value) for key, value in row.items()} for row in rows]
+
+
+def measure(
+    name: str,
+    title: str,
+    text: str,
+    tables: dict[str, Callable[[], list[dict[str, Any]]]],
+    figures: Callable[[dict[str, list[dict[str, Any]]]], dict[str, Any]] = lambda tables: {},
+) -> None:
+    """Measure the tables that the command names, or all, and write the report once all are there.
+
+    Each table can be measured by itself; the report takes the others as they were written last.
+    """
+    chosen = sys.argv[1:] or list(tables)
+    unknown = [table for table in chosen if table not in tables]
+    if unknown:
+        raise SystemExit(f"there is no table {unknown[0]!r}; choose from {', '.join(tables)}.")
+    for table in chosen:
+        save(name, table, tables[table]())
+    known = {table: stored(name, table) for table in tables}
+    if all(known.values()):
+        write(name, title, text, known, figures(known))
+
+
 def merged(
     name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    """The committed table of an experiment with these rows in place of those that have the same
-    values of `keys`.
-    """
-    path = REPORTS / name / f"{table}.csv"
-    if not path.exists():
-        return rows
-    with open(path, newline="") as file:
-        old = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    """The committed table with these rows in place of those with the same `keys`."""
     new = {tuple(str(row[key]) for key in keys): row for row in rows}
-    kept = [{key: number(value) for key, value in row.items()} for row in old]
+    kept = stored(name, table)
     return [new.pop(tuple(str(row[key]) for key in keys), row) for row in kept] + list(new.values())
 
 

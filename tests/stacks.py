@@ -1,4 +1,6 @@
-"""Blocks that rest on each other: scenes of several bodies whose forces statics alone determines."""
+"""Blocks that rest on each other: scenes of several bodies whose forces statics alone
+determines.
+"""
 
 from __future__ import annotations
 

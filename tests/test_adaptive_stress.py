@@ -3,11 +3,12 @@ history is kept.
 """
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import skfem
-from conftest import MATERIAL
+from conftest import MATERIAL, block, two_blocks
 
 from contactopt import InputError, Part, Plate, Rigid, Scene, Support, run
 from contactopt.accuracy import refine
@@ -20,7 +21,6 @@ from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
-from experiments.questions.adaptivity.parts import ball as gmsh_ball
 
 
 def locally(scene, *arguments, **limits):
@@ -139,7 +139,11 @@ def test_bent_edges_follow_the_circle():
 
 
 def test_a_quarter_model_whose_nodes_do_not_match_knows_its_planes():
-    reduction = reduce_bodies(gmsh_ball(size=9.0))
+    scene = two_blocks("solid")
+    scene = replace(
+        scene, lower=replace(scene.lower, mesh=block("solid", -2, 0, cells=5)), copies=4
+    )
+    reduction = reduce_bodies(scene)
     assert reduction.problem.chart.mirrored == (True, True) and len(reduction.coupling.planes) == 2
 
 

@@ -435,7 +435,8 @@ def test_entry_points(tmp_path, monkeypatch):
 
 
 def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_path, monkeypatch):
-    fclib = pytest.importorskip("h5py") and __import__("contactopt").fclib
+    from contactopt import fclib
+
     text = (
         SMALL
         + 'optional = true\n[[methods]]\nmethod = "alternating"\nnormal = "gurobi"\noptional ='

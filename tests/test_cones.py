@@ -10,7 +10,9 @@ number = st.floats(-10, 10)
 
 @given(st.lists(st.tuples(number, number, number), min_size=1, max_size=5), st.floats(0, 3))
 def test_coulomb_cone_projection_is_characterised_by_moreau(points, mu):
-    """x = P(x) - (P(x) - x) with P in the cone, P(x) - x in its dual, orthogonal: Moreau's theorem."""
+    """x = P(x) - (P(x) - x) with P in the cone, P(x) - x in its dual, orthogonal: Moreau's
+    theorem.
+    """
     x = np.array(points)
     p = coulomb_cone(x, np.full(len(x), mu))
     rest = p - x

@@ -237,7 +237,9 @@ def test_a_coupling_is_added_by_one_line(monkeypatch):
 
 @dataclass(frozen=True)
 class Sprung(Rigid):
-    """A rigid body on springs that resist its translations, each of stiffness k [force / length]."""
+    """A rigid body on springs that resist its translations, each of stiffness k [force /
+    length].
+    """
 
     k: float = 1.0
 

@@ -24,7 +24,6 @@ CHAPTERS = {
 @pytest.fixture
 def generate(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "site"))
-    pytest.importorskip("jupytext")
     import generate
 
     return generate

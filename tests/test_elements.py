@@ -28,12 +28,11 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.body import build_body
-from contactopt.bodies.elements import FACES, contact_trace, make_basis, weight_at
+from contactopt.bodies.elements import contact_trace, make_basis, weight_at
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.material import lame
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
 from contactopt.scenes.common import with_elements
-from experiments.questions import elements as experiment
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
 AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}
@@ -204,34 +203,6 @@ def test_a_half_model_is_half_of_the_whole():
     assert first.multipliers[0] == pytest.approx(second.multipliers[0], rel=1e-9)
 
 
-@pytest.mark.parametrize("cut", [False, True])
-def test_hertz_does_not_ripple_in_3d(cut):
-    """Within .6 a the error of the pressure is nearly the same at all nodes; contacts at all nodes
-    of P2 would fail.
-    """
-    row = experiment.measure("sphere 3D", 2, 2, "P" if cut else "Q")
-    assert row["ripple"] < 0.03
-    if cut:
-        with experiment.contacts_at_all_nodes():
-            assert experiment.measure("sphere 3D", 2, 2, "P")["ripple"] > 2 * row["ripple"]
-        assert len(FACES["RefTet"][3]) == 1
-
-
-@pytest.mark.parametrize("cut", [False, True])
-def test_quadratic_elements_need_fewer_unknowns_for_hertz(cut):
-    """Peak pressure and approach: closer on a quadratic mesh half as fine, of about as many
-    unknowns.
-    """
-    shape = "P" if cut else "Q"
-    linear, quadratic = (
-        experiment.measure("sphere", 8, 1, shape),
-        experiment.measure("sphere", 4, 2, shape),
-    )
-    assert quadratic["unknowns"] < 1.3 * linear["unknowns"]
-    for quantity in ("peak", "approach"):
-        assert abs(quadratic[quantity]) < 0.9 * abs(linear[quantity])
-
-
 def test_the_gap_of_a_curved_body_does_not_alternate():
     """Edges are straight, the sphere is not: Part.curve knows.
 
@@ -279,8 +250,6 @@ def test_stress_below_hertz_contact(degree):
 @pytest.mark.parametrize("cut", [False, True])
 def test_quadratic_bodies_by_products(solver, cut):
     """Q as an operator, bodies solved by factors or multigrid, against the explicit one."""
-    if solver == "multigrid":
-        pytest.importorskip("pyamg")
     scene = scenes.make_scene("punch-3d", elements=2, degree=2, simplices=cut)
     explicit = reduce_bodies(scene, Q="explicit").problem
     implicit = reduce_bodies(scene, Q="implicit", solver=solver).problem

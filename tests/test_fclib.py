@@ -1,7 +1,10 @@
-"""Problems of other codes, read where they lie; the files themselves are not part of the project."""
+"""Problems of other codes, read where they lie; the files themselves are not part of the
+project.
+"""
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -9,7 +12,6 @@ from contactopt import InputError, InterfaceProblem, fclib, siconos_residual, so
 from contactopt.linear.operators import dense
 from contactopt.problem.laws.bilateral import Bilateral
 
-h5py = pytest.importorskip("h5py")
 FOLDER = Path(__file__).parents[2] / "shared" / "fclib"
 FILES = sorted(FOLDER.glob("*.hdf5"))
 FULL_RANK = ("Box_Stacks", "CubeH8")

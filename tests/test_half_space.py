@@ -115,10 +115,17 @@ def test_coefficients_are_integrals_of_point_forces(cell, place):
             assert abs(made[pair][0, 0]) < 1e-15  # odd
             continue
         total = sum(
-            dblquad(lambda s, r, value=value: value(r, s), *((a - hx / 2, a) if left else (a, a + hx / 2)),
-                    *((b - hy / 2, b) if low else (b, b + hy / 2)), epsabs=1e-13, epsrel=1e-12)[0]
-            for left in (True, False) for low in (True, False) for a, b in [(x, y)]
-        )  # fmt: skip
+            dblquad(
+                lambda s, r, value=value: value(r, s),
+                *((a - hx / 2, a) if left else (a, a + hx / 2)),
+                *((b - hy / 2, b) if low else (b, b + hy / 2)),
+                epsabs=1e-13,
+                epsrel=1e-12,
+            )[0]
+            for left in (True, False)
+            for low in (True, False)
+            for a, b in [(x, y)]
+        )
         assert made[pair][0, 0] == pytest.approx(total / (hx * hy) / (2 * np.pi * G), rel=1e-10)
 
 
@@ -267,9 +274,13 @@ def test_half_plane_is_hertz_line_contact(law):
     scene = Scene(
         "line",
         Rigid("cylinder", gap=lambda p: p[0] ** 2 / 40, force={"y": -3.0}),
-        HalfSpace("base", Material(5.0, 0.0) if law == "frictionless" else Material(5.0, 0.4999), x),
-        0.3, thickness=10.0, law=law,
-    )  # fmt: skip
+        HalfSpace(
+            "base", Material(5.0, 0.0) if law == "frictionless" else Material(5.0, 0.4999), x
+        ),
+        0.3,
+        thickness=10.0,
+        law=law,
+    )
     problem = contactopt.reduce(scene)
     r = contactopt.solve(problem).reactions
     modulus = 5.0 / (1 - scene.lower.material.nu**2)
@@ -441,10 +452,19 @@ def test_prescribed_approach_is_the_total_force_turned_round():
     pressed = contactopt.solve(contactopt.reduce(ball(20, "frictionless", 0.0, 0.0)), tol=1e-11)
     points = (ticks(20), ticks(20))
     for above in (
-        Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, displacement={"z": pressed.multipliers[0]}),
-        HalfSpace("ball", Material(1e9, 0.3), points, lambda x: -np.sum(x**2, axis=0) / 20,
-                  displacement={"z": pressed.multipliers[0]}),
-    ):  # fmt: skip
+        Rigid(
+            "ball",
+            gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20,
+            displacement={"z": pressed.multipliers[0]},
+        ),
+        HalfSpace(
+            "ball",
+            Material(1e9, 0.3),
+            points,
+            lambda x: -np.sum(x**2, axis=0) / 20,
+            displacement={"z": pressed.multipliers[0]},
+        ),
+    ):
         scene = Scene(
             "given", above, HalfSpace("base", STEEL, points), 0.0, kind="solid", law="frictionless"
         )
@@ -493,9 +513,15 @@ def test_periodic_wavy_surface_is_westergaards():
     mean = 0.3 * flat
     scene = Scene(
         "wave",
-        Rigid("wave", gap=lambda p: amplitude * (1 - np.cos(2 * np.pi * p[0] / length)), force={"y": -mean * length}),
-        HalfSpace("base", STEEL, x, periodic=True), 0.0, law="frictionless",
-    )  # fmt: skip
+        Rigid(
+            "wave",
+            gap=lambda p: amplitude * (1 - np.cos(2 * np.pi * p[0] / length)),
+            force={"y": -mean * length},
+        ),
+        HalfSpace("base", STEEL, x, periodic=True),
+        0.0,
+        law="frictionless",
+    )
     problem = contactopt.reduce(scene)
     solution = contactopt.solve(problem)
     a = length / np.pi * np.arcsin(np.sqrt(0.3))
@@ -554,27 +580,77 @@ def test_self_affine_surface():
     "make,message",
     [
         (lambda: HalfSpace("h", 5.0, ticks(8)), "must be a Material"),
-        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8)), 0.3, kind="solid")), "need 2 rows"),
-        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, [0.0, 1, 2, 4]), 0.3)), "evenly spaced"),
-        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8)), 0.3, copies=2)), "no symmetry"),
-        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8), depth=2.0), 0.3)), "its depth"),
+        (
+            lambda: contactopt.reduce(
+                Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8)), 0.3, kind="solid")
+            ),
+            "need 2 rows",
+        ),
+        (
+            lambda: contactopt.reduce(
+                Scene("s", Rigid("r"), HalfSpace("h", STEEL, [0.0, 1, 2, 4]), 0.3)
+            ),
+            "evenly spaced",
+        ),
+        (
+            lambda: contactopt.reduce(
+                Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8)), 0.3, copies=2)
+            ),
+            "no symmetry",
+        ),
+        (
+            lambda: contactopt.reduce(
+                Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8), depth=2.0), 0.3)
+            ),
+            "its depth",
+        ),
         (lambda: contactopt.reduce(ball(8, height=np.zeros((3, 3)))), "its? height|height of"),
-        (lambda: Scene("s", Rigid("r", force={"y": -1.0}, displacement={"y": 1.0}), HalfSpace("h", STEEL, ticks(8)), 0.3), "not both"),
-        (lambda: Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8), force={"z": -1.0}), 0.3), "no component 'z'"),
+        (
+            lambda: Scene(
+                "s",
+                Rigid("r", force={"y": -1.0}, displacement={"y": 1.0}),
+                HalfSpace("h", STEEL, ticks(8)),
+                0.3,
+            ),
+            "not both",
+        ),
+        (
+            lambda: Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8), force={"z": -1.0}), 0.3),
+            "no component 'z'",
+        ),
         (lambda: self_affine((16, 16), (1.0, 1.0), shortest=0.01), "wavelengths must grow"),
         (lambda: self_affine((16, 16), (1.0, 1.0), hurst=1.5), "Hurst"),
         (lambda: self_affine((16, 16), (1.0, 1.0), seed=-1), "seed must be"),
         (lambda: self_affine(16, (1.0, 1.0)), "two numbers, along x and y"),
-        (lambda: contactopt.reduce(ball(8, upper=SOFT, periodic=True)), "one half-space repeats itself"),
+        (
+            lambda: contactopt.reduce(ball(8, upper=SOFT, periodic=True)),
+            "one half-space repeats itself",
+        ),
         (lambda: ball(8, periodic="yes"), "periodic must be"),
-        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, None), 0.3)), "one row of places per axis"),
-        (lambda: contactopt.reduce(Scene("s", Rigid("r", gap=np.full(8, np.nan)), HalfSpace("h", STEEL, ticks(8)), 0.3)), "not finite"),
-        (lambda: contactopt.reduce(Scene("s", HalfSpace("a", STEEL, ticks(9)), HalfSpace("h", STEEL, ticks(8)), 0.3)), "those of the other surface"),
+        (
+            lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, None), 0.3)),
+            "one row of places per axis",
+        ),
+        (
+            lambda: contactopt.reduce(
+                Scene("s", Rigid("r", gap=np.full(8, np.nan)), HalfSpace("h", STEEL, ticks(8)), 0.3)
+            ),
+            "not finite",
+        ),
+        (
+            lambda: contactopt.reduce(
+                Scene("s", HalfSpace("a", STEEL, ticks(9)), HalfSpace("h", STEEL, ticks(8)), 0.3)
+            ),
+            "those of the other surface",
+        ),
         (lambda: scenes.rough(pressure=-1.0), "pressure"),
         (lambda: scenes.cattaneo_half_space(shear=50.0), "slide off"),
-        (lambda: contactopt.solve(contactopt.reduce(scenes.flat_punch(2, elements=4)), Nested()), "needs half-spaces"),
+        (
+            lambda: contactopt.solve(contactopt.reduce(scenes.flat_punch(2, elements=4)), Nested()),
+            "needs half-spaces",
+        ),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()

@@ -261,7 +261,6 @@ def test_products_start_from_a_coarse_mesh_if_there_is_one():
 
 
 def test_iterative_bodies_are_solved_with_their_contacts_from_cold(tmp_path):
-    pytest.importorskip("pyamg")
     direct, iterative = (
         run("punch-3d", elements=8, solver=solver) for solver in ("superlu", "multigrid")
     )

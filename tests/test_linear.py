@@ -51,6 +51,8 @@ def bodies():
 
 
 BODIES = bodies()
+# solvers of packages that the tests do not ask for
+OPTIONAL = {"pardiso": "pypardiso", "petsc": "petsc4py"}
 
 
 def made(name, args):
@@ -341,7 +343,6 @@ def test_a_block_is_the_matrix_without_the_other_rows():
     """Multigrid for a Block, which copies nothing, is multigrid for the rows and columns
     themselves.
     """
-    pytest.importorskip("pyamg")
     A, *rest = BODIES["solid punch"]
     n = A.shape[0]
     whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))

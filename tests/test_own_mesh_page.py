@@ -18,7 +18,6 @@ def blocks(kind):
 
 
 def test_the_page_runs_from_gmsh_to_the_pressure(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     monkeypatch.chdir(tmp_path)
     mesh, solve = blocks("python")
     exec(compile(mesh, "your_own_mesh.md", "exec"), {})

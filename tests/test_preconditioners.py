@@ -3,9 +3,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg as la
-from scipy.sparse.linalg import cg
+from scipy.sparse.linalg import LinearOperator, cg
 
-from contactopt import InputError, InterfaceProblem, reduce, scenes
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Material,
+    Part,
+    Scene,
+    Support,
+    reduce,
+    scenes,
+)
+from contactopt.meshes.structured import graded, rename, tensor_mesh
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.preconditioners import (
     PRECONDITIONERS,
@@ -23,12 +33,57 @@ from contactopt.methods.preconditioners.circulant import (
 )
 from contactopt.methods.preconditioners.grid import Grid
 from contactopt.problem.chart import Chart
-from experiments.questions.preconditioners import blocks, condition, solids
 
 SIZES = (17, 33, 65)  # contacts
 
 # tests/test_surface_laplacian.py has the other
 ON_GRIDS = [name for name in PRECONDITIONERS if name != "laplacian"]
+
+
+def blocks(k: int, upper: float, lower: float, nu: float) -> InterfaceProblem:
+    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below; k nodes on the
+    contact line.
+    """
+    zone = np.linspace(-2, 2, k)
+    h = zone[1] - zone[0]
+    punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")
+    pin = zone[k // 2 + 1] if k % 2 else zone[k // 2]
+    punch = punch.with_boundaries(
+        {"pin": lambda x: (x[1] > 4 - 1e-9) & (np.abs(x[0] - pin / 2) < pin / 2)}
+    )
+    out = 2 + graded(6, h * 1.15, 1.15)[1:]
+    across = np.concatenate([-out[::-1], zone, out])
+    ground = tensor_mesh(across, -graded(8, h, 1.15)[::-1])
+    held = (Support("top", {"y": 0.0}), Support("pin", {"x": 0.0}))
+    return reduce(
+        Scene("blocks", *pair(punch, held, ground, (upper, lower), nu), 0.5), Q="explicit"
+    )
+
+
+def solids(n: int, upper: float, lower: float) -> InterfaceProblem:
+    """The same bodies in 3D, with n x n contact nodes."""
+    zone = np.linspace(-2, 2, n)
+    h = zone[1] - zone[0]
+    punch = rename(tensor_mesh(zone, zone, graded(4, h, 1.3)), contact="z-", top="z+")
+    out = 2 + graded(6, 1.3 * h, 1.3)[1:]
+    across = np.concatenate([-out[::-1], zone, out])
+    ground = tensor_mesh(across, across, -graded(8, h, 1.3)[::-1])
+    bodies = pair(punch, (Support("top"),), ground, (upper, lower), 0.3)
+    return reduce(Scene("solids", *bodies, 0.5, kind="solid"), Q="explicit")
+
+
+def pair(punch, held, ground, moduli, nu):
+    ground = rename(ground, bottom="yz"[len(ground.p) - 2] + "-").with_boundaries(
+        {"contact": lambda x: (x[-1] > -1e-9) & np.all(np.abs(x[:-1]) < 2, axis=0)}
+    )
+    first, second = (Material(E, nu) for E in moduli)
+    return Part("punch", punch, first, held), Part("ground", ground, second, (Support("bottom"),))
+
+
+def condition(P: np.ndarray | LinearOperator, Q: np.ndarray) -> float:
+    L = la.cholesky((Q + Q.T) / 2, lower=True)
+    values = la.eigvalsh(L.T @ (P @ L))
+    return float(values[-1] / values[0]) if values[0] > 0 else np.inf
 
 
 def normal_block(problem: InterfaceProblem, name: str) -> tuple[np.ndarray, np.ndarray]:

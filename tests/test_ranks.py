@@ -68,7 +68,9 @@ try:
             "same": bool(np.array_equal(one.solution.reactions, many.solution.reactions)),
             "steps": (one.solution.iterations, many.solution.iterations),
             "residuals": (one.solution.residual, many.solution.residual),
-            "stress": max(float(np.abs(a.stress - b.stress).max()) for a, b in zip(one.fields, many.fields)),
+            "stress": max(
+                float(np.abs(a.stress - b.stress).max()) for a, b in zip(one.fields, many.fields)
+            ),
             "messages": team.traffic.messages - before[0],
         }
         if one.path is not None:
@@ -82,11 +84,14 @@ try:
         before = (team.traffic.messages, team.traffic.length)
         problem.Q @ np.ones(len(problem.Q.diagonal))
         sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
-        found["traffic"].append((*sent, sum(body.unknowns for body in contactopt.reduce_bodies(scene).bodies)))
+        bodies = contactopt.reduce_bodies(scene).bodies
+        found["traffic"].append((*sent, sum(body.unknowns for body in bodies)))
     for quantity in ("energy", "pressure", "von_mises:foundation", "approach"):
         aim = dict(elements=4, accuracy=0.2, quantity=quantity, adaptive=quantity != "approach")
         one, many = (contactopt.run("punch-2d", team=own, **aim).estimate for own in (None, team))
-        found[f"adaptive {quantity}"] = [[level.value for level in made.levels] for made in (one, many)]
+        found[f"adaptive {quantity}"] = [
+            [level.value for level in made.levels] for made in (one, many)
+        ]
         found[f"errors {quantity}"] = one.error, many.error
     for scene, upper in (("punch-2d", "punch"), ("cattaneo-2d", "upper")):
         names = ("E", f"nu:{upper}", f"force:{upper}:y", "mu")
@@ -129,8 +134,14 @@ def found(tmp_path_factory):
 
 
 CASES = (
-    "explicit", "implicit", "multigrid", "axisymmetric with a zone", "three bodies, mortar", "load path", "slices",
-)  # fmt: skip
+    "explicit",
+    "implicit",
+    "multigrid",
+    "axisymmetric with a zone",
+    "three bodies, mortar",
+    "load path",
+    "slices",
+)
 
 
 @pytest.mark.parametrize("case", CASES)

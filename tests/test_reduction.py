@@ -197,9 +197,16 @@ def test_units_change_nothing():
     """N-mm-MPa against N-m-Pa."""
     mm = scenes.flat_punch(2, elements=6)
     m = scenes.flat_punch(
-        2, elements=6, width=0.04, height=0.04, foundation_width=0.16, foundation_height=0.08, depth=0.04,
-        upper=Material(5e6, 0.3), lower=Material(5e6, 0.3),
-    )  # fmt: skip
+        2,
+        elements=6,
+        width=0.04,
+        height=0.04,
+        foundation_width=0.16,
+        foundation_height=0.08,
+        depth=0.04,
+        upper=Material(5e6, 0.3),
+        lower=Material(5e6, 0.3),
+    )
     a, b = solve(reduce(mm), tol=1e-11), solve(reduce(m), tol=1e-11)
     assert np.allclose(a.reactions, b.reactions, atol=1e-8)
     assert a.multipliers[0] == pytest.approx(1e3 * b.multipliers[0], rel=1e-9)

@@ -48,9 +48,13 @@ def test_run_writes_everything(name, tmp_path):
     out = tmp_path / "new" / "folder"
     names = {f.name for f in result.fields}
     assert {p.name for p in out.iterdir()} == {
-        "summary.json", "deformed.png", "pressure.png", "interface.npz", *(f"{n}.vtu" for n in names),
+        "summary.json",
+        "deformed.png",
+        "pressure.png",
+        "interface.npz",
+        *(f"{n}.vtu" for n in names),
         *(f"contact-{pair.name}.vtu" for pair in result.problem.pairs),
-    }  # fmt: skip
+    }
     summary = json.loads((out / "summary.json").read_text())
     assert list(summary) == KEYS
     assert summary["status"] == "solved" and summary["residual"] <= 1e-8

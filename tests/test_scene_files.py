@@ -1,4 +1,6 @@
-"""Scene files: they say what the Python API says, and every mistake in them is named with its line."""
+"""Scene files: they say what the Python API says, and every mistake in them is named with
+its line.
+"""
 
 import os
 import tomllib
@@ -202,7 +204,12 @@ def test_blocks_in_other_kinds(tmp_path, kind, components):
 
 
 MISTAKES = [
-    ('kind = "plane-strain"', 'kind = "plane-stress"', 1, "there is no kind 'plane-stress'; choose from plane-strain"),
+    (
+        'kind = "plane-strain"',
+        'kind = "plane-stress"',
+        1,
+        "there is no kind 'plane-stress'; choose from plane-strain",
+    ),
     ("thickness = 2.0", "thicknes = 2.0", 2, "there is no 'thicknes'; valid names are .*thickness"),
     ("thickness = 2.0", 'thickness = "2"', 2, "'thickness' must be a number"),
     ("thickness = 2.0", "thickness = -2.0", 2, "thickness must be a finite number greater than 0"),
@@ -211,11 +218,21 @@ MISTAKES = [
     ("thickness = 2.0", "units = { length = 3 }", 2, "'length' must be a text"),
     ("block = { x = [0, 2], y", "block = { x = [2, 0], y", 5, "'x' must ascend"),
     ("block = { x = [0, 2], y", "block = { x = [2], y", 5, "two coordinates, .*got 1 values"),
-    ("block = { x = [0, 2], y", "block = { z = [0, 2], y", 5, "'x' is missing in bodies.block.block"),
+    (
+        "block = { x = [0, 2], y",
+        "block = { z = [0, 2], y",
+        5,
+        "'x' is missing in bodies.block.block",
+    ),
     ("elements = [4, 2]", "elements = [4, 0]", 5, "'elements' must be whole numbers"),
     ("elements = [4, 2]", "elements = [4000000, 4000000]", 5, "elements in all"),
     ("block = { x", 'mesh = "a.msh"\nblock = { x', 4, "exactly one of .* has mesh and block"),
-    ("block = { x = [0, 2], y = [0, 1], elements = [4, 2] }", 'mesh = "a.msh"', 5, "mesh file .*a.msh' does not exist"),
+    (
+        "block = { x = [0, 2], y = [0, 1], elements = [4, 2] }",
+        'mesh = "a.msh"',
+        5,
+        "mesh file .*a.msh' does not exist",
+    ),
     ("block = { x = [0, 2], y = [0, 1], elements = [4, 2] }", "", 4, "exactly one of .* has none"),
     ("E = 5.0, nu", "E = -5.0, nu", 6, "Young's modulus"),
     ("nu = 0.3", "nu = 0.5", 6, "Poisson's ratio"),
@@ -227,17 +244,37 @@ MISTAKES = [
     ('boundary = "y+",', "", 9, r"'boundary' is missing in bodies.block.plates\[1\]"),
     ("x = 1.0, y", "z = 1.0, y", 9, "no 'z' in .*force; valid names are x, y"),
     ("x = 1.0, y", "x = nan, y", 9, "x must be a finite number"),
-    ("x = 1.0, y = -10.0", "x = [1, 2], y = [3, 4, 5]", 9, "'x' has values for 2 states .* others? .*3"),
+    (
+        "x = 1.0, y = -10.0",
+        "x = [1, 2], y = [3, 4, 5]",
+        9,
+        "'x' has values for 2 states .* others? .*3",
+    ),
     ("x = 1.0, y", "x = [], y", 9, "empty array"),
     ("force = { x = 1.0, y = -10.0 }", "glued = 1", 9, "a plate needs force"),
     ("rigid = {}", "rigid = { normal = { x = 0 } }", 13, "the normal is zero"),
-    ("rigid = {}", "rigid = { normal = { y = 1, z = 1 } }", 13, "no 'z' in .*normal; valid names are x, y"),
+    (
+        "rigid = {}",
+        "rigid = { normal = { y = 1, z = 1 } }",
+        13,
+        "no 'z' in .*normal; valid names are x, y",
+    ),
     ("tol = 1e-10", "tolerance = 1e-10", 21, "no 'tolerance' in solve; valid names are method"),
     ("[solve]", "[slove]", 20, "there is no 'slove'; .*did you mean 'solve'"),
     ("rigid = {}", 'rigid = { gap = "x +" }', 13, "cannot be computed"),
     ("[[contacts]]", "[contacts]", 15, "'contacts' must be an array of tables"),
-    ('upper = "block"', 'upper = "blok"', 16, "there is no body 'blok'; the bodies are block, floor"),
-    ('upper = "block"', 'upper = "block:top"', 16, "no boundary 'top'; name its surface as 'block:NAME'"),
+    (
+        'upper = "block"',
+        'upper = "blok"',
+        16,
+        "there is no body 'blok'; the bodies are block, floor",
+    ),
+    (
+        'upper = "block"',
+        'upper = "block:top"',
+        16,
+        "no boundary 'top'; name its surface as 'block:NAME'",
+    ),
     ('lower = "floor"', 'lower = "block"', 15, "'block' cannot touch itself"),
     ("mu = 0.4", "mu = -0.4", 15, "friction coefficient mu"),
     ("mu = 0.4", "", 15, "'mu' is missing in contacts"),
@@ -245,10 +282,15 @@ MISTAKES = [
     ("tol = 1e-10", "tol = 0", 21, "tol must be a finite number greater than 0"),
     ("tol = 1e-10", "accuracy = 0.1", 20, "belong together"),
     ("thickness = 2.0", "degree = 3", 2, "degree must be 1 or 2"),
-    ('contact = "y-"', 'contact = "y-"\nsupports = [{ boundary = "x-" }]', 4, "body 'block': the plate on 'y\\+' moves"),
+    (
+        'contact = "y-"',
+        'contact = "y-"\nsupports = [{ boundary = "x-" }]',
+        4,
+        "body 'block': the plate on 'y\\+' moves",
+    ),
     ("block = { x = [0, 2], y", "move = { x = 1e16 }\nblock = { x = [0, 2], y", 5, "moved so far"),
     ("[solve]", "[solv]", 20, "there is no 'solv'"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("right,wrong,line,message", MISTAKES, ids=[m[1][:30] for m in MISTAKES])
@@ -298,10 +340,19 @@ def test_lines_of_all_ways_to_write_toml():
     found = {"a": 1, "quoted key": 2, "f": 6, "l": 12}
     assert {key: lines.get((key,), 6 if key == "f" else None) for key in data} == found
     places = {
-        ("quoted key", "c"): 2, ("f", "g.h", "i"): 7, ("f", "g.h", "i", 0): 8, ("f", "g.h", "i", 1, "j"): 9,
-        ("f", "g.h", "i", 1, "k", 1): 10, ("l", 0, "m"): 13, ("l", 1, "m"): 15, ("l", 1, "n"): 16, ("l", 1, "n", "o"): 17,
-        ("l", 1, "p", 0, "q"): 19, ("l", 1, "p", 1): 21, ("l", 1, "p", 1, "q", "r"): 22,
-    }  # fmt: skip
+        ("quoted key", "c"): 2,
+        ("f", "g.h", "i"): 7,
+        ("f", "g.h", "i", 0): 8,
+        ("f", "g.h", "i", 1, "j"): 9,
+        ("f", "g.h", "i", 1, "k", 1): 10,
+        ("l", 0, "m"): 13,
+        ("l", 1, "m"): 15,
+        ("l", 1, "n"): 16,
+        ("l", 1, "n", "o"): 17,
+        ("l", 1, "p", 0, "q"): 19,
+        ("l", 1, "p", 1): 21,
+        ("l", 1, "p", 1, "q", "r"): 22,
+    }
     assert {place: lines[place] for place in places} == places
 
 

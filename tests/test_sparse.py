@@ -3,20 +3,29 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from coulomb_check import violations
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
+from contactopt.benchmark.packings import packing
+from contactopt.benchmark.problems import FAMILIES
 from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
 from contactopt.methods.kernels.homotopy import Homotopy, homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import DenseBlocks, SparseBlocks
 from contactopt.problem import dimensionless
-from experiments.questions.coulomb_check import violations
-from experiments.questions.granular import packing
 
 
 @pytest.fixture(scope="module")
 def stack():
     return packing(2, 36, seed=1, mu=0.4, points=2)
+
+
+def test_a_packing_is_a_family_of_the_benchmark():
+    made = FAMILIES["packing"](dim=3, bodies=9, mu=0.2)
+    assert sp.issparse(made.Q) and made.dim == 3 and np.all(made.mu == 0.2)
+    for wrong in ({"dim": 4}, {"bodies": 3}, {"points": 0}):
+        with pytest.raises(InputError, match="packing needs"):
+            packing(**wrong)
 
 
 def test_both_forms_are_the_same_problem(stack):

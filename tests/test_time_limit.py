@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, solve
+from contactopt.benchmark.packings import packing
 from contactopt.errors import BackendError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.methods import METHODS
 from contactopt.methods.backends import CONIC, QP, child
 from contactopt.methods.backends.qp import BoxQP
-from experiments.questions.granular import packing
 
 LIMIT, SLACK = 0.5, 1.0
 
@@ -55,7 +55,6 @@ CASES = {
 @pytest.fixture(scope="module", autouse=True)
 def imported():
     """The first use of a modelling language costs seconds that no limit can cut."""
-    pytest.importorskip("cvxpy")
     solve(no_solution(3), "tresca", max_iterations=1)
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-pytest.importorskip("build")
 
 
 def run(*command: str | Path, cwd: Path) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
+from contactopt.benchmark.packings import packing
 from contactopt.benchmark.plugins import arguments_of
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
@@ -249,7 +250,8 @@ def in_units(
 
 
 FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
-    make.__name__: make for make in (rigid_bodies, half_plane, tangential, redundant, in_units)
+    make.__name__: make
+    for make in (rigid_bodies, packing, half_plane, tangential, redundant, in_units)
 }
 
 

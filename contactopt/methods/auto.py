@@ -4,7 +4,7 @@ proximal loop.
 0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
    falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
-   force at all) while its residual falls. Elastic bodies end here (reports/newton_steps). Where its
+   force at all) while its residual falls. Elastic bodies end here. Where its
    sortings go round in a circle near a solution, a few proximal steps break out of it.
 2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these

@@ -12,7 +12,7 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.resultants import views
 
 # elements across the half-width of contact; with so few the largest pressure is some percent off
-# (reports/hertz)
+# (reports/accuracy)
 FEWEST = 4
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 
 def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
-    elastic, rigid = (
-        table[table["family"] != "rigid_bodies"],
-        table[table["family"] == "rigid_bodies"],
-    )
+    elastic = table[table["family"] != "rigid_bodies"]
+    rigid = table[table["family"] == "rigid_bodies"]
     alternating = elastic[elastic["name"] == "alternating"]
     below = alternating[alternating["problem.mu"] < alternating["guaranteed_mu"]]
     above = alternating[alternating["problem.mu"] >= alternating["alternating_mu"]]

@@ -8,19 +8,15 @@ their edges and stick inside. Walls are coupled by mortar, since bricks are stag
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from dataclasses import replace
 from statistics import median
 from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[variable] = "1"
+import numpy as np
 
-import numpy as np  # noqa: E402
-
-from contactopt import (  # noqa: E402
+from contactopt import (
     BodyForce,
     Contact,
     Material,
@@ -31,8 +27,8 @@ from contactopt import (  # noqa: E402
     reduce_bodies,
     solve,
 )
-from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt.meshes.structured import rename, tensor_mesh
+from experiments.report import write
 
 BODIES = (2, 4, 8, 16, 32)
 CELLS = 16  # elements along each side of a block
@@ -58,9 +54,7 @@ def chain(count: int) -> Scene:
 
 
 def wall(count: int) -> Scene:
-    """Rows of WALL bricks, every second one moved by a quarter of a brick, pushed sideways a
-    little.
-    """
+    """Rows of WALL bricks, every second one a quarter of a brick aside, pushed sideways."""
     bodies: list[Part] = []
     contacts: list[Contact] = []
     below: list[tuple[str, float]] = []
@@ -82,9 +76,7 @@ def wall(count: int) -> Scene:
 
 
 def pressed(scene: Scene) -> Scene:
-    """The scene without weight: plates press its highest bodies, and bodies are stiff or soft, row
-    by row.
-    """
+    """The scene without weight, pressed by plates from above; rows are stiff and soft by turns."""
     parts = [part for part in scene.parts if isinstance(part, Part)]
     rows = [round(float(part.build_mesh(CELLS, None).p[1].min())) for part in parts]
     made: list[Any] = [FLOOR]
@@ -148,11 +140,12 @@ def growth(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return made
 
 
-TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and walls of bricks. Each body has 16 x 16 linear
-elements. The bodies rest on each other and on a rigid floor, held by contact and friction alone.
-Under their own weight the lowest joints bear everything above them. In low chains and walls nothing
-slips. In the rows `pressed` there is no weight. Instead a plate presses every body of the highest
-row. Rows of stiff and soft bodies take turns, so that every joint slips at its edges.
+TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and
+walls of bricks. Each body has 16 x 16 linear elements. The bodies rest on each other and on a rigid
+floor, held by contact and friction alone. Under their own weight the lowest joints bear everything
+above them. In low chains and walls nothing slips. In the rows `pressed` there is no weight. Instead
+a plate presses every body of the highest row. Rows of stiff and soft bodies take turns, so that
+every joint slips at its edges.
 
 {runs}
 

@@ -1,6 +1,4 @@
-"""What do the solvers of a body's linear system cost as the mesh is refined? `--large`: up to a
-million unknowns.
-"""
+"""What do the solvers of a body's linear system cost? `--large`: up to a million unknowns."""
 
 from __future__ import annotations
 
@@ -8,11 +6,8 @@ import argparse
 import ctypes
 import multiprocessing
 import os
-import resource
-import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -37,15 +32,11 @@ ELEMENTS = {  # across the contact half-width
     PLAIN: (8, 12, 16, 24, 32),
 }
 LARGE = {"pardiso": (48,), "multigrid": (48, 64, 80)}
-BOTH, BOTH_LARGE = 24, 90
 COLOURS = {"superlu": "#0072B2", "pardiso": "#009E73", "multigrid": "#D55E00", PLAIN: "#999999"}
-GIB = 2**30
 
 
 def system(part: str, elements: int) -> tuple[System, np.ndarray]:
-    """What the solvers of one body of the 3D punch are made from, and a random load on its contact
-    unknowns.
-    """
+    """What a solver of a body of the 3D punch is made from, and a random load on its contacts."""
     scene = scenes.flat_punch(3)
     body = build_body(scene, getattr(scene, part), elements, None)
     dofs, free = np.asarray(body.basis.nodal_dofs), body.free
@@ -121,55 +112,6 @@ def measure(task: tuple[str, int]) -> dict[str, Any]:
     }
 
 
-def schedule() -> np.ndarray:
-    """Seconds this thread has run, and has waited for a core."""
-    run, wait = (
-        Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()[:2]
-    )
-    return np.array([int(run), int(wait)]) / 1e9
-
-
-def watched(act: Callable[[], Any]) -> tuple[Any, np.ndarray]:
-    """What `act` returns; seconds it ran, waited for a core, waited for anything else (Python's
-    lock).
-    """
-    start, before = time.perf_counter(), schedule()
-    result = act()
-    run, core = schedule() - before
-    return result, np.array([run, core, time.perf_counter() - start - run - core])
-
-
-def both(elements: int) -> list[dict[str, Any]]:
-    """Both bodies at the same time, a thread each."""
-    systems = [system(part, elements) for part in ("upper", "lower")]
-    before = resident()
-    rows = []
-    with ThreadPoolExecutor(2) as pool:
-        made = list(pool.map(lambda s: watched(lambda: make_solver("multigrid", s[0])), systems))
-        solvers = [solver for solver, _ in made]
-        solved = list(
-            pool.map(lambda p: watched(lambda: p[0].solve(p[1][1])), zip(solvers, systems))
-        )
-    memory, peak = resident() - before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    for phase, results in (("setup", made), ("solve", solved)):
-        for part, (_, load), (_, seconds), solver in zip(
-            ("punch", "foundation"), systems, results, solvers
-        ):
-            rows.append(
-                {
-                    "phase": phase,
-                    "body": part,
-                    "unknowns": len(load),
-                    "iterations": iterations(solver, load) if phase == "solve" else "",
-                    "ran [s]": seconds[0],
-                    "waited for the other thread [s]": max(seconds[2], 0.0),
-                    "solvers [GiB]": memory / GIB,
-                    "peak with assembly [GiB]": peak / GIB,
-                }
-            )
-    return rows
-
-
 def alone(act: Callable[[Any], Any], task: Any) -> Any:
     """act(task) in a new process, so that its memory is its own."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -228,13 +170,15 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
     return figure
 
 
-TEXT = """Which solver of a body's linear system is the fastest? The body is the foundation of `punch-3d`. Its hexahedra grow by 1.3 away from the
-contact, and it is held on three sides. One load is random on the unknowns of the contact. Multigrid
-and the defaults of pyamg ({versions}) iterate to a relative accuracy of 1e-10. It is measured by
-(r' B r)^1/2 with the V-cycle B for the one, and by |r| for the other. The table has processor
-seconds of one thread, and the memory that the solver keeps, without the matrix. "complexity" is the
-number of entries of all levels over those of the matrix. "residual" is |b - A x| / |b|. {large}
-{{rows}}
+TEXT = """Which solver of a body's linear system is the fastest? The body is the foundation of
+`punch-3d`. Its hexahedra grow by 1.3 away from the contact, and it is held on three sides. One
+load is random on the unknowns of the contact. Multigrid and the defaults of pyamg ({versions})
+iterate to a relative accuracy of 1e-10. It is measured by (r' B r)^1/2 with the V-cycle B for
+the one, and by the length of r for the other. The table has processor seconds of one thread, and
+the memory that the solver keeps, without the matrix. "complexity" is the number of entries of all
+levels over those of the matrix. "residual" is |b - A x| / |b|.
+
+{large}{{rows}}
 
 **Growth.** The table has exponents of the number of unknowns, fitted to the three largest sizes of
 each solver.
@@ -244,12 +188,6 @@ each solver.
 "pyamg's defaults" has the same blocks and rigid motions, and takes every neighbour for a strong
 one. Flat elements then make its iterations grow with the mesh. `multigrid` joins only nodes that
 are close to each other, measured by the size of the mesh around them.
-
-**Both bodies at the same time**, by multigrid with one thread each. Products with sparse matrices
-leave Python's lock to the other thread. In the set-up, the aggregation of pyamg and the smoothing
-of the prolongation do not. Waiting for a core is not counted.
-
-{{threads}}
 """
 
 if __name__ == "__main__":
@@ -270,10 +208,9 @@ if __name__ == "__main__":
         for elements in several:
             rows.append(alone(measure, (name, elements)))
             print(rows[-1], flush=True)
-    threads = alone(both, BOTH_LARGE if large else BOTH)
     versions = ", ".join(
         f"{name} {version(name)}" for name in ("pyamg", "pypardiso") if find_spec(name)
     )
-    text = TEXT.format(versions=versions, large="Made with `--large`.\n" if large else "")
-    tables = {"rows": rows, "growth": exponents(rows), "threads": threads}
+    text = TEXT.format(versions=versions, large="Made with `--large`.\n\n" if large else "")
+    tables = {"rows": rows, "growth": exponents(rows)}
     write("body_solvers", "Solvers of a body's linear system", text, tables, {"cost": draw(rows)})

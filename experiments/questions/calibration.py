@@ -1,6 +1,4 @@
-"""Are friction and stiffness found from a Cattaneo-Mindlin loop, are the intervals honest, and
-where is mu not in the data?
-"""
+"""Are friction and stiffness found from a sheared contact, and are the intervals honest?"""
 
 from __future__ import annotations
 
@@ -30,9 +28,7 @@ FRICTIONS = (0.2, 0.35, 0.5, 0.7)
 
 
 def loop(cells: int, loads: Sequence[float] = LOADS) -> list[contactopt.Scene]:
-    """Two equal cylinders as half-planes; the upper one is pressed, and pushed by one load after
-    the other.
-    """
+    """Two equal cylinders as half-planes; the upper one is pressed, then pushed load by load."""
     x = REACH * (2 * np.arange(cells) + 1 - cells) / cells
     upper = HalfSpace(
         "upper",
@@ -115,9 +111,7 @@ def repetitions() -> tuple[list[dict[str, Any]], contactopt.Fit]:
 
 
 def knowledge() -> tuple[list[dict[str, Any]], np.ndarray]:
-    """Standard deviation of mu, relative, from half a loop of the amplitude T = share mu P, data
-    with NOISE of their largest shift.
-    """
+    """Relative deviation of mu from half a loop up to T = share mu P, with NOISE in the data."""
     out, rows = np.zeros((len(FRICTIONS), len(AMPLITUDES))), []
     for i, mu in enumerate(FRICTIONS):
         for j, share in enumerate(AMPLITUDES):
@@ -179,11 +173,12 @@ def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
     return made
 
 
-TEXT = f"""How well do measurements of a sheared contact determine friction and stiffness? Two cylinders are pressed by {FORCE:g} N and pushed to and
-fro by {len(LOADS)} shear forces up to {max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu
-= 0.3 and mu = {MU:g}. One has a radius of {RADIUS:g} mm, and the other is flat. The shift of the
-upper one is measured. From it `contactopt.fit` finds E of both bodies and mu. It starts from E =
-{START["E"]:g}, mu = {START["mu"]:g}.
+TEXT = f"""How well do measurements of a sheared contact determine friction and stiffness?
+Two cylinders are pressed by {FORCE:g} N and pushed to and fro by {len(LOADS)} shear forces up
+to {max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu = 0.3 and mu = {MU:g}. One has a
+radius of {RADIUS:g} mm, and the other is flat. The shift of the upper one is measured. From
+it `contactopt.fit` finds E of both bodies and mu. It starts from E = {START["E"]:g}, mu =
+{START["mu"]:g}.
 
 **Without noise.** The data come from the same grid of 40 points, or from a finer grid. In the
 second case the error that is left is that of the coarse grid:

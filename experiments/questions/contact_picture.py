@@ -24,9 +24,7 @@ MAGNIFIED = 5.0  # displacements as drawn
 
 
 def draw_bodies(ax, path: PathResult, a: float) -> None:  # type: ignore[no-untyped-def]
-    """The deformed bodies about the contact, coloured by von Mises stress, with the forces on the
-    upper one.
-    """
+    """The deformed bodies about the contact, coloured by von Mises stress, with their forces."""
     bodies = recover(path.reduction, path.solution)
     top = max(float(np.quantile(body.von_mises, 0.999)) for body in bodies)
     for body in bodies:

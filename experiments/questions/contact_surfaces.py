@@ -2,40 +2,32 @@
 of stiffness?
 
 `python -m experiments.questions.contact_surfaces` makes the tables and the report; it needs the
-package gmsh. With `roots` it prints how long both ways to the square root take instead.
+package gmsh.
 """
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import gmsh
 import numpy as np
-import scipy.sparse as sp
 from matplotlib.figure import Figure
-from scipy.sparse.linalg import LinearOperator
 from skfem import MeshQuad, MeshTet
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.methods.preconditioners import surface as surface_room
 from experiments.questions.preconditioners import condition, iterations
-from experiments.report import markdown, write
+from experiments.report import write
 
 POISSON, HEIGHT, GROWTH = 0.3, 1.0, 1.3
 RATIOS = (1e-4, 1.0, 1e4)  # stiffness of the lower body over that of the upper one
 SIZES = (0.3, 0.13)  # of the triangles
 FINER = 0.075  # on the first two surfaces, at a ratio of one
 AROUND = (100, 1000)  # nodes around the ring
-LANCZOS = 25  # steps that estimate a condition number without the entries of Q
-MANY = 10_000  # nodes around the ring without the entries of Q
 UPPER, LOWER = 1.0, -1.0
-PRODUCTS = 20  # whose mean time is taken
 
 
 def disc() -> None:
@@ -102,9 +94,7 @@ def triangles(name: str, size: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def extruded(points: np.ndarray, cells: np.ndarray, levels: np.ndarray) -> MeshTet:
-    """The prisms over triangles, each cut into three tetrahedra; neighbours agree because corners
-    are sorted.
-    """
+    """Prisms over triangles, each cut into three tetrahedra; sorted corners make them agree."""
     k, cells = points.shape[1], np.sort(cells, axis=0)
     p = np.concatenate([np.concatenate([points, np.full((1, k), z)]) for z in levels], axis=1)
     tetrahedra = []
@@ -184,50 +174,6 @@ def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, objec
     return row
 
 
-def lanczos(P: LinearOperator, Q: LinearOperator) -> float:
-    """Condition of P Q from below, by Lanczos' method in the inner product of P, orthogonalised
-    twice.
-    """
-    w = np.random.default_rng(0).normal(size=Q.shape[0])
-    basis: list[np.ndarray] = []
-    images: list[np.ndarray] = []
-    T = np.zeros((LANCZOS, LANCZOS))
-    for j in range(LANCZOS):
-        Pw = P @ w
-        size = np.sqrt(w @ Pw)
-        basis.append(w / size)
-        images.append(Pw / size)
-        w = Q @ images[j]
-        for _ in range(2):
-            for i in range(j + 1):
-                share = images[i] @ w
-                T[i, j] += share
-                w = w - share * basis[i]
-    values = np.linalg.eigvalsh(np.triu(T) + np.triu(T, 1).T)
-    return float(values[-1] / values[0])
-
-
-def many(n: int) -> dict[str, object]:
-    """The ring without the entries of Q."""
-    problem = reduce_bodies(ring(n), Q="implicit").problem
-    P = preconditioner(problem, "laplacian")
-    Q = LinearOperator((problem.q.size,) * 2, matvec=lambda x: problem.Q @ x.ravel(), dtype=float)
-    row: dict[str, object] = {
-        "surface": "closed ring, in the plane",
-        "contacts": problem.contacts,
-        "ratio": 1.0,
-    }
-    for title, chosen in (
-        ("laplacian", P),
-        ("deflated", deflated(P, problem.Q, smooth_motions(problem))),
-    ):
-        row |= {
-            f"{title}: condition (from below)": lanczos(chosen, Q),
-            f"{title}: iterations": iterations(chosen, Q),
-        }
-    return row
-
-
 def draw(rows: list[dict]) -> Figure:
     figure = Figure(figsize=(7, 5), layout="constrained")
     ax = figure.subplots()
@@ -253,27 +199,25 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """Does the preconditioner `laplacian` work on contact surfaces of any shape? Two stubs stand on each other along a
-surface. gmsh meshed this surface with triangles, and each stub has a column of tetrahedra over each
-triangle. In the plane a pin sits in a bush. The table has condition numbers of the whole operator,
-with normal and tangential components together. It also has the iterations of conjugate gradients
-from a random right-hand side to 1e-8. `deflated` means that constant and linear motions are solved
-for exactly. The only number that was fitted to stubs is ALONG
+TEXT = """Does the preconditioner `laplacian` work on contact surfaces of any shape? Two stubs stand
+on each other along a surface. gmsh meshed this surface with triangles, and each stub has a column
+of tetrahedra over each triangle. In the plane a pin sits in a bush. The table has condition numbers
+of the whole operator, with normal and tangential components together. It also has the iterations of
+conjugate gradients from a random right-hand side to 1e-8. `deflated` means that constant and linear
+motions are solved for exactly. The only number that was fitted to stubs is ALONG
 (`contactopt/methods/preconditioners/constants.py`), and it was fitted on the disc.
 
-1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number {most:.1f}. No surface takes more than {steps} iterations. On the disc
-   the condition numbers are {disc}. {beyond}
-2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most {plainsteps} iterations. Without any
-   preconditioner, conjugate gradients take up to {none}.
-3. The ratio of the stiffnesses of the two bodies, from 1e-4 to 1e4, changes a condition number by at most {spread:.0f} %.
-4. From the coarsest to the finest mesh, the deflated condition number changes by a factor of {least:.2f} to {largest:.2f}.
+1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number
+   {most:.1f}. No surface takes more than {steps} iterations. On the disc the condition numbers are
+   {disc}. {beyond}
+2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most
+   {plainsteps} iterations. Without any preconditioner, conjugate gradients take up to {none}.
+3. The ratio of the stiffnesses of the two bodies, from 1e-4 to 1e4, changes a condition number by
+   at most {spread:.0f} %.
+4. From the coarsest to the finest mesh, the deflated condition number changes by a factor of
+   {least:.2f} to {largest:.2f}.
 
 {{rows}}
-
-The last table has the ring with so many contacts that Q is known by its products only. The
-condition number is an estimate from below by the method of Lanczos:
-
-{{many}}
 """
 
 
@@ -327,7 +271,7 @@ def main() -> None:
             rows += [judge(name, *pair) for pair in pairs(stubs(name, FINER), RATIOS[1:2])]
     for n in AROUND:
         rows += [judge("closed ring, in the plane", *pair) for pair in pairs(ring(n), RATIOS)]
-    tables = {"rows": rows, "many": [many(MANY)]}
+    tables = {"rows": rows}
     write(
         "contact_surfaces",
         "`laplacian` on contact surfaces of any shape",
@@ -337,45 +281,5 @@ def main() -> None:
     )
 
 
-def roots() -> list[dict[str, object]]:
-    """Time of `laplacian` on discs, by eigenvectors and by poles, and after how many products
-    eigenvectors have paid off.
-    """
-    rows = []
-    for size in (0.3, 0.2, 0.13, 0.09):
-        points, cells = triangles(next(iter(SURFACES)), size)
-        k = points.shape[1]
-        problem = InterfaceProblem(
-            sp.eye(3 * k, format="csr"), np.zeros((k, 3)), 0.3, coordinates=points
-        )
-        problem = replace(problem, chart=replace(problem.chart, cells=cells))
-        X, held = np.random.default_rng(0).normal(size=(k, 3)), np.zeros((k, 3), dtype=bool)
-        times = {}
-        for way, most in (("eigenvectors", 3 * k), ("poles", 0)):
-            surface_room.EIGENVECTORS = most  # type: ignore[attr-defined]
-            began = time.process_time()
-            act = surface_room.laplacian(problem, held)[1]
-            made = time.process_time()
-            for _ in range(PRODUCTS):
-                act(X)
-            times[way] = made - began, (time.process_time() - made) / PRODUCTS
-        slower, faster = (
-            times["eigenvectors"][0] - times["poles"][0],
-            times["poles"][1] - times["eigenvectors"][1],
-        )
-        seconds = {
-            f"{way}, {what} [s]": s
-            for way, own in times.items()
-            for what, s in zip(("set-up", "product"), own)
-        }
-        rows.append(
-            {"unknowns": 2 * k} | seconds | {"products that pay": max(slower, 0.0) / faster}
-        )
-    return rows
-
-
 if __name__ == "__main__":
-    if sys.argv[1:] == ["roots"]:
-        print(markdown(roots()))
-    else:
-        main()
+    main()

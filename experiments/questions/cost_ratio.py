@@ -36,9 +36,7 @@ def timed(act: Callable[[], Any]) -> tuple[Any, float, float]:
 
 
 def bonded(upper: Assembly, lower: Assembly, solver: str) -> Callable[[], np.ndarray]:
-    """The direct solve of the bonded bodies under the plate's unit motion: order, factorise,
-    substitute once.
-    """
+    """The direct solve of the bonded bodies under the plate's unit motion, with its factors."""
     count = [b.basis.mesh.p.shape[1] for b in (upper, lower)]
     partner = {tuple(np.round(x, 9)): n for x, n in zip(lower.points.T, lower.nodes)}
     node = [np.arange(count[0]), count[0] + np.arange(count[1])]
@@ -112,12 +110,13 @@ def measure(name: str, solver: str) -> dict[str, Any]:
     }
 
 
-TEXT = f"""What does friction cost? The time from assembled bodies to certified contact forces (residual at most 1e-8) is compared with that of one linear
-solve. For the frictional problem two cores factorise both bodies at the same time, and Newton's
-method follows. The linear solve is one direct solve of the same two bodies, glued together at the
-contact nodes, with a given motion of the plate. It has the same solver and ordering, and one
-forward and backward substitution. Times are medians of {REPEATS} runs in turn, with
-`OMP_NUM_THREADS=1`. The second ratio counts the seconds of both threads.
+TEXT = f"""What does friction cost? The time from assembled bodies to certified contact forces
+(residual at most 1e-8) is compared with that of one linear solve. For the frictional problem two
+cores factorise both bodies at the same time, and Newton's method follows. The linear solve is one
+direct solve of the same two bodies, glued together at the contact nodes, with a given motion of the
+plate. It has the same solver and ordering, and one forward and backward substitution. Times are
+medians of {REPEATS} runs in turn, with `OMP_NUM_THREADS=1`. The second ratio counts the seconds of
+both threads.
 
 {{ratios}}
 

@@ -30,9 +30,7 @@ def on_half_plane(cells: int, mu: float) -> Scene:
 
 
 def on_block(elements: int, mu: float) -> Scene:
-    """A rigid punch on the middle of an elastic block of finite elements, which is clamped below:
-    no known profile.
-    """
+    """A rigid punch on the middle of an elastic block, clamped below: no known profile."""
     half = np.linspace(0.0, HALF, elements + 1)
     rest = graded(3 * HALF, HALF / elements, 1.3)[1:]
     x = np.concatenate([-(HALF + rest[::-1]), -half[:0:-1], half, HALF + rest])
@@ -59,9 +57,7 @@ def polynomials(places: np.ndarray) -> np.ndarray:
 
 
 def known_profile(x: np.ndarray) -> np.ndarray:
-    """Displacement of a half-plane under uniform pressure on |x| < 1 (Johnson 1985, section 2.5),
-    up to a constant [length].
-    """
+    """Displacement of a half-plane under even pressure (Johnson 1985, section 2.5) [length]."""
     modulus = MATERIAL.E / (1 - MATERIAL.nu**2)
     with np.errstate(divide="ignore", invalid="ignore"):
         shape = (1 + x) * np.log((1 + x) ** 2) + (1 - x) * np.log((1 - x) ** 2)
@@ -132,11 +128,11 @@ def figure(kept: dict[str, contactopt.Design]) -> Any:
     return made
 
 
-TEXT = f"""Which profile makes the pressure under a punch even? A rigid flat punch of the half-width {HALF:g} mm carries {FORCE:g} N. Its pressure is infinite at
-the corners. On a mesh the pressure is largest at the last contact. `contactopt.design` looks for
-the profile whose largest pressure is as small as possible. The profile has one free height per
-contact, or it is a sum of six Legendre polynomials. The mean pressure is the force over the face of
-the punch.
+TEXT = f"""Which profile makes the pressure under a punch even? A rigid flat punch of the half-width
+{HALF:g} mm carries {FORCE:g} N. Its pressure is infinite at the corners. On a mesh the pressure is
+largest at the last contact. `contactopt.design` looks for the profile whose largest pressure is as
+small as possible. The profile has one free height per contact, or it is a sum of six Legendre
+polynomials. The mean pressure is the force over the face of the punch.
 
 On a half-plane without friction the answer is known: it is the displacement under a uniform
 pressure (Johnson 1985, section 2.5). For the block of finite elements, and with friction, the best

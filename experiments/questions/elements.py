@@ -68,9 +68,7 @@ def scene(
     grading: float = 1.0,
     size: float | None = None,
 ) -> Scene:
-    """Sphere or disc with a contact half-width of 1 on a half-space: axisymmetric, or a quarter
-    model in 3D.
-    """
+    """Sphere or disc on a half-space, half-width 1: axisymmetric, or a quarter model in 3D."""
     across, rise = grids(n, dim, grading, size or SIZE[dim])
     modulus = contact_modulus(RUBBER)
     force = 2 * modulus / RADIUS if punch else 4 * modulus / (3 * RADIUS)
@@ -101,9 +99,7 @@ def scene(
 
 
 def measure(case: str, n: int, degree: int, shape: str, **options: object) -> dict[str, object]:
-    """One solve, repeated where it is short: errors relative to the exact values, unknowns, median
-    processor time.
-    """
+    """One solve, repeated where it is short: relative errors, unknowns, median processor time."""
     dim = 3 if case.endswith("3D") else 2
     made = scene(dim, n, degree, shape, **options)  # type: ignore[arg-type]
     times: list[float] = []
@@ -114,10 +110,8 @@ def measure(case: str, n: int, degree: int, shape: str, **options: object) -> di
         times.append(time.process_time() - start)
     problem, exact = reduction.problem, made.reference
     assert solution.solved
-    pressure, x = (
-        solution.reactions[:, 0] / problem.areas,
-        np.linalg.norm(problem.coordinates[: dim - 1], axis=0),
-    )
+    pressure = solution.reactions[:, 0] / problem.areas
+    x = np.linalg.norm(problem.coordinates[: dim - 1], axis=0)
     row: dict[str, object] = {
         "case": case,
         "shape": shape,
@@ -143,17 +137,13 @@ def measure(case: str, n: int, degree: int, shape: str, **options: object) -> di
 
 
 def size_effect() -> float:
-    """By how much less the disc approaches a body of SIZE than a half-space, relative: it goes with
-    1 / size.
-    """
+    """By how much less the disc approaches a body of SIZE than a half-space, relative."""
     near, far = (measure("disc", 8, 2, "Q", punch=True, size=k * SIZE[2]) for k in (1, 10))
     return (float(near["approach"]) - float(far["approach"])) / 0.9
 
 
 def without_size(row: dict, effect: float) -> dict[str, object]:
-    """The approach of a half-space: the same force costs the same approach, 2/3 of the effect on a
-    sphere's.
-    """
+    """The approach of a half-space; the size's effect on a sphere's is 2/3 of that on a disc's."""
     share = {"sphere": 2 / 3, "sphere 3D": np.nan}.get(row["case"], 1.0)
     return row | {"approach": row["approach"] - share * effect}
 
@@ -170,9 +160,7 @@ def runs(across: dict[tuple[int, int], tuple[int, ...]]) -> Iterator[dict[str, o
 
 @contextmanager
 def contacts_at_all_nodes() -> Iterator[None]:
-    """Quadratic simplices with contacts at the middles of edges too, as the package has it for
-    bricks alone.
-    """
+    """Quadratic simplices with contacts at the middles of edges too, as bricks have them."""
     kept = dict(elements.FACES)
     quarters = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
     elements.FACES["RefTri"] = (*kept["RefTri"][:3], kept["RefQuad"][3])
@@ -186,9 +174,7 @@ def contacts_at_all_nodes() -> Iterator[None]:
 def ripples(
     rows: list[dict], across: dict[tuple[int, int], tuple[int, ...]]
 ) -> list[dict[str, object]]:
-    """Scatter of the pressure on the finest meshes, and what contacts at all nodes of simplices
-    would give.
-    """
+    """Scatter of the pressure on the finest meshes, also with contacts at all nodes."""
     out = []
     for case, dim in (("sphere", 2), ("sphere 3D", 3)):
         finest = {kind: series(rows, case, *kind)[-1] for kind in KINDS}
@@ -221,9 +207,7 @@ QUANTITIES = (
 
 
 def reach(rows: list[dict], quantity: str, cost: str, target: float) -> float | None:
-    """Cost from which on the error stays below the target, between two runs by a power law; None:
-    not reached.
-    """
+    """Cost from which on the error stays below the target, by a power law; None: never."""
     error = np.abs([r[quantity] for r in rows])
     # a finer mesh may be worse: a lucky zero does not count
     error = np.maximum.accumulate(error[::-1])[::-1]
@@ -347,10 +331,11 @@ def findings(rows: list[dict], ripple: list[dict]) -> str:
     return "\n".join(said)
 
 
-TEXT = """Which elements should you take? A rigid sphere and a rigid flat disc press on a half-space without friction, with E = 5 MPa and nu = .3. The scenes are
-axisymmetric or in 3D. The axisymmetric body is 3,000 contact radii large. Its finite size changes
-the approach, by {size:.3f} % on the disc. A body ten times as large shows this, and the change is
-taken out. The body in 3D is a quarter model of 20 contact radii, and its approach is not compared.
+TEXT = """Which elements should you take? A rigid sphere and a rigid flat disc press on a
+half-space without friction, with E = 5 MPa and nu = .3. The scenes are axisymmetric or in 3D.
+The axisymmetric body is 3,000 contact radii large. Its finite size changes the approach, by
+{size:.3f} % on the disc. A body ten times as large shows this, and the change is taken out. The
+body in 3D is a quarter model of 20 contact radii, and its approach is not compared.
 
 Q stands for quadrilaterals or hexahedra. P stands for the same elements cut into triangles or
 tetrahedra. The number behind the letter is the degree of the displacement. n is the number of

@@ -1,6 +1,4 @@
-"""Do contacts keep their areas and a uniform pressure, and Hertz and Persson their peaks, on meshes
-that nobody prepared?
-"""
+"""Do contacts keep areas, even pressure and exact peaks on meshes that nobody prepared?"""
 
 from __future__ import annotations
 
@@ -60,13 +58,9 @@ def grid(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
 
 
 def surface(rng: np.random.Generator, dim: int, ends: np.ndarray, shape: Any, up: bool) -> Faces:
-    """A random mesh of a surface between `ends` (dim - 1, 2), lifted to z = shape(x); `up`: its
-    body lies below.
-    """
-    kind, degree = (
-        str(rng.choice(["RefTri", "RefQuad"] if dim == 2 else ["RefTet", "RefHex"])),
-        int(rng.integers(1, 3)),
-    )
+    """A random mesh of a surface between `ends`, at z = shape(x); `up`: its body lies below."""
+    kind = str(rng.choice(["RefTri", "RefQuad"] if dim == 2 else ["RefTet", "RefHex"]))
+    degree = int(rng.integers(1, 3))
     if dim == 2:
         mesh = skfem.MeshLine(grid(rng, *ends[0]))
     else:
@@ -107,9 +101,7 @@ def moved(rng: np.random.Generator, *sides: Faces) -> list[Faces]:
 
 
 def pair(seed: int) -> dict[str, Any]:
-    """Areas and forces of uniform pressure where a random surface faces another one that covers it
-    or parallels it.
-    """
+    """Areas and forces of uniform pressure where a random surface faces another one."""
     rng = np.random.default_rng(seed)
     dim, flat = int(rng.integers(2, 4)), bool(rng.integers(2))
     parallel = flat and bool(rng.integers(2))
@@ -232,9 +224,7 @@ class Case:
 
 
 def case(shape: str, rng: np.random.Generator) -> Case:
-    """A roller or a ball with a contact of a few percent of its radius, or a pin that fills up to a
-    third of its hole.
-    """
+    """A roller or a ball with a small contact, or a pin that fills up to a third of its hole."""
     radius, steel = float(10 ** rng.uniform(-1, 2)), Material(210e3, 0.3)
     soft = steel if shape == "pin" else Material(steel.E * 10 ** rng.uniform(-0.5, 0.5), 0.3)
     modulus, a = contact_modulus(steel, soft), radius * rng.uniform(0.02, 0.05)
@@ -309,9 +299,7 @@ def scene(one: Case, rng: np.random.Generator) -> tuple[Scene, dict[str, Any]]:
 
 
 def read(x: np.ndarray, p: np.ndarray, areas: np.ndarray, terms: int) -> tuple[float, float]:
-    """Peak and half-width where p^2 is a polynomial in x^2, fitted where the pressure is not small:
-    for Hertz of two terms.
-    """
+    """Peak and half-width where p^2 is a polynomial in x^2, fitted where p is not small."""
     inside = (p > 0.15 * p.max()) & (areas > 0)
     A = np.vander((x[inside] / x[inside].max()) ** 2, terms, increasing=True)
     c = np.linalg.lstsq(A * areas[inside, None], p[inside] ** 2 * areas[inside], rcond=None)[0]
@@ -363,12 +351,13 @@ def meshes(count: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     return worst, missed or [{"shape": "none"}]
 
 
-TEXT = """Does every contact keep the area of its faces, whatever the gap between two surfaces is beside the size of their facets? {count} random
-pairs of surfaces: linear and quadratic faces, triangles and quadrilaterals, even, graded and random
-ones, turned, moved, and in units from 1e-6 to 1e6. The gap is 1e-4 to 1e3 facets. One surface
-covers the other, or is parallel and shifted. *area* is the relative error of the sum of the areas
-of all contacts. *share* is that of the area of one contact. *uniform pressure* is the error of the
-nodal forces that a uniform pressure exerts, over the mean one: the patch test.
+TEXT = """Does every contact keep the area of its faces, whatever the gap between two surfaces is
+beside the size of their facets? {count} random pairs of surfaces: linear and quadratic faces,
+triangles and quadrilaterals, even, graded and random ones, turned, moved, and in units from 1e-6 to
+1e6. The gap is 1e-4 to 1e3 facets. One surface covers the other, or is parallel and shifted. *area*
+is the relative error of the sum of the areas of all contacts. *share* is that of the area of one
+contact. *uniform pressure* is the error of the nodal forces that a uniform pressure exerts, over
+the mean one: the patch test.
 
 {{pairs}}
 

@@ -8,19 +8,14 @@ within seconds; the other methods follow.
 
 from __future__ import annotations
 
-import os
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-import statistics  # noqa: E402
-import sys  # noqa: E402
-import time  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Any  # noqa: E402
-
-from contactopt import InterfaceProblem, Solution, fclib, siconos_residual, solve  # noqa: E402
-from experiments.report import markdown, write  # noqa: E402
+from contactopt import InterfaceProblem, Solution, fclib, siconos_residual, solve
+from experiments.report import markdown, write
 
 DEFAULT, OTHERS = "auto", ("proximal", "nsgs", "admm")
 TOL = 1e-8
@@ -114,10 +109,11 @@ def totals(rows: list[dict[str, Any]], key: str) -> list[dict[str, Any]]:
     return out
 
 
-TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone, medians of three (one where a solve takes
-more than {long:g} s). "Siconos' residual" is the published measure, which depends on units. The
-last columns quote the seconds that Siconos' solvers take for the same files on a machine of the
-same kind, as an order of magnitude; - where they do not reach 1e-8 in 20 s or were not measured.
+TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone,
+medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the
+published measure, which depends on units. The last columns quote the seconds that Siconos'
+solvers take for the same files on a machine of the same kind, as an order of magnitude; - where
+they do not reach 1e-8 in 20 s or were not measured.
 
 ## The default method
 

@@ -8,39 +8,47 @@ their time limit by more than a second.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
+import scipy.sparse as sp
 
-import contextlib  # noqa: E402
-import io  # noqa: E402
-import sys  # noqa: E402
-import tempfile  # noqa: E402
-import time  # noqa: E402
-import warnings  # noqa: E402
-from collections import Counter  # noqa: E402
-from collections.abc import Callable  # noqa: E402
-from concurrent.futures import ProcessPoolExecutor  # noqa: E402
-from dataclasses import replace  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Any  # noqa: E402
-
-import numpy as np  # noqa: E402
-import scipy.sparse as sp  # noqa: E402
-
-import contactopt as co  # noqa: E402
-from contactopt.methods import METHODS  # noqa: E402
+import contactopt as co
+from contactopt.methods import METHODS
 
 CASES, PROCESSES = 5000, 2
 LIMIT, SLACK = 0.3, 1.0  # seconds
 OWN = (co.InputError, co.BackendError)
 
-JUNK: tuple[Any, ...] = (
-    None, True, -1, 0, 3, 1e308, -1e308, float("nan"), float("inf"), 1j, "", "x", "nan", b"x", [], [[]], [[1.0], [1.0, 2.0]],
-    {}, {"a": 1}, object(), lambda: 0, np.zeros(0), np.zeros((2, 2)), np.full((2, 2), np.nan), np.eye(2) * 1j, np.array("x"),
-    np.array(["a", "b"]), np.array([object()]), sp.eye_array(4), 10**30, range(3), Path("."), np.ma.masked, ValueError,
-)  # fmt: skip
+NUMBERS: tuple[Any, ...] = (None, True, -1, 0, 3, 1e308, -1e308, float("nan"), float("inf"), 1j)
+TEXTS: tuple[Any, ...] = ("", "x", "nan", b"x")
+CONTAINERS: tuple[Any, ...] = ([], [[]], [[1.0], [1.0, 2.0]], {}, {"a": 1}, object(), lambda: 0)
+NANS, LETTERS = np.full((2, 2), np.nan), np.array(["a", "b"])
+ARRAYS: tuple[Any, ...] = (np.zeros(0), np.zeros((2, 2)), NANS, np.eye(2) * 1j, np.array("x"))
+OTHERS: tuple[Any, ...] = (10**30, range(3), Path("."), np.ma.masked, ValueError)
+JUNK = (
+    *(*NUMBERS, *TEXTS, *CONTAINERS, *ARRAYS),
+    *(LETTERS, np.array([object()]), sp.eye_array(4), *OTHERS),
+)
+SETTINGS = ("method", "tol", "time_limit", "max_iterations", "change_tol", "start", "relaxation")
+PLACES = ["material", "support", "traction", "replace", "part", "follow", "reduce", "name"]
+PLACES += ["body force"]
+WORDS = ["x", "-1", "0", "nan", "1e308", "1000000000", "", "../..", "--zz", "punch-2d"]
+WORDS += ["é", "\x00", "inf"]
+OPTIONS = ["--mu", "--force", "--elements", "--tol", "--method", "--degree", "--q", "--solver"]
+OPTIONS += ["--accuracy", "--quantity"]
 
 
 def good(rng: np.random.Generator) -> dict[str, Any]:
@@ -81,21 +89,7 @@ def solves(rng: np.random.Generator, folder: Path) -> None:
         tol=10.0 ** rng.integers(-16, -3), time_limit=LIMIT, max_iterations=200
     )
     method: Any = any_of(rng, list(METHODS))
-    spoilt = any_of(
-        rng,
-        [
-            "",
-            "",
-            "",
-            "method",
-            "tol",
-            "time_limit",
-            "max_iterations",
-            "change_tol",
-            "start",
-            "relaxation",
-        ],
-    )
+    spoilt = any_of(rng, ["", "", "", *SETTINGS])
     if spoilt == "method":
         method = any_of(rng, JUNK)
     elif spoilt:
@@ -157,24 +151,9 @@ def files(rng: np.random.Generator, folder: Path) -> None:
 
 
 def scenes(rng: np.random.Generator, folder: Path) -> None:
-    """Scenes, parts, loads and supports of wrong kinds; two bodies of one name; a path of unlike
-    states.
-    """
+    """Scenes of wrong kinds; two bodies of one name; a path of unlike states."""
     scene = co.scenes.flat_punch(dim=2)
-    kind = any_of(
-        rng,
-        [
-            "material",
-            "support",
-            "traction",
-            "replace",
-            "part",
-            "follow",
-            "reduce",
-            "name",
-            "body force",
-        ],
-    )
+    kind = any_of(rng, PLACES)
     if kind == "material":
         co.Material(any_of(rng, [1.0, *JUNK]), any_of(rng, [0.3, *JUNK]))
     elif kind in ("support", "traction", "body force"):
@@ -205,49 +184,16 @@ def commands(rng: np.random.Generator, folder: Path) -> None:
     """The command line."""
     from contactopt.cli import main
 
-    words = [
-        "x",
-        "-1",
-        "0",
-        "nan",
-        "1e308",
-        "1000000000",
-        "",
-        "../..",
-        "--zz",
-        "punch-2d",
-        "é",
-        "\x00",
-        "inf",
-    ]
-    options = [
-        "--mu",
-        "--force",
-        "--elements",
-        "--tol",
-        "--method",
-        "--degree",
-        "--q",
-        "--solver",
-        "--accuracy",
-        "--quantity",
-    ]
     command = any_of(rng, ["run", "run", "list", "benchmark", "report", "solve", "x", ""])
-    line = [command, any_of(rng, ["punch-2d", *words])]
-    line += [any_of(rng, options), any_of(rng, words)] if rng.random() < 0.8 else []
+    line = [command, any_of(rng, ["punch-2d", *WORDS])]
+    line += [any_of(rng, OPTIONS), any_of(rng, WORDS)] if rng.random() < 0.8 else []
     line += ["--elements", "1"] if command == "run" and "--elements" not in line else []
     line += ["--out", str(folder / "out")] if command == "run" else []
     main(line)
 
 
-DOORS: tuple[Callable[[np.random.Generator, Path], None], ...] = (
-    problems,
-    solves,
-    starts,
-    files,
-    scenes,
-    commands,
-)
+Door = Callable[[np.random.Generator, Path], None]
+DOORS: tuple[Door, ...] = (problems, solves, starts, files, scenes, commands)
 
 
 def judge(seed: int) -> tuple[str, str, str]:
@@ -284,11 +230,11 @@ def judge(seed: int) -> tuple[str, str, str]:
     return door.__name__, "answered", ""
 
 
-TEXT = """What does contactopt do with input that makes no sense? {cases} random inputs (seeds 0 to {last}) are given in turn to the constructors, to
-`solve` with every method, to its start, to the readers of files, to scenes, and to the command
-line. Each input has at least one value that is not of the kind, the shape or the size that is asked
-for, or it is a degenerate problem. The time limits are {limit:g} s. Every input should be solved,
-or be refused by one of contactopt's own errors.
+TEXT = """What does contactopt do with input that makes no sense? {cases} random inputs (seeds 0 to
+{last}) are given in turn to the constructors, to `solve` with every method, to its start, to the
+readers of files, to scenes, and to the command line. Each input has at least one value that is not
+of the kind, the shape or the size that is asked for, or it is a degenerate problem. The time limits
+are {limit:g} s. Every input should be solved, or be refused by one of contactopt's own errors.
 
 Exceptions that are not contactopt's own: {broken}. Time limits overrun by more than {slack:g} s:
 {overrun}.

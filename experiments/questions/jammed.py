@@ -1,28 +1,21 @@
-"""How often does a path that may turn back reach a solution of a jammed packing where interior
-points do not?
-"""
+"""Does a path that may turn back solve jammed packings where interior points do not?"""
 
 from __future__ import annotations
 
-import os
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import statistics  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Callable  # noqa: E402
-from typing import Any  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import InterfaceProblem, solve  # noqa: E402
-from contactopt.methods.kernels.homotopy import homotopy_iterates  # noqa: E402
-from contactopt.methods.kernels.interior import Path, interior_iterates  # noqa: E402
-from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix  # noqa: E402
-from contactopt.problem import dimensionless  # noqa: E402
-from experiments.questions.granular import packing  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt import InterfaceProblem, solve
+from contactopt.benchmark.packings import packing
+from contactopt.methods.kernels.homotopy import homotopy_iterates
+from contactopt.methods.kernels.interior import Path, interior_iterates
+from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
+from contactopt.problem import dimensionless
+from experiments.report import write
 
 # dimension, bodies, contacts of a pair of bodies
 FAMILIES = ((2, 25, 1), (2, 64, 2), (3, 18, 3), (3, 27, 2))
@@ -85,10 +78,11 @@ def measure(dim: int, bodies: int, points: int, mu: float) -> dict[str, Any]:
     return row
 
 
-TEXT = """Packings of {seeds} seeds in each row. How many end at a solution: on the two interior-point paths that the default method begins with,
-and on the path that turns back where it must (`contactopt.methods.kernels.homotopy`, at most
-{systems} linear systems), with an error of at most {reached:g}; and how many the default method
-certifies within {limit} iterations. Medians of processor seconds, one thread.
+TEXT = """Packings of {seeds} seeds in each row. How many end at a solution: on the two
+interior-point paths that the default method begins with, and on the path that turns back where
+it must (`contactopt.methods.kernels.homotopy`, at most {systems} linear systems), with an error of
+at most {reached:g}; and how many the default method certifies within {limit} iterations. Medians of
+processor seconds, one thread.
 
 {{rows}}
 """

@@ -1,33 +1,26 @@
 """What does friction cost beside one linear solve, up to a punch of a million unknowns in 3D?
 
 `python -m experiments.questions.large_punch [elements ...]` measures the sizes and writes the
-report, `--phases [elements]` measures the phases on one core and on two. Wall times mean something
-only where no other program has a share of the cores. The phases come first.
+report.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import resource
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes, solve
-from contactopt.bodies import assemble
-from contactopt.coupling.back_to_bodies import recover
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.linear.concurrency import each, one_blas_thread
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import REPORTS, markdown, merged, write
+from experiments.report import merged, write
 
 SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch
 FRICTION = (0.1, 0.2, 0.3, 0.4, 0.5)
@@ -37,8 +30,6 @@ ACCURACY = 1e-8  # of the product whose V-cycles are counted
 WAYS = {"coupled": "coupled", "products": "krylov"}  # -> Newton's linear solver
 KEYS = ("elements", "way", "mu")
 MODULE = "experiments.questions.large_punch"
-PHASES_AT = 32  # elements
-PHASES = REPORTS / "large_punch" / "phases.json"  # what `--phases` measured last
 
 
 def once(elements: int, way: str, mu: float) -> dict[str, object]:
@@ -88,58 +79,6 @@ def cycles_of_product(reduction) -> int:  # type: ignore[no-untyped-def]
     return total
 
 
-CONFIGURATIONS = {
-    "one core": (1, True),
-    "two cores": (2, True),
-    "two cores, BLAS threads left alone": (2, False),
-}
-
-
-def phases(elements: int, cores: int) -> list[dict[str, object]]:
-    """Wall and CPU time of every phase of one run on so many cores; run in a process of its own."""
-    os.sched_setaffinity(0, set(sorted(os.sched_getaffinity(0))[:cores]))
-    rows = []
-
-    def timed(phase: str, act: Callable[[], Any]) -> Any:
-        begin = time.perf_counter(), time.process_time()
-        made = act()
-        rows.append(
-            {
-                "phase": phase,
-                "wall [s]": time.perf_counter() - begin[0],
-                "CPU [s]": time.process_time() - begin[1],
-            }
-        )
-        return made
-
-    scene = scenes.flat_punch(3)
-    assembled = timed(
-        "assembly", lambda: each(lambda part: assemble(scene, part, elements, None), scene.parts)
-    )
-    with one_blas_thread():
-        timed("hierarchies", lambda: each(lambda body: body.prepare("multigrid", False), assembled))
-    reduction = reduce_bodies(scene, elements, solver="multigrid")
-    solution = timed("solution", lambda: solve(reduction.problem, "newton"))
-    timed("displacements and stresses", lambda: recover(reduction, solution))
-    return rows
-
-
-def phase_table(elements: int) -> list[dict[str, object]]:
-    table: dict[str, dict[str, object]] = {}
-    for name, (cores, limited) in CONFIGURATIONS.items():
-        limits = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} if limited else {}
-        environment = {
-            key: value for key, value in os.environ.items() if not key.endswith("NUM_THREADS")
-        } | limits
-        command = [sys.executable, "-m", MODULE, "--phases-once", str(elements), str(cores)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
-        for row in json.loads(done.stdout.splitlines()[-1]):
-            own = table.setdefault(row["phase"], {"elements": elements, "phase": row["phase"]})
-            own |= {f"{name}: wall [s]": row["wall [s]"], f"{name}: CPU [s]": row["CPU [s]"]}
-            own[f"{name}: wall / CPU"] = row["wall [s]"] / row["CPU [s]"]
-    return list(table.values())
-
-
 def isolated(elements: int, way: str, mu: float) -> dict[str, object]:
     command = [sys.executable, "-m", MODULE, "--once", str(elements), way, str(mu)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
@@ -147,7 +86,7 @@ def isolated(elements: int, way: str, mu: float) -> dict[str, object]:
 
 
 def runs(sizes: list[int]) -> list[tuple[int, str, float]]:
-    """All sizes with the largest friction; at those COMPARED all coefficients, and products with Q."""
+    """All sizes with the largest friction; those COMPARED with all, and with products."""
     chosen = [(n, "coupled", FRICTION[-1]) for n in sizes]
     more = [n for n in sizes if n in COMPARED]
     chosen += [(n, "coupled", mu) for n in more for mu in FRICTION[:-1]]
@@ -168,8 +107,9 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d with `elements` elements across the half-width of the
-punch. It is solved from a cold start to a certificate of 1e-8. Both bodies are solved by multigrid.
+TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d
+with `elements` elements across the half-width of the punch. It is solved from a cold start to a
+certificate of 1e-8. Both bodies are solved by multigrid.
 
 There are two ways. `coupled` is Newton's method on displacements and contact forces at once.
 `products` is Newton's method that takes products with Q, and each of these products solves with
@@ -181,18 +121,13 @@ wall times.
 
 {sizes}
 
-- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over all sizes at mu = .5).
-- CPU time of the frictional problem over that of one linear solve with both bodies (a product with Q at 1e-8), set-up included in
-  both, at mu = .5: {ratios}.
-- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
+- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over
+  all sizes at mu = .5).
+- CPU time of the frictional problem over that of one linear solve with both bodies (a product with
+  Q at 1e-8), set-up included in both, at mu = .5: {ratios}.
+- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to
+  {most}, over all sizes and mu.
 - CPU time of `products` over that of `coupled`, set-up included: {faster}.
-
-The last table has the wall time over the CPU time of every phase. One half is the best that two
-cores can reach. These runs had real-time priority, so that other programs did not disturb them. The
-threads are those that share the bodies and the products. BLAS has one thread, except in the last
-columns.
-
-{phases}
 """
 
 
@@ -228,17 +163,11 @@ def report(rows: list[dict]) -> str:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--once"]:
         print(json.dumps(once(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]))))
-    elif sys.argv[1:2] == ["--phases-once"]:
-        print(json.dumps(phases(int(sys.argv[2]), int(sys.argv[3]))))
-    elif sys.argv[1:2] == ["--phases"]:
-        measured = phase_table(int(sys.argv[2]) if len(sys.argv) > 2 else PHASES_AT)
-        PHASES.write_text(json.dumps(measured, indent=1) + "\n")
-        print(markdown(measured))
     else:
         rows = [isolated(*run) for run in runs([int(size) for size in sys.argv[1:]] or list(SIZES))]
         rows = merged("large_punch", "sizes", rows, KEYS)
         rows = sorted(rows, key=lambda row: (int(row["unknowns"]), row["way"], float(row["mu"])))
-        tables = {"sizes": rows, "phases": json.loads(PHASES.read_text())}
+        tables = {"sizes": rows}
         write(
             "large_punch",
             "Friction beside one linear solve",

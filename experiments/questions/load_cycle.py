@@ -1,4 +1,4 @@
-"""What does a load path cost in accuracy and time: how many states, and where does the energy go?"""
+"""What does a load path cost in accuracy and time: how many states, how much energy?"""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contactopt.figures.animation import animate, energies, loop
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.solving.follow import follow
 from contactopt.solving.paths import PathResult
-from experiments.questions.cattaneo import exact_loss, loop_area
+from experiments.questions.accuracy.sheared import exact_loss, loop_area
 from experiments.report import REPORTS, write
 
 SHEAR = 45.0  # .9 mu force
@@ -26,11 +26,9 @@ def cycle(steps: int) -> dict[str, object]:
     states = scenes.shear_cycle(2, steps=steps, shear=SHEAR)
     history = follow(states).history
     exact = exact_loss(2, states[-1], SHEAR)
-    lost, area, step = (
-        float(history["friction_work"][-1] - history["friction_work"][steps]),
-        loop_area(history, steps),
-        float(history["step_work"][-1] - history["step_work"][steps]),
-    )
+    lost = float(history["friction_work"][-1] - history["friction_work"][steps])
+    area = loop_area(history, steps)
+    step = float(history["step_work"][-1] - history["step_work"][steps])
     return {
         "steps to the largest shear": steps,
         "states": len(states),
@@ -95,9 +93,9 @@ def draw_growing(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared to and fro by .9 of the friction bound. At every
-step the energies balance to rounding: external work = elastic energy + friction work + error of the
-steps.
+TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared
+to and fro by .9 of the friction bound. At every step the energies balance to rounding: external
+work = elastic energy + friction work + error of the steps.
 
 ![film](film.gif)
 

@@ -51,9 +51,10 @@ def measure(kind: str, cells: int) -> dict[str, object]:
     }
 
 
-TEXT = """Does a uniform pressure pass through the interface exactly? Two blocks with unevenly spaced meshes and the heights 1 and 2 are pressed by a
-frictionless rigid plate, with mu = 0. The stress is uniform and uniaxial. So the pressure F / A and
-the approach 3 F / (A E) are exact. (In plane strain E / (1 - nu^2) takes the place of E.)
+TEXT = """Does a uniform pressure pass through the interface exactly? Two blocks with unevenly
+spaced meshes and the heights 1 and 2 are pressed by a frictionless rigid plate, with mu = 0. The
+stress is uniform and uniaxial. So the pressure F / A and the approach 3 F / (A E) are exact. (In
+plane strain E / (1 - nu^2) takes the place of E.)
 
 {rows}
 """

@@ -1,19 +1,13 @@
-"""How good are the paper's H^1/2 preconditioners, what beats them, and what do products with Q
-cost?
-"""
+"""How good are the paper's H^1/2 preconditioners, and what beats them?"""
 
 from __future__ import annotations
-
-import time
-from collections.abc import Callable
-from statistics import median
 
 import numpy as np
 import scipy.linalg as la
 from matplotlib.figure import Figure
 from scipy.sparse.linalg import LinearOperator, cg
 
-from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce, scenes, solve
+from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.linear.operators import Interface
 from contactopt.meshes.structured import graded, rename, tensor_mesh
@@ -44,7 +38,6 @@ STIFFNESS = (
     (5.0, 5.0, 0.499),
 )
 BODIES = "E1 = {:g}, E2 = {:g}, nu = {:g}"
-ELEMENTS = {2: (32, 64, 128, 256, 512, 1024), 3: (6, 8, 12, 16, 20)}
 COLOURS = {"none": GREY, "p21": ORANGE, "p22": GREEN, "neumann": BLUE}
 
 
@@ -91,9 +84,7 @@ def solids(
     Q: str = "explicit",
     nu: float = 0.3,
 ) -> InterfaceProblem:
-    """The same bodies in 3D (16 x 16 x 8 foundation, growth 1.3), the punch held on top; n x n
-    contact nodes.
-    """
+    """The same bodies in 3D, the punch held on top; growth 1.3, n x n contact nodes."""
     zone = np.linspace(-2, 2, n) if zone is None else zone
     h = zone[-1] - zone[-2]
     out = 2 + graded(6, 1.3 * h, 1.3)[1:]
@@ -130,9 +121,7 @@ def iterations(P: np.ndarray | LinearOperator | None, Q: Interface) -> int:
 
 
 def choices(problem: InterfaceProblem) -> dict[str, Preconditioner | None]:
-    """No preconditioner, each by itself, each with the smooth motions deflated; without the entries
-    of Q the best alone.
-    """
+    """None, each by itself, each with smooth motions deflated; without entries the best alone."""
     plain: dict[str, Preconditioner | None] = {"none": None}
     known = [name for name in PRECONDITIONERS if problem.dim == 2 or name != "p22"]
     plain |= {name: preconditioner(problem, name) for name in known}
@@ -170,9 +159,7 @@ def of_bodies(problem: InterfaceProblem, name: str) -> dict[str, object]:
 
 
 def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
-    """Only the contacts in the middle are active: half-width `share` of that of the contact
-    surface.
-    """
+    """Only contacts in the middle are active: half-width `share` of that of the surface."""
     x = problem.coordinates[: problem.dim - 1]
     inside = np.sqrt(np.sum(x**2, axis=0)) <= 2 * share + 1e-9
     active = np.flatnonzero(np.repeat(inside, problem.dim))
@@ -192,36 +179,6 @@ def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
                     restricted(P, U, zero) @ np.eye(len(active)), Q
                 )
     return row
-
-
-def product_costs(dim: int, elements: int) -> dict[str, object]:
-    """Seconds of one product with Q in each form and with the preconditioner, and of whole
-    frictional solves.
-    """
-    scene = scenes.flat_punch(dim, elements=elements, mu=0.3)
-    row: dict[str, object] = {"dim": dim}
-    for form in ("explicit", "implicit"):
-        begin = time.perf_counter()
-        problem = reduce(scene, Q=form)
-        solution = solve(problem)
-        total = time.perf_counter() - begin
-        assert solution.solved, solution.message
-        row |= {
-            "contacts": problem.contacts,
-            f"{form}: product [s]": seconds(lambda p=problem: p.Q @ p.q.ravel()),
-        }
-        row |= {f"{form}: scene solved [s]": total, "products": solution.products}
-    P = preconditioner(problem, "neumann")
-    return row | {"neumann: product [s]": seconds(lambda: P @ problem.q.ravel())}
-
-
-def seconds(act: Callable[[], object], repeats: int = 7) -> float:
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        act()
-        times.append(time.perf_counter() - begin)
-    return median(times)
 
 
 def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
@@ -259,42 +216,19 @@ def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
     return figure
 
 
-def draw_costs(rows: list[dict]) -> Figure:
-    figure = Figure(figsize=(6.4, 8.4), layout="constrained")
-    for ax, kind in zip(figure.subplots(2, 1), ("product", "scene solved")):
-        for dim, style in ((2, "o-"), (3, "s--")):
-            chosen = [row for row in rows if row["dim"] == dim]
-            for form, colour in (("explicit", ORANGE), ("implicit", BLUE), ("neumann", GREEN)):
-                key = f"{form}: {kind} [s]"
-                if key in chosen[0]:
-                    what = "preconditioner" if form == "neumann" else f"{form} Q"
-                    k = [row["contacts"] for row in chosen]
-                    ax.loglog(
-                        k,
-                        [row[key] for row in chosen],
-                        style,
-                        color=colour,
-                        mfc="white",
-                        label=f"{what}, {dim}D",
-                    )
-        ax.set(
-            xlabel="contact nodes N [-]",
-            ylabel=f"one {kind} [s]" if kind == "product" else "scene reduced and solved [s]",
-        )
-        ax.legend(frameon=False, fontsize=8)
-    return figure
+TEXT = """How many iterations do linear systems with Q take, if Q is known by its products only? The
+paper (A. Lotfi, section 5.2) claims a condition number that grows like log^2 N with the number N of
+contacts. The best preconditioner here does not grow. PCG stands for preconditioned conjugate
+gradients.
 
-
-TEXT = """How many iterations do linear systems with Q take, if Q is known by its products only? The paper (A. Lotfi, section 5.2) claims a condition number that
-grows like log^2 N with the number N of contacts. The best preconditioner here does not grow. PCG
-stands for preconditioned conjugate gradients.
-
-1. `neumann`, with the smooth motions deflated (solved for exactly), needs at most {worst_2d} PCG iterations in 2D and {worst_3d} in 3D,
-   whatever the number of contacts. Without a preconditioner there are {none_2d} at {last} contacts.
-2. On a contact zone that is a part of the surface, the inverse of the block G_AA of the model is as good as on the whole surface. The
-   rows and columns of P, which the paper takes, are not.
-3. All preconditioners become worse if Poisson's ratio nu comes near .5. Short tangential waves then lock in bilinear elements, and the
-   models of Q do not contain this. (At nu = .49 the eigenvectors of the smallest eigenvalues are alternating tangential forces.)
+1. `neumann`, with the smooth motions deflated (solved for exactly), needs at most {worst_2d} PCG
+   iterations in 2D and {worst_3d} in 3D, whatever the number of contacts. Without a preconditioner
+   there are {none_2d} at {last} contacts.
+2. On a contact zone that is a part of the surface, the inverse of the block G_AA of the model is as
+   good as on the whole surface. The rows and columns of P, which the paper takes, are not.
+3. All preconditioners become worse if Poisson's ratio nu comes near .5. Short tangential waves then
+   lock in bilinear elements, and the models of Q do not contain this. (At nu = .49 the eigenvectors
+   of the smallest eigenvalues are alternating tangential forces.)
 
 **2D.** A punch, 4 wide and 4 high and held at its top, stands on a foundation of 16 x 8 that is
 clamped below. Both are in plane strain with E = 5 and nu = .3. The nodes are evenly spaced on the
@@ -330,12 +264,6 @@ inverse of the block G_AA of the model, by an inner PCG that needs no body.
 
 {zones}
 
-**Cost.** Times are medians of 7 products. The scenes punch-2d and punch-3d have mu = .3, and are
-reduced and solved to 1e-8 once each. An implicit product is one solve with each body, from its
-factors. An explicit product is one with an array.
-
-{costs}
-
 Another report measures what a whole frictional solve costs, over one linear solve of the bonded
 bodies: [the price of friction](../cost_ratio/report.md).
 """
@@ -361,7 +289,6 @@ def main() -> None:
     plane, solid = blocks(129, *STIFFNESS[0]), solids(13, 5.0, 5.0)
     zones = [in_zone(p, share) for p in (plane, solid) for share in (0.8, 0.4, 0.2)]
     zones = [{key: row.get(key, "") for key in zones[0]} for row in zones]
-    costs = [product_costs(dim, elements) for dim, sizes in ELEMENTS.items() for elements in sizes]
     best = [
         row["PCG iterations, full"] for row in rows if row["preconditioner"] == "neumann, deflated"
     ]
@@ -386,12 +313,10 @@ def main() -> None:
         "surface": surface,
         "ratios": ratios,
         "zones": zones,
-        "costs": costs,
     }
     figures = {
         "line": draw(rows, SIZES, "contact line (2D)"),
         "surface": draw(surface, tuple(n * n for n in SIDES), "contact surface (3D)"),
-        "costs": draw_costs(costs),
     }
     write(
         "preconditioners",
@@ -399,7 +324,6 @@ def main() -> None:
         text,
         tables,
         figures,
-        "{name}.md",
     )
 
 

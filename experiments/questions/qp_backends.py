@@ -1,4 +1,4 @@
-"""Do all QP backends give the same answer at tight settings, and which needs the crossover for it?"""
+"""Do all QP backends give the same answer, and which needs the crossover for it?"""
 
 from __future__ import annotations
 
@@ -49,9 +49,7 @@ def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
 
 
 def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
-    """The first answer of the first try, in place of
-    contactopt.methods.kernels.semismooth.certified.
-    """
+    """The first answer of the first try, in place of `semismooth.certified`."""
     r, multipliers = next(iter(solvers))[1]()
     return r.reshape(equations.q.shape), multipliers
 
@@ -70,11 +68,12 @@ def in_all_units(name: str) -> dict[str, object]:
     return row
 
 
-TEXT = """Do all solvers of quadratic programs lead to the same answer? The problem is the default `punch-2d` (17 contacts, mu = .5). The same backend
-solves its normal and its tangential problem, at the tight settings of contactopt.methods.backends.
-The answer is certified at 1e-9. Differences are relative to a solve at 1e-13. contactopt makes the
-answer of a backend exact by a few more steps, which is called crossover. "Without crossover" takes
-the answers of the backend as they come, for at most 40 iterations.
+TEXT = """Do all solvers of quadratic programs lead to the same answer? The problem is the default
+`punch-2d` (17 contacts, mu = .5). The same backend solves its normal and its tangential problem, at
+the tight settings of contactopt.methods.backends. The answer is certified at 1e-9. Differences are
+relative to a solve at 1e-13. contactopt makes the answer of a backend exact by a few more steps,
+which is called crossover. "Without crossover" takes the answers of the backend as they come, for at
+most 40 iterations.
 
 {rows}
 

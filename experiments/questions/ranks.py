@@ -1,6 +1,4 @@
-"""Do bodies on ranks of their own give the same answers, how evenly do the ranks work, and what
-travels between them?
-"""
+"""How evenly do ranks of MPI work on bodies of their own, and what travels between them?"""
 
 from __future__ import annotations
 
@@ -54,9 +52,7 @@ class Clocks:
         self._lock = threading.Lock()
 
     def read(self, other: float = 0.0, waited: float = 0.0) -> float:
-        """The clock without the CPU time that looking for messages took, set forward to another
-        one.
-        """
+        """The clock without the CPU time of looking for messages, set forward to another one."""
         with self._lock:
             cpu = time.process_time()
             self.now, self._last = max(self.now + cpu - self._last - waited, other), cpu
@@ -140,9 +136,7 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
 
 
 def traffic(team: Team, height: float) -> dict[str, Any]:
-    """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the
-    answer.
-    """
+    """One body on each rank: what a product with Q sends, and the answer."""
     scene = sliced(
         scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height),
         "foundation",
@@ -202,9 +196,10 @@ def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     }
 
 
-TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the bodies of a scene among N processes, which are called ranks. Each process assembles its
-bodies and solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on
-the interfaces travel.
+TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the
+bodies of a scene among N processes, which are called ranks. Each process assembles its bodies and
+solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on the
+interfaces travel.
 
 ## Two bodies of equal size on two ranks
 
@@ -233,8 +228,7 @@ array Q is made once, and then the steps send nothing.
 
 With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration
 such as conjugate gradients) send an order for each operation on them, and receive scalar products
-and displacements on the interface. How many V-cycles slices of any height need is measured by
-`python -m experiments.questions.several_pairs`:
+and displacements on the interface:
 
 
 {coupled}

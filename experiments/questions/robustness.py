@@ -1,21 +1,14 @@
-"""How often does each method fail on random rigid-body problems with more contact unknowns than
-freedom?
-"""
+"""How often does each method fail on rigid bodies with more contacts than freedom?"""
 
 from __future__ import annotations
 
-import os
+import time
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import time  # noqa: E402
-
-import numpy as np  # noqa: E402
-import scipy.linalg as la  # noqa: E402
-
-from contactopt import InterfaceProblem, solve  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt import solve
+from contactopt.benchmark.problems import rigid_bodies
+from experiments.report import write
 
 METHODS = ("auto", "newton", "proximal", "acary_cadoux", "admm", "nsgs")
 SIZES = ((10, 30), (10, 40), (15, 90))  # bodies, contacts
@@ -24,28 +17,11 @@ SEEDS = range(15)
 TOL, LIMIT, ITERATIONS = 1e-8, 1.0, 2000
 
 
-def rigid_bodies(seed: int, bodies: int, contacts: int, mu: float) -> InterfaceProblem:
-    """Q = H' M^-1 H of random rigid bodies and contact frames, q = H' v, so that a solution exists."""
-    rng = np.random.default_rng(seed)
-    H = np.zeros((3 * contacts, 6 * bodies))
-    for c in range(contacts):
-        frame = la.qr(rng.normal(size=(3, 3)))[0]
-        i, j = rng.choice(bodies, 2, replace=False)
-        for body, sign in ((i, 1.0), (j, -1.0)):
-            arm = rng.normal(size=3)
-            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 3] = sign * frame
-            H[3 * c : 3 * c + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
-    inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
-    return InterfaceProblem(
-        (H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), mu
-    )
-
-
 def measure(method: str, mu: float) -> dict[str, object]:
     solved, seconds = 0, []
     for bodies, contacts in SIZES:
         for seed in SEEDS:
-            problem = rigid_bodies(seed, bodies, contacts, mu)
+            problem = rigid_bodies(bodies, contacts, mu, seed)
             start = time.perf_counter()
             solution = solve(problem, method, tol=TOL, time_limit=LIMIT, max_iterations=ITERATIONS)
             seconds.append(time.perf_counter() - start)
@@ -59,10 +35,10 @@ def measure(method: str, mu: float) -> dict[str, object]:
     }
 
 
-TEXT = """Which methods solve problems whose contact forces are not unique? The problems are random rigid bodies: {sizes} (bodies, contacts), with {seeds} seeds
-each. Their matrix Q does not have full rank, and friction is strong or very strong. The certificate
-is 1e-8. Each method has at most {limit:g} s and {iterations} iterations per problem, and one BLAS
-thread.
+TEXT = """Which methods solve problems whose contact forces are not unique? The problems are random
+rigid bodies: {sizes} (bodies, contacts), with {seeds} seeds each. Their matrix Q does not have full
+rank, and friction is strong or very strong. The certificate is 1e-8. Each method has at most
+{limit:g} s and {iterations} iterations per problem, and one BLAS thread.
 
 {{rows}}
 """

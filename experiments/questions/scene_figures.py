@@ -1,6 +1,4 @@
-"""What do the paper's scenes look like? Its figures 1, 2, 3a and 3b for ours, into
-reports/figures/.
-"""
+"""The paper's figures 1, 2, 3a and 3b for our scenes, into reports/figures/."""
 
 from __future__ import annotations
 

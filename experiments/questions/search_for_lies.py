@@ -8,20 +8,15 @@ making says: that it has no solution, or which reactions are the only ones.
 
 from __future__ import annotations
 
-import os
+import sys
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import sys  # noqa: E402
-from collections import Counter  # noqa: E402
-from concurrent.futures import ProcessPoolExecutor  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import InterfaceProblem, Solution, solve  # noqa: E402
-from contactopt.linear.operators import dense  # noqa: E402
-from experiments.questions.coulomb_check import violations  # noqa: E402
+from contactopt import InterfaceProblem, Solution, solve
+from contactopt.linear.operators import dense
+from experiments.questions.coulomb_check import violations
 
 METHODS = ("auto", "auto", "newton", "proximal", "nsgs")
 TOL, SLACK = 1e-8, 20.0  # the check's own conditions are combinations of the certificate's
@@ -88,9 +83,7 @@ def distant(rng, k, d):  # type: ignore[no-untyped-def]
 
 
 def frictionless(Q, q, far):  # type: ignore[no-untyped-def]
-    """The normal reactions (k,) of the contacts that are not far, by trying all sets of closed
-    ones.
-    """
+    """The normal reactions (k,) of near contacts, by trying all sets of closed ones."""
     near = np.flatnonzero(~far)
     d = q.shape[1]
     for bits in range(2 ** len(near)):
@@ -155,9 +148,7 @@ FAMILIES = (
 
 
 def make(seed: int) -> tuple[str, dict]:
-    """The case of that seed: its family's name and its data, in units drawn at random from 1e-12 to
-    1e12.
-    """
+    """The case of that seed: its family's name and its data, in random units."""
     rng = np.random.default_rng(seed)
     family = FAMILIES[seed % len(FAMILIES)]
     k, d = int(rng.integers(1, 6)), int(rng.integers(2, 4))
@@ -175,9 +166,7 @@ def make(seed: int) -> tuple[str, dict]:
 
 
 def answered(case: dict, seed: int, force: float = 1.0, length: float = 1.0):  # type: ignore[no-untyped-def]
-    """The answer of the case's method, and its problem, in other units; None where the load pulls
-    the bodies apart.
-    """
+    """The answer and its problem in other units; None where the load pulls the bodies apart."""
     Q, q, s = case["Q"] * (length / force), case["q"] * length, case["s"] * force
     problem = InterfaceProblem(Q, q, case["mu"], case["V"], s)
     try:
@@ -191,9 +180,7 @@ def method_of(seed: int) -> str:
 
 
 def changed(case: dict, seed: int, answer: Solution) -> str:
-    """What is different in other units, of every UNITS_OF-th case of a family: the status, or an
-    answer that was certified.
-    """
+    """What is different in other units, of every UNITS_OF-th case: status, or certified answer."""
     if seed // len(FAMILIES) % UNITS_OF or answer.status.label == "time_limit":
         return ""
     for force, length in SCALES:
@@ -249,17 +236,19 @@ def judge(seed: int) -> tuple[str, str, str]:
     return name, "solved", ""
 
 
-TEXT = """Does contactopt ever call an answer solved that is wrong? This report looks for such answers. It solves {cases} random problems (seeds 0 to
-{last}). The families of problems take turns, and so do the methods: {methods}. Forces and lengths
-are in units from 1e-12 to 1e12. The certificate asked for is {tol:g}, with at most 100 iterations
-or 1 s.
+TEXT = """Does contactopt ever call an answer solved that is wrong? This report looks for such
+answers. It solves {cases} random problems (seeds 0 to {last}). The families of problems take turns,
+and so do the methods: {methods}. Forces and lengths are in units from 1e-12 to 1e12. The
+certificate asked for is {tol:g}, with at most 100 iterations or 1 s.
 
 A *lie* is one of the following:
 
-- an answer called solved that violates Coulomb's conditions at some contact by more than {slack:g} times the tolerance
-  (`experiments/questions/coulomb_check.py` checks this without the certificate);
+- an answer called solved that violates Coulomb's conditions at some contact by more than {slack:g}
+  times the tolerance (`experiments/questions/coulomb_check.py` checks this without the
+  certificate);
 - an answer called solved to a problem that was made without a solution;
-- an answer called solved that differs from the only contact forces there are by more than {forces:g} of the largest force;
+- an answer called solved that differs from the only contact forces there are by more than
+  {forces:g} of the largest force;
 - a problem with a solution that is called infeasible.
 
 In one family a plate is held by contacts that move with it as one. There a solution exists if and

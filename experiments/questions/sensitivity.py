@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,16 +11,15 @@ from typing import Any
 import numpy as np
 
 import contactopt
-from contactopt import InterfaceProblem, Solution, Status, natural_map_residual, scenes, solve
+from contactopt import InterfaceProblem, Solution, scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.states import chain_of
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.problem import dimensionless
-from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.readings.quantities import seeds_of
 from contactopt.scenes.parameters import parameters
 from contactopt.solving.solve_scene import Solved
-from experiments.report import REPORTS, environment, merged, write
+from experiments.report import measure
 
 PROBLEMS = 100
 STEP = 1e-6
@@ -62,9 +59,7 @@ SCENES: dict[str, tuple[Callable[[], Any], tuple[str, ...], tuple[str, ...], dic
 
 
 def random_problem(seed: int, dim: int) -> InterfaceProblem:
-    """Positive definite Q, every third one unsymmetric, every second pressed by a plate; 8 to 20
-    contacts.
-    """
+    """Positive definite Q, every third unsymmetric, every second with a plate; 8 to 20 contacts."""
     rng = np.random.default_rng(seed)
     k = int(rng.integers(8, 21))
     n, p = k * dim, seed % 2
@@ -154,45 +149,6 @@ def against_differences(dim: int) -> list[dict[str, Any]]:
     ]
 
 
-def at_kinks(seed: int, dim: int) -> tuple[InterfaceProblem, Solution]:
-    """Contact 0 grazes, 1 is between stick and slip, 2 is at the apex, 3 sticks, 4 slips, 5 is
-    open.
-    """
-    rng = np.random.default_rng(seed)
-    A = rng.normal(size=(6 * dim, 6 * dim))
-    Q = A @ A.T / (6 * dim) + 0.5 * np.eye(6 * dim)
-    mu, e = rng.uniform(0.2, 0.4, 6), rng.normal(size=(6, dim - 1))
-    e /= np.linalg.norm(e, axis=1)[:, None]
-    r, u = np.zeros((2, 6, dim))
-    u[0, 1:], u[5, 1:], u[5, 0], u[4, 1:] = 0.7 * e[0], 0.3 * e[5], 1.0, 0.8 * e[4]
-    r[[1, 3, 4], 0] = 1.0, 1.5, 1.2
-    r[1, 1:], r[3, 1:], r[4, 1:] = mu[1] * e[1], 0.4 * mu[3] * e[3], -1.2 * mu[4] * e[4]
-    problem = InterfaceProblem(Q, u - (Q @ r.ravel()).reshape(r.shape), Coulomb(mu))
-    return problem, Solution(
-        r, np.zeros(0), Status.SOLVED, natural_map_residual(problem, r, np.zeros(0)), 0, "exact"
-    )
-
-
-def one_sided() -> list[dict[str, Any]]:
-    rows = []
-    for dim in (2, 3):
-        worst, named = 0.0, 0
-        for seed in range(PROBLEMS // 2):
-            problem, solution = at_kinks(seed, dim)
-            ours = contactopt.sensitivity(problem, solution)
-            named += [weak.contact for weak in ours.weak] == [0, 1, 2]
-            rng, h = np.random.default_rng(seed + 1000), 1e-7
-            change = {"q": rng.normal(size=problem.q.shape), "mu": 0.3 * rng.normal(size=6)}
-            end = solve(moved(problem, change, h), tol=1e-13, start=solution)
-            wanted = (end.reactions - solution.reactions) / h
-            error = np.abs(ours.forward(**change).reactions - wanted).max() / np.abs(wanted).max()
-            worst = max(worst, float(error))
-        rows.append(
-            {"dim": dim, "problems": PROBLEMS // 2, "kinks named": named, "difference": worst}
-        )
-    return rows
-
-
 def solved(scene: Any, settings: dict[str, Any], start: Solution | None = None) -> Solved:
     reduction = reduce_bodies(scene, **settings)
     return Solved(reduction, solve(reduction.problem, tol=1e-13, start=start))
@@ -203,9 +159,7 @@ def value(quantity: str, result: Solved) -> float:
 
 
 def through_scenes() -> list[dict[str, Any]]:
-    """The best of central differences with two steps, so that neither rounding nor curvature of the
-    difference decides.
-    """
+    """The best of two central differences: neither rounding nor curvature decides."""
     rows = []
     for name, (make, names, quantities, settings) in SCENES.items():
         scene = make()
@@ -247,9 +201,7 @@ def cpu(act: Callable[[], Any], repeats: int = 5) -> float:
 
 
 def single_step(problem: InterfaceProblem, solution: Solution) -> float:
-    """CPU seconds of one dense Newton step at the solution, with its own factorisation; nan where Q
-    is no array.
-    """
+    """CPU seconds of one dense Newton step with its factors; nan where Q is no array."""
     if not isinstance(problem.Q, np.ndarray):
         return float("nan")
     scaled, scales = dimensionless(problem)
@@ -260,9 +212,7 @@ def single_step(problem: InterfaceProblem, solution: Solution) -> float:
 
 
 def costs() -> list[dict[str, Any]]:
-    """CPU seconds of all derivatives of one quantity, and of one step of the solve that they come
-    from.
-    """
+    """CPU seconds of all derivatives of one quantity, and of the solve before."""
     rows = []
     cases = (
         ("punch-2d, dense", lambda: scenes.flat_punch(2, elements=512), {"Q": "explicit"}),
@@ -302,69 +252,9 @@ def costs() -> list[dict[str, Any]]:
     return rows
 
 
-def twenty() -> list[dict[str, Any]]:
-    """Twenty parameters: the gap at places of the punch in twenty smooth shapes, and materials, by
-    gradient or by differences.
-    """
-    scene = scenes.flat_punch(2, elements=128)
-    base = solved(scene, {})
-    problem = base.reduction.problem
-    x = problem.chart.places[0] / np.abs(problem.chart.places).max()
-    shapes = np.cos(np.pi * np.arange(16) * x[:, None])
-    materials = ("E:punch", "E:foundation", "nu:punch", "nu:foundation")
-
-    def ours() -> Any:
-        found = contactopt.gradient(base, "energy", ("gap", *materials))
-        return np.append(shapes.T @ found.by["gap"], [found.by[name] for name in materials])
-
-    def one_sided_difference() -> np.ndarray:
-        """The cheapest difference: warm starts, and no new reduction for the gap."""
-        out, first = [], value("energy", base)
-        h = 1e-6
-        for shape in shapes.T:
-            q = problem.q.copy()
-            q[:, 0] += h * shape
-            there = replace(problem, q=q)
-            end = Solved(
-                replace(base.reduction, problem=there), solve(there, tol=1e-12, start=base.solution)
-            )
-            out.append((value("energy", end) - first) / h)
-        for which in parameters(materials, scene):
-            at = which.read(scene)
-            out.append(
-                (value("energy", solved(which.put(scene, at * (1 + h)), {}, base.solution)) - first)
-                / (h * at)
-            )
-        return np.array(out)
-
-    fast, slow = cpu(ours), cpu(one_sided_difference, 3)
-    error = np.abs(ours() - one_sided_difference()).max() / np.abs(ours()).max()
-    return [
-        {
-            "contacts": problem.contacts,
-            "parameters": shapes.shape[1] + len(materials),
-            "gradient [s]": fast,
-            "differences [s]": slow,
-            "times faster": slow / fast,
-            "they differ by": float(error),
-        }
-    ]
-
-
-def table(part: str, rows: list[dict[str, Any]]) -> None:
-    """Write one table of the report."""
-    folder = REPORTS / "sensitivity"
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / f"{part}.csv", "w", newline="") as file:
-        file.write(f"# {environment()}\n")
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-TEXT = f"""Are the derivatives of certified solutions right, and what do they cost? `contactopt.sensitivity` and `contactopt.gradient` are compared with
-differences of solved problems. A relative error is the largest error over all forces, over the
-largest derivative of a force.
+TEXT = f"""Are the derivatives of certified solutions right, and what do they cost?
+`contactopt.sensitivity` and `contactopt.gradient` are compared with differences of solved problems.
+A relative error is the largest error over all forces, over the largest derivative of a force.
 
 {{random}}
 
@@ -373,11 +263,6 @@ is positive definite, and every third Q is not symmetric. Every second problem h
 kinds of problems are left out: those that were not solved to 1e-12, and those with a contact nearer
 to a kink than 1e-4 of the largest force. There the two ends of a difference may lie on different
 pieces of the solution.
-
-**At kinks.** Here three contacts are weakly active by construction: they are just between open and
-closed, or between stick and slip. One-sided differences have the step 1e-7:
-
-{{kinks}}
 
 **Scenes.** These are derivatives with respect to the parameters of a scene. There are two central
 differences, with the relative steps 1e-4 and 1e-5, and the nearer one counts. Derivatives that are
@@ -396,27 +281,13 @@ the gradient is spent around the factorisation: on the dimensionless copy of Q, 
 certificate, and on the check whether the bonded system is symmetric.
 
 {{costs}}
-
-**One adjoint solve against many differences.** The parameters are sixteen shapes of the gap and
-four constants of materials. The differences are one-sided and have warm starts. A difference by the
-gap solves the interface problem again. A difference by a constant also reduces the bodies again:
-
-{{twenty}}
 """
 
 
 if __name__ == "__main__":
     parts: dict[str, Callable[[], list[dict[str, Any]]]] = {
         "random": lambda: [row for dim in (2, 3) for row in against_differences(dim)],
-        "kinks": one_sided,
         "scenes": through_scenes,
         "costs": costs,
-        "twenty": twenty,
     }
-    for part in (
-        sys.argv[1:] or parts
-    ):  # each part can be measured by itself; the report takes the others from their tables
-        table(part, parts[part]())
-    known = {part: merged("sensitivity", part, [], ()) for part in parts}
-    if all(known.values()):
-        write("sensitivity", "Derivatives of certified solutions", TEXT, known, {})
+    measure("sensitivity", "Derivatives of certified solutions", TEXT, parts)

@@ -7,29 +7,25 @@ is written.
 
 from __future__ import annotations
 
-import os
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from importlib import import_module
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
-import time  # noqa: E402
-from collections.abc import Iterator  # noqa: E402
-from contextlib import ExitStack, contextmanager  # noqa: E402
-from importlib import import_module  # noqa: E402
-from typing import Any  # noqa: E402
-
-from contactopt import InterfaceProblem, reduce, scenes, solve  # noqa: E402
-from contactopt.methods import constants, find_method  # noqa: E402
-from contactopt.methods.nested import Nested  # noqa: E402
-from experiments.questions.granular import packing  # noqa: E402
-from experiments.questions.robustness import rigid_bodies  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt import InterfaceProblem, reduce, scenes, solve
+from contactopt.benchmark.packings import packing
+from contactopt.benchmark.problems import rigid_bodies
+from contactopt.methods import constants, find_method
+from contactopt.methods.nested import Nested
+from experiments.report import write
 
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
 USERS = {
-    "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
+    "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH "
+    "ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
         "auto",
         "auto",
         ("elastic", "rigid", "packing"),
@@ -43,7 +39,9 @@ USERS = {
     "LOOSE": ("kernels.alart_curnier", "newton", ("elastic",)),
     "SMALL FULL": ("kernels.sparse_blocks", "auto", ("packing",)),
     "SHARPER SHARPEST": ("apg", "apg", ("coarse",)),
-    "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK": (
+    "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING "
+    "MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING "
+    "STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK": (
         "kernels.interior",
         "auto",
         ("rigid", "packing"),
@@ -59,7 +57,8 @@ USERS = {
     ),
     "COARSEST LEAST_SYMBOL LEAST_DETERMINANT": ("kernels.levels", "nested", ("half-spaces",)),
     "FIRST_SHIFT SHIFT_RATIO": ("kernels.level_steps", "nested", ("half-spaces",)),
-    "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS COARSE_TRIES CLOSER": (
+    "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS COARSE_TRIES "
+    "CLOSER": (
         "nested",
         "nested",
         ("half-spaces",),
@@ -84,7 +83,7 @@ def problems() -> dict[str, list[InterfaceProblem]]:
         reduce(scenes.flat_punch(2, mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)
     ]
     spheres = [reduce(scenes.sphere(mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)]
-    rigid = [rigid_bodies(seed, 10, 40, mu) for seed in range(3) for mu in (0.3, 1.0, 3.0)]
+    rigid = [rigid_bodies(10, 40, mu, seed) for seed in range(3) for mu in (0.3, 1.0, 3.0)]
     grains = [
         packing(dim, 40, seed, mu, points)
         for seed in range(2)
@@ -163,13 +162,14 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
     return rows
 
 
-TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one at a time: how many problems are certified
-(residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value
-itself. Of shares near one the distance from one is halved and doubled. The problems: {elastic} of
-elastic bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of
-random rigid bodies, {packing} packings of rigid bodies with a sparse Q, {products} of elastic
-bodies known by products with Q, {bodies} of bodies that are solved by iteration, {halves} of
-half-spaces; one run each, one thread; the same run twice differs by up to {noise:.0%}.
+TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one
+at a time: how many problems are certified (residual at most 1e-8, at most {limit}
+iterations), and the processor time over that with the value itself. Of shares near one the
+distance from one is halved and doubled. The problems: {elastic} of elastic bodies (`punch-2d`
+and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies,
+{packing} packings of rigid bodies with a sparse Q, {products} of elastic bodies known by
+products with Q, {bodies} of bodies that are solved by iteration, {halves} of half-spaces; one
+run each, one thread; the same run twice differs by up to {noise:.0%}.
 
 {{rows}}
 """

@@ -8,7 +8,6 @@ was measured before.
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import subprocess
@@ -23,7 +22,7 @@ from scipy.optimize import nnls
 from contactopt import reduce_bodies, scenes, solve
 from contactopt.coupling.costs import MOST_EXPLICIT, WAYS, seconds, terms
 from contactopt.figures.plots import BLUE, GREEN, ORANGE
-from experiments.report import REPORTS, number, write
+from experiments.report import stored, write
 
 SIZES = {2: (64, 128, 256, 512, 1024), 3: (6, 8, 12, 16, 20, 26)}  # elements across the half-width
 FORMS = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
@@ -40,9 +39,7 @@ COLOURS = {"dense": BLUE, "products": GREEN, "coupled": ORANGE}
 
 
 def once(dim: int, elements: int, way: str, solver: str) -> dict[str, object]:
-    """CPU time of one run with one thread of BLAS, in a process of its own; what is imported late
-    is imported before.
-    """
+    """CPU time of one run with one BLAS thread; late imports are made before."""
     scene = scenes.flat_punch(dim, mu=MU)
     solve(reduce_bodies(scene, 3, Q=FORMS[way], solver=solver).problem, "newton")
     begin = time.process_time()
@@ -87,9 +84,7 @@ def measured() -> list[dict[str, object]]:
 
 
 def fitted(rows: list[dict]) -> list[dict[str, object]]:
-    """COSTS by least squares of relative errors over numbers that are not negative, and how far the
-    estimates are off.
-    """
+    """COSTS by least squares of relative errors, not negative, and how far they are off."""
     found: list[dict[str, object]] = []
     for dim, solver in dict.fromkeys((row["dim"], row["solver"]) for row in rows):
         mine = [row for row in rows if (row["dim"], row["solver"]) == (dim, solver)]
@@ -147,11 +142,12 @@ def cheapest(m: int, n: int, dim: int, solver: str) -> str:
     )
 
 
-TEXT = """Which way to the solution is the cheapest? The scenes are punch-2d and punch-3d with mu = {mu}. Newton's method solves them from a cold start to a
-certificate of 1e-8. There are three ways: an array Q (`dense`), `products` with Q by the factors of
-both bodies, or bodies and contact at once by multigrid (`coupled`). Times are CPU seconds of one
-run each, with the set-up and with one thread of BLAS. Other programs had a share of the machine. n
-is the number of unknowns of the larger body, and m is the number of those on its contact surface.
+TEXT = """Which way to the solution is the cheapest? The scenes are punch-2d and punch-3d with mu =
+{mu}. Newton's method solves them from a cold start to a certificate of 1e-8. There are three ways:
+an array Q (`dense`), `products` with Q by the factors of both bodies, or bodies and contact at once
+by multigrid (`coupled`). Times are CPU seconds of one run each, with the set-up and with one thread
+of BLAS. Other programs had a share of the machine. n is the number of unknowns of the larger body,
+and m is the number of those on its contact surface.
 
 {{rows}}
 
@@ -171,9 +167,7 @@ and methods other than Newton's. In the plane `coupled` takes less than both oth
 
 
 def crossing(places: Places, dim: int, solver: str, share: float) -> float:
-    """Unknowns from which on `coupled` takes less than that share of the time of the others, for
-    contacts as on the punches.
-    """
+    """Unknowns from which on `coupled` takes less than that share of the time of the others."""
     n, m = np.log(np.array(places[dim]).T)
     slope, start = np.polyfit(n, m, 1)
     for size in np.geomspace(3e3, 1e7, 400):
@@ -220,16 +214,8 @@ def main(rows: list[dict]) -> None:
     )
 
 
-def before() -> list[dict]:
-    with open(REPORTS / "ways" / "rows.csv", newline="") as file:
-        return [
-            {k: number(v) for k, v in row.items()}
-            for row in csv.DictReader(x for x in file if not x.startswith("#"))
-        ]
-
-
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--once"]:
         print(json.dumps(once(int(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5])))
     else:
-        main(before() if sys.argv[1:2] == ["--fit"] else measured())
+        main(stored("ways", "rows") if sys.argv[1:2] == ["--fit"] else measured())

@@ -40,9 +40,6 @@ ACCURACY = (
     "elements",
     "patch_test",
     "facing_surfaces",
-    "hertz",
-    "stick_ratio",
-    "cattaneo",
     "load_cycle",
     "calculix",
     "qp_backends",
@@ -102,9 +99,10 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
-TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page of this site. It takes ten to fifteen minutes
-to read. The code checks every claim by an assertion. The exercises have hidden solutions: click on
-*Solution* to open one. [The course](course.md) says how to open a notebook.
+TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page
+of this site. It takes ten to fifteen minutes to read. The code checks every claim by an assertion.
+The exercises have hidden solutions: click on *Solution* to open one. [The course](course.md) says
+how to open a notebook.
 """
 
 
@@ -179,7 +177,9 @@ def base(path: Path) -> str:
 
 
 def report(path: Path) -> str:
-    """A report as a page: pictures from its folder, other files by their place in the repository."""
+    """A report as a page: pictures from its folder, other files by their place in the
+    repository.
+    """
     text = PICTURE.sub(rf"![\1]({Path(base(path), 'x').parent.as_posix()}/\2)", path.read_text())
 
     def place(link: re.Match) -> str:

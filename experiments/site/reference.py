@@ -145,8 +145,9 @@ def room_pages(root: Path) -> Pages:
     yield Path("api.md"), index("Reference", text, [f"api/{name}" for name in names], hidden=True)
 
 
-ROOMS_TEXT = """The folders of the package are the stages through which data flows. A room imports only from the rooms that
-stand above it in this table; a contract of the import linter checks this.
+ROOMS_TEXT = """The folders of the package are the stages through which data flows. A room
+imports only from the rooms that stand above it in this table; a contract of the import linter
+checks this.
 """
 
 
@@ -217,8 +218,9 @@ def plug_in_pages(site: Path) -> Pages:
     yield Path("plug_ins.md"), index("What can be chosen by its name", PLUG_INS_TEXT, list(present))
 
 
-PLUG_INS_TEXT = """Each of these pages is made from a table of the package, so it lists all that there is. A new entry costs one
-file and one line in its table: [how to add one](../contributing.md).
+PLUG_INS_TEXT = """Each of these pages is made from a table of the package, so it lists all that
+there is. A new entry costs one file and one line in its table: [how to add
+one](../contributing.md).
 """
 
 
@@ -228,34 +230,36 @@ def methods_index() -> str:
     return index("Methods", text, [f"methods/{name}" for name in METHODS], hidden=True)
 
 
-METHODS_TEXT = """Every method is called by its name, `contactopt.solve(problem, "newton")`, and every answer of every method
-gets the same certificate. The letters and signs are those of [the mathematics](../mathematics.md).
+METHODS_TEXT = """Every method is called by its name, `contactopt.solve(problem, "newton")`, and
+every answer of every method gets the same certificate. The letters and signs are those of [the
+mathematics](../mathematics.md).
 """
-SCENES_TEXT = """A named scene is run by `contactopt run NAME` or `contactopt.run("NAME")`. Its arguments are those of the
-function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene with a load path is solved
-state by state.
+SCENES_TEXT = """A named scene is run by `contactopt run NAME` or `contactopt.run("NAME")`. Its
+arguments are those of the function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene
+with a load path is solved state by state.
 """
-PRECONDITIONERS_TEXT = """A preconditioner is an approximate inverse of the compliance $Q$. It makes iterative methods short, where $Q$ is known by its
-products only. It is chosen by its name: `contactopt.run("punch-2d", preconditioner="neumann")`, or
-`--preconditioner neumann` on the command line.
+PRECONDITIONERS_TEXT = """A preconditioner is an approximate inverse of the compliance $Q$. It makes
+iterative methods short, where $Q$ is known by its products only. It is chosen by its name:
+`contactopt.run("punch-2d", preconditioner="neumann")`, or `--preconditioner neumann` on the command
+line.
 """
-SOLVERS_TEXT = """A body solver solves the linear system of one elastic body. It is chosen by its name:
-`contactopt.run("punch-2d", solver="superlu")`, or `--solver superlu` on the command line. The
+SOLVERS_TEXT = """A body solver solves the linear system of one elastic body. It is chosen by its
+name: `contactopt.run("punch-2d", solver="superlu")`, or `--solver superlu` on the command line. The
 default, `auto`, chooses by size.
 """
-LAWS_TEXT = """A law says which forces a contact can carry, and how these forces depend on its motion. A scene names its law:
-`Scene(..., law="bilateral")`, or `Contact(..., law="bilateral")` for one pair of surfaces. The
-sections below come from the table of laws.
+LAWS_TEXT = """A law says which forces a contact can carry, and how these forces depend on its
+motion. A scene names its law: `Scene(..., law="bilateral")`, or `Contact(..., law="bilateral")` for
+one pair of surfaces. The sections below come from the table of laws.
 """
-COUPLINGS_TEXT = """A coupling says how the displacements of two contact surfaces make the relative displacements of the contacts. The
-default, `auto`, takes `matching` if the nodes of the two surfaces match, and `mortar` if they do
-not.
+COUPLINGS_TEXT = """A coupling says how the displacements of two contact surfaces make the relative
+displacements of the contacts. The default, `auto`, takes `matching` if the nodes of the two
+surfaces match, and `mortar` if they do not.
 """
-BACKENDS_TEXT = """A backend is a solver of quadratic or cone programs that others wrote. (A quadratic program has a quadratic cost and linear
-constraints. A cone program may also bound the length of a vector.) A backend is chosen by its name:
-`contactopt.solve(problem, normal="osqp")`, or `--normal osqp` on the command line. The packages
-that do not come with contactopt are installed by `pip install 'contactopt[backends]'` or one by
-one.
+BACKENDS_TEXT = """A backend is a solver of quadratic or cone programs that others wrote. (A
+quadratic program has a quadratic cost and linear constraints. A cone program may also bound the
+length of a vector.) A backend is chosen by its name: `contactopt.solve(problem, normal="osqp")`, or
+`--normal osqp` on the command line. The packages that do not come with contactopt are installed by
+`pip install 'contactopt[backends]'` or one by one.
 """
 
 

@@ -276,12 +276,12 @@ assert history["energy_error"].max() < 1e-9
 # because each step takes the force at its end.
 #
 # ```python
-# coarse = follow(scenes.shear_cycle(2, steps=2, mu=mu, force=P, shear=T_most, depth=D,
-# elements=32)).history assert np.isclose(coarse["shift"].max(), shift.max(), rtol=1e-3) assert
-# np.isclose(coarse["stick_half_width"].min(), history["stick_half_width"].min(), rtol=1e-3) tip = 2
-# # the state with T = 40 N assert abs(np.trapezoid(coarse["shear_force"][tip:],
-# coarse["shift"][tip:])) < area assert coarse["friction_work"][-1] - coarse["friction_work"][tip] >
-# friction
+# coarse = follow(scenes.shear_cycle(2, steps=2, mu=mu, force=P, shear=T_most, depth=D, elements=32)).history
+# assert np.isclose(coarse["shift"].max(), shift.max(), rtol=1e-3)
+# assert np.isclose(coarse["stick_half_width"].min(), history["stick_half_width"].min(), rtol=1e-3)
+# tip = 2  # the state with T = 40 N
+# assert abs(np.trapezoid(coarse["shear_force"][tip:], coarse["shift"][tip:])) < area
+# assert coarse["friction_work"][-1] - coarse["friction_work"][tip] > friction
 # ```
 #
 # </details>

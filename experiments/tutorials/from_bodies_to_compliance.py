@@ -264,12 +264,17 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 # $s$ is the load. The plate is glued to the punch, so it holds the punch sideways.
 #
 # ```python
-# from dataclasses import replace from contactopt import Plate, solve scene = two_blocks(17) pressed
-# = replace(scene, upper=replace(scene.upper, supports=(), loads=(Plate("top", {"y": -10.0}),)))
-# with_plate = reduce(pressed) V = with_plate.V.reshape(-1, 2) assert np.allclose(V[:, 0], 1.0) and
-# np.allclose(V[:, 1], 0.0) assert np.allclose(with_plate.s, -10.0) answer = solve(with_plate)
-# assert np.isclose(answer.reactions[:, 0].sum(), 10.0)  # the contact carries the load assert
-# answer.multipliers[0] < 0  # the plate comes down
+# from dataclasses import replace
+# from contactopt import Plate, solve
+# scene = two_blocks(17)
+# pressed = replace(scene, upper=replace(scene.upper, supports=(), loads=(Plate("top", {"y": -10.0}),)))
+# with_plate = reduce(pressed)
+# V = with_plate.V.reshape(-1, 2)
+# assert np.allclose(V[:, 0], 1.0) and np.allclose(V[:, 1], 0.0)
+# assert np.allclose(with_plate.s, -10.0)
+# answer = solve(with_plate)
+# assert np.isclose(answer.reactions[:, 0].sum(), 10.0)  # the contact carries the load
+# assert answer.multipliers[0] < 0  # the plate comes down
 # ```
 #
 # </details>

@@ -328,11 +328,11 @@ assert len(all_solutions(piston(2.0, give=1e-2))) == 1
 # iteration.
 #
 # ```python
-# assert solve(node(-10.0, 1.0, 0.66), "alternating", max_iterations=5000).solved assert not
-# solve(node(-10.0, 1.0, 0.67), "alternating", max_iterations=5000).solved seen =
-# {round(solve(pulled, "alternating", max_iterations=n).reactions[0, 0], 4) for n in (200, 201)}
-# assert np.allclose(sorted(seen), [5.1186, 8.3221], atol=1e-3) assert solve(pulled, "alternating",
-# relaxation=0.5).solved
+# assert solve(node(-10.0, 1.0, 0.66), "alternating", max_iterations=5000).solved
+# assert not solve(node(-10.0, 1.0, 0.67), "alternating", max_iterations=5000).solved
+# seen = {round(solve(pulled, "alternating", max_iterations=n).reactions[0, 0], 4) for n in (200, 201)}
+# assert np.allclose(sorted(seen), [5.1186, 8.3221], atol=1e-3)
+# assert solve(pulled, "alternating", relaxation=0.5).solved
 # ```
 #
 # </details>

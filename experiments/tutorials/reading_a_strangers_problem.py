@@ -220,12 +220,14 @@ folder.cleanup()
 # the centre, which is not quite enough. Both rear corners lift off slowly.
 #
 # ```python
-# rough = InterfaceProblem(problem.Q, problem.q, 2.0) answer = solve(rough) u =
-# rough.displacements(answer.reactions, answer.multipliers) assert answer.solved assert np.all(u[:2,
-# 0] > 1e-3) and np.allclose(answer.reactions[:2], 0.0, atol=1e-9)  # the rear is off the floor
-# assert np.allclose(u[2:], 0.0, atol=1e-9)  # the front sticks spin = np.linalg.solve(M, H @
-# answer.reactions.ravel() + f)[3:] assert spin[1] > 1e-3 and np.allclose(spin[[0, 2]], 0.0,
-# atol=1e-9)
+# rough = InterfaceProblem(problem.Q, problem.q, 2.0)
+# answer = solve(rough)
+# u = rough.displacements(answer.reactions, answer.multipliers)
+# assert answer.solved
+# assert np.all(u[:2, 0] > 1e-3) and np.allclose(answer.reactions[:2], 0.0, atol=1e-9)  # the rear is off the floor
+# assert np.allclose(u[2:], 0.0, atol=1e-9)  # the front sticks
+# spin = np.linalg.solve(M, H @ answer.reactions.ravel() + f)[3:]
+# assert spin[1] > 1e-3 and np.allclose(spin[[0, 2]], 0.0, atol=1e-9)
 # ```
 #
 # </details>
@@ -239,11 +241,13 @@ folder.cleanup()
 # normal components has no resultant and no moment. It is in the kernel of $Q$.
 #
 # ```python
-# twist = np.zeros((4, 3)) twist[:, 0] = [1.0, -1.0, -1.0, 1.0] assert np.allclose(problem.Q @
-# twist.ravel(), 0.0) difference = answers["nsgs"].reactions - answers["auto"].reactions assert
-# np.linalg.norm(difference[:, 0]) > 0.005 assert np.allclose(problem.Q @ difference.ravel(), 0.0,
-# atol=1e-8)  # two answers differ by such a change assert abs(difference[:, 0] @ twist[:, 0]) >
-# 0.99 * np.linalg.norm(difference[:, 0]) * np.linalg.norm(twist)
+# twist = np.zeros((4, 3))
+# twist[:, 0] = [1.0, -1.0, -1.0, 1.0]
+# assert np.allclose(problem.Q @ twist.ravel(), 0.0)
+# difference = answers["nsgs"].reactions - answers["auto"].reactions
+# assert np.linalg.norm(difference[:, 0]) > 0.005
+# assert np.allclose(problem.Q @ difference.ravel(), 0.0, atol=1e-8)  # two answers differ by such a change
+# assert abs(difference[:, 0] @ twist[:, 0]) > 0.99 * np.linalg.norm(difference[:, 0]) * np.linalg.norm(twist)
 # ```
 #
 # </details>

@@ -287,8 +287,8 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 #
 #     return LinearOperator((2 * nodes, 2 * nodes), matvec=product)
 #
-# tried = {exponent: iterations(problem.Q, power(exponent)) for exponent in (0.0, 0.5, 1.0, 1.5,
-# 2.0)} assert min(tried, key=tried.get) == 1.0
+# tried = {exponent: iterations(problem.Q, power(exponent)) for exponent in (0.0, 0.5, 1.0, 1.5, 2.0)}
+# assert min(tried, key=tried.get) == 1.0
 # ```
 #
 # </details>

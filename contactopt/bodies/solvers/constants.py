@@ -14,10 +14,10 @@ PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than 
 # time of factors beyond these limits.
 FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body that is factorised
 
-# `python -m experiments.questions.solver_constants` compares the elimination orders.
+# Chosen by the times of trials.
 LEAF = 48  # nodes of a piece of the mesh that nested dissection does not cut further
 
-# `python -m experiments.questions.solver_constants` varies one of these at a time.
+# Chosen by the times of trials that varied one of these at a time.
 COARSEST = 60  # nodes or aggregates that multigrid does not coarsen further
 NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggregated
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one

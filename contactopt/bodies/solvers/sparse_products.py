@@ -1,10 +1,10 @@
 """Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by
 SciPy elsewhere.
 
-One oneMKL product of single precision takes half the time of one of SciPy (`python -m
-experiments.questions.solver_constants`). Neither holds Python's lock, so that the pieces of one
-product can be made in several threads. The package sparse_dot_mkl calls the same functions, but
-makes a handle for each product, which doubles the time of small ones; numba is no faster.
+One oneMKL product of single precision takes half the time of one of SciPy. Neither holds Python's
+lock, so that the pieces of one product can be made in several threads. The package sparse_dot_mkl
+calls the same functions, but makes a handle for each product, which doubles the time of small ones;
+numba is no faster.
 """
 
 from __future__ import annotations

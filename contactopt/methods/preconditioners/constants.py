@@ -5,16 +5,13 @@ ALONG was chosen for small condition numbers of `laplacian` on the disc of
 (reports/contact_surfaces/report.md). They judge PIECE, THINNEST and DISTORTED, too, which were
 chosen by trial.
 
-EIGENVECTORS was chosen by the times of both ways, `python -m experiments.questions.contact_surfaces
-roots`; a solve takes up to thousands of products.
+EIGENVECTORS was chosen by the times of both ways; a solve takes up to thousands of products.
 
 DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the
-bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md). On
-bodies that had no part in that fit, `neumann` is judged by `python -m
-experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
+bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md).
 
-WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m
-experiments.questions.several_pairs`.
+WAVES and MOST_WAVES were chosen for few iterations on a body that is cut into thin slices, such as
+those of `python -m experiments.questions.ranks` (reports/ranks/report.md).
 """
 
 SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies'

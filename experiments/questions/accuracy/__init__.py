@@ -1,3 +1,1 @@
-"""How accurate are the answers, and what does accuracy cost? Run with `python -m
-experiments.questions.accuracy`.
-"""
+"""How accurate are the answers, and what does accuracy cost?"""

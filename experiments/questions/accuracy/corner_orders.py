@@ -38,17 +38,13 @@ def graded(n: int) -> np.ndarray:
 
 
 def reference(n: int) -> np.ndarray:
-    """The uniform grid with its first element halved again and again: holds all functions of
-    coarser uniform grids.
-    """
+    """The uniform grid, its first element halved again and again: holds all coarser functions."""
     grid = uniform(n)
     return np.concatenate([[0.0], grid[1] / 2.0 ** np.arange(NEAR, 0, -1), grid[1:]])
 
 
 def scene(lines: Lines, mu: float, bilateral: bool) -> Scene:
-    """Half model of a punch of half-width and height 1 on a body of half-width 3 and height 2, unit
-    force.
-    """
+    """Half of a punch 2 wide and 1 high on a body 6 wide and 2 high, under unit force."""
 
     def punch(n: int, zone: float | None):  # type: ignore[no-untyped-def]
         return rename(tensor_mesh(1 - lines(n)[::-1], lines(n)), contact="y-", top="y+", axis="x-")
@@ -72,9 +68,7 @@ def solved(lines: Lines, n: int, mu: float, bilateral: bool):  # type: ignore[no
 
 
 def energy_norm(fine, coarse) -> float:  # type: ignore[no-untyped-def]
-    """Of the difference of two solved scenes, the coarse one interpolated to the nodes of the fine
-    mesh.
-    """
+    """Of the difference of two solved scenes, the coarse one read at the nodes of the fine one."""
     total = 0.0
     for body, field, other in zip(fine[0].bodies, recover(*fine), recover(*coarse)):
         p = other.mesh.p
@@ -92,9 +86,7 @@ def energy_norm(fine, coarse) -> float:  # type: ignore[no-untyped-def]
 
 
 def orders(name: str) -> tuple[list[dict[str, object]], dict[str, np.ndarray]]:
-    """Rows of the table, and for the figure the errors of the approach on uniform and graded
-    meshes.
-    """
+    """Rows of the table, and the errors of the approach on uniform and on graded meshes."""
     mu, bilateral, ratio = CASES[name]
     exponent = corner(MATERIAL, MATERIAL, ratio).exponent
     dual = corner(MATERIAL, MATERIAL, None if ratio is None else -ratio).exponent

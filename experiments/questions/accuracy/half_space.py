@@ -30,9 +30,7 @@ CORNER = 2.0  # exponent of the grading towards the edge of a flat punch
 
 
 def outwards(start: float, first: float, slope: float, size: float) -> np.ndarray:
-    """Grid from `start` to `size`, lengths in units of a: elements from `first` on, growing as in
-    the head of this module.
-    """
+    """Grid from `start` to `size` [a] with elements from `first` on, growing as said above."""
     grid, h = [start], first
     while grid[-1] < size:
         grid.append(grid[-1] + h)
@@ -84,9 +82,7 @@ def indenter(
 
 
 def flat(kind: str, mu: float, size: float = 1e4, elements: int = 32) -> Scene:
-    """A rigid flat punch of half-width 1 under a unit force; elements shrink quadratically towards
-    its edge.
-    """
+    """A rigid flat punch of half-width 1 under a unit force, graded towards its edge."""
     plane = kind == "plane-strain"
     across, up = ("x", "y") if plane else ("r", "z")
     beta, modulus = dundurs(None, MATERIAL)[1], contact_modulus(MATERIAL)

@@ -1,15 +1,10 @@
-"""What the report on accuracy measures: errors against exact solutions, and error estimates against
-true errors.
-"""
+"""Errors against exact solutions, and error estimates against true errors."""
 
 from __future__ import annotations
 
-import csv
 import time
 from dataclasses import replace
 from multiprocessing import get_context
-
-import numpy as np
 
 from contactopt import scenes
 from contactopt.accuracy import refine
@@ -20,7 +15,6 @@ from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Rigid, Scene
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL, flat, indenter
-from experiments.report import REPORTS
 
 KINDS = {"point": "axisymmetric", "line": "plane-strain"}
 FRICTION = (0.1, 0.3, 0.5, 0.7)
@@ -28,8 +22,6 @@ LOCKING = ((0.3, 0.3), (0.45, 0.1), (0.49, 0.02))
 TARGETS = (1e-2, 3e-3, 1e-3)
 SIZES = (10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
 SMALL, MODEST = 24, 26  # elements of the Hertz table: at most 5,000 unknowns
-STEPS = (4, 8, 16, 32, 64)
-
 Exact = dict[str, float]
 
 
@@ -128,9 +120,7 @@ def all_effectivities() -> list[dict[str, object]]:
 
 
 def finite(size: float) -> dict[str, object]:
-    """Errors of a block `size` half-widths high and wide for a half-space, less those of the
-    largest block.
-    """
+    """Errors of a block `size` half-widths high and wide, less those of the largest block."""
     row: dict[str, object] = {"size / a": size}
     begin = time.perf_counter()
     for name, scene in (
@@ -209,73 +199,3 @@ def locking(nu: float, mu: float) -> dict[str, object]:
             f"{name}, error": value_of("stick", reduction, solution) - exact(scene)["stick"],
         }
     return row
-
-
-def cattaneo() -> list[dict[str, object]]:
-    """Rows of the report on sheared contacts, made by experiments.questions.cattaneo."""
-    with open(REPORTS / "cattaneo" / "loads.csv") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    keys = (
-        "scene",
-        "T / (mu P)",
-        "unknowns",
-        "c / a, rel. error",
-        "p in L2",
-        "q in L2",
-        "loss, rel. error",
-    )
-    kinds = {"scene": str, "unknowns": int}
-    return [{key: kinds.get(key, float)(row[key]) for key in keys} for row in rows]
-
-
-def sphere() -> list[dict[str, object]]:
-    """The named scene, peak pressure to 1 %; the fastest of five runs, which is the least
-    disturbed.
-    """
-    scene, best = scenes.sphere(), None
-    for _ in range(5):
-        _, estimate = refine([scene], "pressure", 1e-2)
-        seconds = estimate.levels[-1].seconds
-        if best is None or seconds < best[0]:
-            best = seconds, estimate
-    assert best is not None
-    truth = exact(scene)["pressure"]
-    return [
-        {
-            "elements": level.elements,
-            "splits": level.splits,
-            "unknowns": level.unknowns,
-            "zone rounds": level.rounds,
-            "peak, relative error": level.value / truth - 1,
-            "seconds": level.seconds,
-        }
-        for level in best[1].levels
-    ]
-
-
-def parsimony(kind: str) -> dict[str, list[dict[str, float]]]:
-    """Errors of the peak and the width against unknowns and time, with grading and zone loop on and
-    off.
-    """
-    curves: dict[str, list[dict[str, float]]] = {}
-    for grading in (True, False):
-        for loop in (True, False):
-            name = f"{'graded' if grading else 'uniform'}, {'zone loop' if loop else 'zone 1.25 a'}"
-            for elements in STEPS if grading else STEPS[:3]:
-                size = 100.0 if grading else 12.0
-                scene = indenter(kind, size=size, elements=elements, uniform=not grading, loop=loop)
-                seconds, truth = np.inf, exact(scene)
-                for _ in range(3):
-                    begin = time.perf_counter()
-                    solved = solve_zone(scene, elements)
-                    reduction, solution = solved.reduction, solved.solution
-                    seconds = min(seconds, time.perf_counter() - begin)
-                errors = [
-                    abs(value_of(q, reduction, solution) / truth[q] - 1)
-                    for q in ("pressure", "width")
-                ]
-                row = {"elements": elements, "unknowns": reduction.dofs, "seconds": seconds}
-                curves.setdefault(name, []).append(
-                    row | {"pressure": errors[0], "width": errors[1]}
-                )
-    return curves

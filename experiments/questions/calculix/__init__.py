@@ -1,3 +1,1 @@
-"""Does CalculiX find the same contact forces on the same mesh? Run with `python -m
-experiments.questions.calculix`.
-"""
+"""Does CalculiX find the same contact forces on the same mesh?"""

@@ -46,9 +46,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Both bodies as one mesh: points (2, N), quads (4, M) anticlockwise, and the first node and
-    element of each body.
-    """
+    """Both bodies as one mesh: points (2, N), quads (4, M) anticlockwise, first nodes, elements."""
 
     scene: Scene
     meshes: tuple[Any, Any]
@@ -76,9 +74,7 @@ class Model:
 
 
 def model(scene: Scene, elements: int | None = None) -> Model:
-    """Number a scene of two elastic bodies in plane strain; InputError for what the deck cannot
-    say.
-    """
+    """Number a plane scene of two elastic bodies; InputError for what the deck cannot say."""
     parts = scene.upper, scene.lower
     if scene.kind != "plane-strain" or scene.degree != 1 or scene.law != "coulomb":
         raise InputError(
@@ -122,9 +118,7 @@ def deck(bodies: Model, contact: Contact) -> str:
 
 
 def _number(value: float) -> str:
-    """At most 20 characters, as ccx reads them, and with a decimal point, without which *SPRING
-    takes it for a component.
-    """
+    """At most 20 characters with a decimal point: *SPRING takes others for a component."""
     return f"{value:.12e}"
 
 
@@ -138,9 +132,7 @@ def _both_layers(bodies: Model, nodes: np.ndarray, layered: bool) -> np.ndarray:
 
 
 def _mesh(bodies: Model, layered: bool) -> str:
-    """Nodes, elements, materials, and the sets PLANE (the nodes of the plane) and BODIES (all
-    elements).
-    """
+    """Nodes, elements, materials, and the sets PLANE (its nodes) and BODIES (all elements)."""
     count, thickness = bodies.points.shape[1], bodies.scene.thickness
     lines = ["*NODE, NSET=PLANE"]
     lines += [f"{i}, {_number(x)}, {_number(y)}" for i, (x, y) in enumerate(bodies.points.T, 1)]
@@ -167,9 +159,7 @@ def _mesh(bodies: Model, layered: bool) -> str:
 
 
 def _held(bodies: Model) -> dict[tuple[int, int], float]:
-    """(node, component) -> prescribed displacement, of supports and of the plate's directions that
-    do not move.
-    """
+    """(node, component) -> prescribed displacement, of supports and of held plates."""
     held = {}
     components = bodies.scene.components
     for body, part in enumerate((bodies.scene.upper, bodies.scene.lower)):

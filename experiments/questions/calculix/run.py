@@ -1,6 +1,4 @@
-"""One run of CalculiX (ccx) beside contactopt: start it with limits, read what it printed, compare
-nodal forces.
-"""
+"""One run of CalculiX (ccx): start it with limits, read what it printed, compare forces."""
 
 from __future__ import annotations
 
@@ -56,9 +54,7 @@ def punch(elements: int = ELEMENTS, modulus: float = STIFF, mu: float = MU) -> S
 
 
 def penalty(scene: Scene, law: str, factor: float) -> Contact:
-    """The law of a dimensionless factor: stiffness = factor E / h, h the length of an element on
-    the contact.
-    """
+    """The law of a dimensionless factor: stiffness = factor E / h, h the length of an element."""
     stiffness = factor * scene.upper.material.E * scene.elements / 20.0
     return Contact(
         law, stiffness, stiffness if law == "mortar" else STICK * stiffness, master="top"
@@ -87,11 +83,8 @@ def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> 
         cycles = _rows(folder / "job.cvg", 4)
         attempts = _rows(folder / "job.sta", 2)
         failure = _failure(process.returncode, log_text, wall >= LIMIT)
-        displacement, forces, reactions = (
-            np.zeros((2, 0)),
-            (np.zeros(0),) * 2,
-            (np.zeros((0, 2)),) * 2,
-        )
+        displacement, forces = np.zeros((2, 0)), (np.zeros(0),) * 2
+        reactions = (np.zeros((0, 2)),) * 2
         if not failure:
             tables = printed(folder / "job.dat")
             displacement = tables["displacements"][:, 1:3].T
@@ -198,9 +191,7 @@ def difference(values: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
 
 
 def linear(program: str) -> dict[str, Any]:
-    """The bodies bonded at the contact nodes, in both codes: all displacements and the forces that
-    hold them together.
-    """
+    """The bodies bonded at the contacts, in both codes: displacements and forces between them."""
     scene = punch()
     bodies, reduction = model(scene), reduce_bodies(scene)
     answer = run(program, bodies, reduction, Contact("bonded"))
@@ -232,9 +223,7 @@ def linear(program: str) -> dict[str, Any]:
 
 
 def softened(problem: InterfaceProblem, scene: Scene, factor: float) -> np.ndarray:
-    """Reactions of contactopt under the law of node-to-surface penalty: compliances 1 / (stiffness
-    area) added to Q.
-    """
+    """Reactions under the node-to-surface law: compliances 1 / (stiffness area) added to Q."""
     law = penalty(scene, "node-to-surface", factor)
     added = 1 / np.outer(problem.areas, [law.stiffness, law.stick])
     return solve(replace(problem, Q=problem.Q + np.diag(added.ravel())), tol=1e-11).reactions

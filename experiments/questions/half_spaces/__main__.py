@@ -9,45 +9,21 @@ TAMAAS this Python is used if it has Tamaas. Set OMP_NUM_THREADS=1.
 
 from __future__ import annotations
 
-import csv
-import sys
-
-from experiments.questions.half_spaces.exact import cattaneo_rows, hertz_rows, kernel_rows
-from experiments.questions.half_spaces.measured import Row
-from experiments.questions.half_spaces.models import chart_rows, draw_limits, draw_speed, limit_rows
+from experiments.questions.half_spaces.exact import cattaneo_rows, hertz_rows
+from experiments.questions.half_spaces.models import chart_rows, draw_speed
 from experiments.questions.half_spaces.rough import (
     friction_rows,
     rough_rows,
     tamaas_rows,
     wavy_rows,
 )
-from experiments.report import REPORTS, write
+from experiments.report import measure
 
-TABLES = {
-    "kernels": kernel_rows,
-    "hertz": hertz_rows,
-    "cattaneo": cattaneo_rows,
-    "wavy": wavy_rows,
-    "rough": rough_rows,
-    "friction": friction_rows,
-    "tamaas": tamaas_rows,
-    "chart": chart_rows,
-    "limits": limit_rows,
-}
-MISSING: list[Row] = [{"not measured": "run the command below with the name of this table"}]
-
-TEXT = """How accurate and how fast are half-spaces? Every transform has one thread. Times are CPU seconds of the process, on a machine on which other
-programs ran as well. "CPU s, problem" is the time to make the interface problem. "solve" is the
-time of `contactopt.solve`, with its certificate. The tables were made one by one, while other
-programs ran. Therefore compare times within a table only.
-
-## Influence coefficients
-
-An influence coefficient says how far a force on one cell moves another cell. The coefficients of
-cells of 1 x .7 are compared with adaptive quadrature of the point forces. The table has the largest
-error of all six coefficients, over the largest coefficient there.
-
-{kernels}
+TEXT = """How accurate and how fast are half-spaces? Every transform has one thread. Times are CPU
+seconds of the process, on a machine on which other programs ran as well. "CPU s, problem" is the
+time to make the interface problem. "solve" is the time of `contactopt.solve`, with its certificate.
+The tables were made one by one, while other programs ran. Therefore compare times within a table
+only.
 
 ## Hertz: a rigid sphere on a half-space
 
@@ -101,52 +77,25 @@ problem here stands beside the time of the solve.
 ## Speed against accuracy, products against size
 
 {chart}
-
-## Where a half-space is wrong
-
-The table has the results of finite elements over those of the half-space. One body is a block of 40
-contact radii around the axis, on a rigid floor and under a rigid sphere. The other is an elastic
-half ball under a rigid plate, on rigid ground. All have small displacements. For a / R beyond .3
-this is an assumption of its own.
-
-{limits}
 """
 
 
-def number(text: str) -> float | int | str:
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            pass
-    return text
-
-
-def stored(name: str) -> list[Row]:
-    """The rows of a table as they were written last."""
-    path = REPORTS / "half_spaces" / f"{name}.csv"
-    if not path.exists():
-        return MISSING
-    with open(path, newline="") as file:
-        file.readline()
-        return [{key: number(value) for key, value in row.items()} for row in csv.DictReader(file)]
-
-
-def main() -> None:
-    wanted = sys.argv[1:] or list(TABLES)
-    unknown = [name for name in wanted if name not in TABLES]
-    if unknown:
-        raise SystemExit(f"there is no table {unknown[0]!r}; choose from {', '.join(TABLES)}.")
-    for name in wanted:
-        made = TABLES[name]() or [{"Tamaas": "not installed here: nothing compared"}]
-        tables = {other: stored(other) for other in TABLES} | {name: made}
-        figures = {}
-        if "model" in tables["chart"][0] and "products" in tables["wavy"][0]:
-            figures["speed"] = draw_speed(tables["chart"], tables["wavy"])
-        if "body" in tables["limits"][0]:
-            figures["limits"] = draw_limits(tables["limits"])
-        write("half_spaces", "Half-spaces: exactness, cost, and Tamaas", TEXT, tables, figures)
+TABLES = {
+    "hertz": hertz_rows,
+    "cattaneo": cattaneo_rows,
+    "wavy": wavy_rows,
+    "rough": rough_rows,
+    "friction": friction_rows,
+    "tamaas": tamaas_rows,
+    "chart": chart_rows,
+}
 
 
 if __name__ == "__main__":
-    main()
+    measure(
+        "half_spaces",
+        "Half-spaces: exactness, cost, and Tamaas",
+        TEXT,
+        TABLES,
+        lambda tables: {"speed": draw_speed(tables["chart"], tables["wavy"])},
+    )

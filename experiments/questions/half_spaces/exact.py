@@ -6,57 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.integrate import dblquad
 
 from contactopt import HalfSpace, Material, follow, scenes, solve
 from contactopt.analytic import contact_modulus, cycle_loss_point, tangential_modulus
-from contactopt.bodies.influence import half_space_influence
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.readings.half_space_readings import subsurface_stress, surface_contact
 from experiments.questions.half_spaces.measured import Row, cpu, solved
 
-# in cells
-PLACES = ((0, 0), (1, 0), (1, 1), (5, 3), (12, 12), (13, 4), (64, 64), (65, 10), (500, 300))
-CELL = (1.0, 0.7)
 STEPS = 4  # of the path from zero to the largest shear
-
-
-def kernel_rows() -> list[Row]:
-    """Coefficients against adaptive quadrature of point forces over the cell, in quarters."""
-    nu, (hx, hy) = 0.3, CELL
-    material = Material(2 * (1 + nu), nu)  # G = 1
-    point = {
-        (0, 0): lambda x, y, rho: (1 - nu) / rho + nu * x**2 / rho**3,
-        (1, 1): lambda x, y, rho: (1 - nu) / rho + nu * y**2 / rho**3,
-        (2, 2): lambda x, y, rho: (1 - nu) / rho,
-        (0, 1): lambda x, y, rho: nu * x * y / rho**3,
-        (0, 2): lambda x, y, rho: (0.5 - nu) * x / rho**2,
-        (1, 2): lambda x, y, rho: (0.5 - nu) * y / rho**2,
-    }
-    rows = []
-    for place in PLACES:
-        made = half_space_influence(material, CELL, (np.array([place[0]]), np.array([place[1]])))
-        largest = max(abs(part[0, 0]) for part in made.values())
-        errors = []
-        for pair, value in point.items():
-            if place == (0, 0) and pair[0] != pair[1]:
-                continue  # zero because it is odd
-            total = 0.0
-            for a, b in (
-                (x, y) for x in (place[0] - 0.5, place[0]) for y in (place[1] - 0.5, place[1])
-            ):
-
-                def at(y: float, x: float, value: Any = value) -> float:
-                    return float(value(x, y, np.hypot(x, y)))
-
-                total += dblquad(
-                    at, hx * a, hx * (a + 0.5), hy * b, hy * (b + 0.5), epsabs=1e-15, epsrel=1e-12
-                )[0]  # fmt: skip
-            errors.append(abs(made[pair][0, 0] - total / (hx * hy) / (2 * np.pi)) / largest)
-        rows.append(
-            {"cells apart": f"{place[0]}, {place[1]}", "largest error, relative": max(errors)}
-        )
-    return rows
 
 
 def _box(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -115,9 +72,7 @@ def _summit(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 
 def cattaneo_rows() -> list[Row]:
-    """Cattaneo and Mindlin, sheared to half of mu P at nu = 0, where they are exact, and at nu =
-    .3.
-    """
+    """Sheared to half of mu P at nu = 0, where the formulas are exact, and at nu = .3."""
     rows, tractions = [], {}
     for nu, elements in ((0.0, 32), (0.0, 64), (0.0, 128), (0.3, 32), (0.3, 64), (0.3, 128)):
         material = Material(5.0, nu)

@@ -47,7 +47,7 @@ class Steps(logging.Handler):
 
 
 def solved(scene: Scene, tol: float = 1e-8) -> tuple[Row, Reduction, Solution]:
-    """The problem of a scene of half-spaces, solved: what it took, the reduction and the solution."""
+    """The solved problem of a scene of half-spaces: what it took, reduction and solution."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     making, reduction = cpu(lambda: reduce_bodies(scene))
     steps = Steps(reduction.problem.Q.kernel.grid)

@@ -1,6 +1,4 @@
-"""The same Hertz contact by finite elements and by half-spaces: error over time, and where the
-half-space is wrong.
-"""
+"""The same Hertz contact by finite elements and by half-spaces: error over time."""
 
 from __future__ import annotations
 
@@ -9,17 +7,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from contactopt import HalfSpace, Material, Rigid, Scene, Solution, run, scenes, solve
-from contactopt.analytic import contact_modulus, hertz_line, hertz_point
+from contactopt import HalfSpace, Material, Rigid, Scene, Solution, scenes, solve
+from contactopt.analytic import contact_modulus, hertz_line
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from experiments.questions.half_spaces.measured import Row, cpu
 
 MATERIAL = Material(5.0, 0.3)
 RADIUS = 400.0
-THICKNESSES = (1.0, 2.0, 4.0, 8.0, 16.0, 40.0)  # of a block, over the contact radius
-SLENDER = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)  # contact radius of Hertz over the radius of a ball
-WIDE = 40.0  # radius of the block, over the contact radius
 
 
 def chart_rows() -> list[Row]:
@@ -67,75 +62,6 @@ def _pressure_error(name: str, scene: Scene) -> Row:
 def _answer(scene: Scene) -> tuple[Any, Solution]:
     problem = reduce_bodies(scene).problem
     return problem, solve(problem)
-
-
-def limit_rows() -> list[Row]:
-    """Approach and peak pressure of bodies that are no half-spaces, over those of Hertz, by
-    axisymmetric finite elements.
-
-    A block glued to a rigid floor under a rigid sphere gets thinner; a half ball under a rigid
-    plate, on rigid ground, is pressed harder and harder.
-    """
-    rows = []
-    exact = hertz_point(100.0, RADIUS, contact_modulus(MATERIAL))
-    for ratio in THICKNESSES:
-        a = exact.half_width
-        scene = scenes.sphere(
-            rigid="sphere",
-            mu=0.0,
-            lower=MATERIAL,
-            elements=16,
-            foundation_height=ratio * a,
-            foundation_radius=WIDE * a,
-        )
-        rows.append(_over_hertz("block", "H / a", ratio, scene))
-    for ratio in SLENDER:
-        force = 4 * contact_modulus(MATERIAL) * (ratio * RADIUS) ** 3 / (3 * RADIUS)
-        scene = scenes.sphere(rigid="foundation", mu=0.0, upper=MATERIAL, force=force, elements=16)
-        rows.append(_over_hertz("ball", "a / R", ratio, scene))
-    return rows
-
-
-def _over_hertz(body: str, size: str, ratio: float, scene: Scene) -> Row:
-    result = run(scene)
-    exact, summary = scene.reference, result.summary
-    return {
-        "body": body,
-        "size": f"{size} = {ratio:g}",
-        "ratio": ratio,
-        "approach": summary["approach"] / exact.approach,
-        "peak pressure": summary["max_pressure"] / exact.peak,
-        "contact radius": summary["contact_half_width"] / exact.half_width,
-    }
-
-
-def draw_limits(rows: list[Row]) -> Figure:
-    """Answers of bodies that are no half-spaces over those of half-spaces."""
-    made = Figure(figsize=(9, 3.6), layout="constrained")
-    for ax, body, label in zip(
-        made.subplots(1, 2, sharey=True),
-        ("block", "ball"),
-        (
-            "thickness of the block over contact radius, H / a",
-            "contact radius over radius of the ball, a / R",
-        ),
-    ):
-        own = [row for row in rows if row["body"] == body]
-        x = [row["ratio"] for row in own]
-        for name, style, colour in (
-            ("approach", "o-", ORANGE),
-            ("peak pressure", "s-", GREEN),
-            ("contact radius", "^-", GREY),
-        ):
-            ax.semilogx(x, [row[name] for row in own], style, color=colour, label=name)
-        ax.axhline(1.0, color=BLUE, label="half-space")
-        ax.set(xlabel=label)
-        ax.set_xticks(x, [f"{value:g}" for value in x])
-        ax.minorticks_off()
-    made.axes[0].set(ylabel="finite elements over half-space [-]", title="A block on a rigid floor")
-    made.axes[1].set(title="A ball on rigid ground")
-    made.axes[1].legend(frameon=False)
-    return made
 
 
 def draw_speed(charts: list[Row], growth: list[Row]) -> Figure:

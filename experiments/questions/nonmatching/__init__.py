@@ -1,1 +1,1 @@
-"""Meshes that do not match: exactness, accuracy, cost, and CalculiX beside."""
+"""Meshes that do not match: exactness and accuracy."""

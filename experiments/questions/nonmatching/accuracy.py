@@ -8,52 +8,16 @@ from typing import Any
 import numpy as np
 
 from contactopt import reduce_bodies, scenes, solve
-from contactopt.readings.edges import stick_width
-from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
 from contactopt.solving.follow import follow
-from experiments.questions.cattaneo import error
-from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
+from experiments.questions.accuracy.sheared import error
+from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch
 
 METHODS = ("newton", "auto")
 FINE = 192
 SIZES = ((16, 16), (24, 24), (16, 24), (24, 16), (32, 32), (48, 48), (32, 48))
 SHEARS = (10.0, 30.0, 45.0)
 OTHERS = (5.0, 15.0, 25.0, 35.0)
-
-
-def hertz() -> list[dict[str, Any]]:
-    """Line and point; quadratic elements coarse away from the contact, linear ones as in the named
-    scenes.
-    """
-    rows = []
-    growth = round_bodies.GROWTH[2]
-    for name, force in (("cylinder", 30.0), ("sphere", 1.0)):
-        for degree in (2, 1):
-            round_bodies.GROWTH[2] = 1.5 if degree == 2 else growth
-            for sizes in ((8, 8), (12, 12), (8, 12), (12, 8), (16, 16), (24, 24), (16, 24)):
-                scene = getattr(scenes, name)(mu=0.0, force=force)
-                exact = scene.reference
-                reduction = reduce_bodies(apart(scene, *sizes, degree), zone=exact.half_width)
-                problem, solution = reduction.problem, solve(reduction.problem)
-                x, p = problem.coordinates[0], solution.reactions[:, 0] / problem.areas
-                inner = (x > 0.3 * exact.half_width) & (x < 0.9 * exact.half_width)
-                slope, value = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
-                rows.append(
-                    {
-                        "scene": name,
-                        "degree": degree,
-                        "elements": f"{sizes[0]}:{sizes[1]}",
-                        "unknowns": reduction.dofs,
-                        "contacts": problem.contacts,
-                        "peak, rel. error": float(p.max() / exact.peak - 1),
-                        "width, rel. error": float(np.sqrt(-value / slope) / exact.half_width - 1),
-                        "p in L2": error(p, exact.pressure(x), problem.areas),
-                        "steps": solution.iterations,
-                    }
-                )
-            round_bodies.GROWTH[2] = growth
-    return rows
 
 
 def press_fits() -> list[dict[str, Any]]:
@@ -85,9 +49,7 @@ def press_fits() -> list[dict[str, Any]]:
 
 
 def resultant_curve(problem: Any, reactions: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Contact forces between the axis and some places, (2, places): what converges where pressures
-    are singular.
-    """
+    """Contact forces (2, places) from the axis to some places: they converge at any pressure."""
     order = np.argsort(problem.coordinates[0])
     x = problem.coordinates[0][order]
     ends = np.concatenate([[0.0], (x[1:] + x[:-1]) / 2, x[-1:]])
@@ -109,34 +71,6 @@ def elastic_punch() -> list[dict[str, Any]]:
             row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}"}
             row |= {"normal": float(rms[0]), "tangential": float(rms[1])}
             rows.append(row | steps(found))
-    return rows
-
-
-def rigid_punch() -> list[dict[str, Any]]:
-    """Stick ratio against Spence, exact for the rigid punch; the matching row is the named scene
-    with a body without mesh.
-    """
-    rows = []
-    for kind in ("plane-strain", "axisymmetric"):
-        for mu in (0.1, 0.3, 0.5):
-            for upper in (0, 48):
-                exact = scenes.rigid_punch(kind, mu=mu).reference
-                scene = (
-                    scenes.rigid_punch(kind, mu=mu, elements=64)
-                    if not upper
-                    else stiff_punch(kind, upper, 64, mu)
-                )
-                reduction = reduce_bodies(scene)
-                found = {method: solve(reduction.problem, method=method) for method in METHODS}
-                ratio = stick_width(reduction, found["newton"])[0] / 20.0
-                row: dict[str, Any] = {
-                    "kind": kind,
-                    "mu": mu,
-                    "punch": "elastic, 48 cells" if upper else "rigid",
-                }
-                row |= {"c / a": float(ratio), "exact": exact.stick_half_width / exact.half_width}
-                row |= {"error": float(ratio - exact.stick_half_width / exact.half_width)}
-                rows.append(row | steps(found))
     return rows
 
 
@@ -178,9 +112,7 @@ def sheared(
 
 
 def cattaneo() -> list[dict[str, Any]]:
-    """Root mean squares of both errors over several shears, each on meshes made for it, and on
-    meshes made for another one.
-    """
+    """Root mean squares of both errors over several shears, on meshes for them and for others."""
     rows = []
     for made, shears in ((None, SHEARS), (45.0, OTHERS)):
         for degree in (1, 2):
@@ -219,40 +151,3 @@ def cattaneo() -> list[dict[str, Any]]:
 def _squares(found: list[tuple[float, float, bool]]) -> np.ndarray:
     """Mean squares (2,) of the errors of pressure and traction."""
     return np.asarray(np.mean(np.array([f[:2] for f in found]) ** 2, axis=0))
-
-
-def solids() -> list[dict[str, Any]]:
-    """Two bodies in space, pressed and then sheared in one step, linear bricks; the exact tractions
-    are those of Mindlin.
-    """
-    rows = []
-    for sizes, carrier in (
-        ((6, 6), None),
-        ((8, 8), None),
-        ((6, 8), "lower"),
-        ((8, 6), "upper"),
-        ((6, 8), "upper"),
-    ):
-        scene = apart(scenes.cattaneo(3, shear=30.0), *sizes, 1)
-        states = [_sheared(scene, share) for share in (0.0, 1.0)]
-        path = follow(states if carrier is None else [carried(state, carrier) for state in states])
-        problem, r = path.reduction.problem, path.solution.reactions
-        x, exact = np.linalg.norm(problem.coordinates[:2], axis=0), scene.reference
-        p, q = r[:, 0] / problem.areas, np.linalg.norm(r[:, 1:], axis=1) / problem.areas
-        own = sizes[0] if carrier == "upper" else sizes[1]
-        row: dict[str, Any] = {"elements": f"{sizes[0]}:{sizes[1]}"}
-        row |= {
-            "contacts on": "matching nodes"
-            if carrier is None
-            else "fine side"
-            if own == 8
-            else "coarse side"
-        }
-        row |= {"unknowns": path.reduction.dofs, "contacts": problem.contacts}
-        row |= {"peak, rel. error": float(p.max() / exact.peak - 1)}
-        row |= {"p in L2": error(p, exact.pressure(x), problem.areas)}
-        rows.append(
-            row
-            | {"q in L2": error(q, np.abs(exact.shear(x)), problem.areas), "solved": path.solved}
-        )
-    return rows

@@ -63,9 +63,7 @@ def stacked(kind: str, degree: int, cells: tuple[int, int], carrier: str) -> Sce
 def press_fit(
     sectors: tuple[int, int], degree: int, carrier: str, mu: float = 0.0
 ) -> tuple[Scene, float]:
-    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2, and Lame's pressure; isoparametric
-    if quadratic.
-    """
+    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2, and Lame's pressure."""
     interference = 0.01
     sides = (Support("start", {"y": 0.0}), Support("end", {"x": 0.0}))
 
@@ -117,19 +115,3 @@ def punch(
         "lower": material,
     }
     return scenes.flat_punch(2, **scaled, **loads, **changes)  # type: ignore[arg-type]
-
-
-def stiff_punch(kind: str, upper: int, lower: int, mu: float, force: float = 100.0) -> Scene:
-    """The rigid punch on a half-space, the punch an elastic block ten million times as stiff with
-    its own mesh.
-    """
-    scene = scenes.rigid_punch(kind, mu=mu, elements=lower, force=force)
-    across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
-    h = np.linspace(0, 1, upper + 1)
-    grid = 20.0 * (1 - (1 - h) ** 3)  # finer at the edge
-    mesh = rename(tensor_mesh(grid, np.linspace(0, 20.0, 5)), axis="x-", contact="y-", top="y+")
-    material = Material(5e7, 0.3)
-    top = Part(
-        "punch", mesh, material, (Support("axis", {across: 0.0}),), (Plate("top", {up: -force}),)
-    )
-    return replace(scene, upper=top)

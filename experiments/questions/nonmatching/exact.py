@@ -32,9 +32,7 @@ def patch_tests() -> list[dict[str, Any]]:
 
 
 def resultants(reduction: Reduction, reactions: np.ndarray) -> tuple[float, float]:
-    """Sum of the nodal forces on both bodies and of their moments, over the sum of the forces'
-    sizes (and the extent).
-    """
+    """Sums of all nodal forces and of their moments, over the forces' sizes (and the extent)."""
     force, moment, extent = np.zeros(2), 0.0, 0.0
     for body, B in zip(reduction.bodies, reduction.maps):
         f, x = (B.T @ reactions.ravel())[body.body.unknowns], body.body.locations
@@ -63,31 +61,4 @@ def equilibrium() -> list[dict[str, Any]]:
         for label, forces in (("solved", r), ("random forces", random)):
             row[f"{label}: force"], row[f"{label}: moment"] = resultants(reduction, forces)
         rows.append(row)
-    return rows
-
-
-def units() -> list[dict[str, Any]]:
-    """The elastic punch, 32:48, in other units of length and force."""
-    rows, first = [], None
-    for length, force in (
-        (1.0, 1.0),
-        (1e-6, 1.0),
-        (1e6, 1.0),
-        (1.0, 1e-6),
-        (1.0, 1e6),
-        (1e-6, 1e6),
-        (1e6, 1e-6),
-    ):
-        solution = solve(reduce(apart(punch(length=length, force=force), 32, 48)))
-        r = solution.reactions / force
-        first = r if first is None else first
-        rows.append(
-            {
-                "unit of length": 1 / length,
-                "unit of force": 1 / force,
-                "status": solution.status.label,
-                "steps": solution.iterations,
-                "forces, largest difference": float(np.abs(r - first).max() / np.abs(first).max()),
-            }
-        )
     return rows

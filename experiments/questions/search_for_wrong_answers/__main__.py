@@ -7,29 +7,24 @@ another way can say.
 
 from __future__ import annotations
 
-import os
+import logging
+import sys
+import time
+from collections.abc import Iterator
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import logging  # noqa: E402
-import sys  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Iterator  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from experiments.questions.search_for_wrong_answers.compare import Verdict, judge  # noqa: E402
-from experiments.questions.search_for_wrong_answers.families import FAMILIES  # noqa: E402
+from experiments.questions.search_for_wrong_answers.compare import Verdict, judge
+from experiments.questions.search_for_wrong_answers.families import FAMILIES
 
 SCENES = 300  # ten of them suffice for a first look
 TEXT = """Is an answer right whose certificate is right? This report solves random scenes (seeds
-{first} to {last}) in two ways that share neither mesh nor coupling, and compares what they say. The first
-way has structured meshes whose nodes match, or is an exact solution. The second has unstructured
-meshes of Gmsh, read from its files, with a mortar coupling carried by either side; or a model in
-space for one in the plane, finite elements for a half-space, the shape of a mesh for a function of
-the gap. The second way is also turned or mirrored, written in other units and with other numbers of
-nodes and elements, and the sides of its contacts are exchanged.
+{first} to {last}) in two ways that share neither mesh nor coupling, and compares what they say. The
+first way has structured meshes whose nodes match, or is an exact solution. The second has
+unstructured meshes of Gmsh, read from its files, with a mortar coupling carried by either side; or
+a model in space for one in the plane, finite elements for a half-space, the shape of a mesh for a
+function of the gap. The second way is also turned or mirrored, written in other units and with
+other numbers of nodes and elements, and the sides of its contacts are exchanged.
 
 Each way is solved on three meshes, each about twice as fine as the one before (1.4 times in space).
 The error of the finest is estimated by the range of the three values, or by Richardson's

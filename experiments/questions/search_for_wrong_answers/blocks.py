@@ -76,9 +76,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """A scene of blocks: contacts by names, friction, what else the scene needs, and the size of
-    its first elements.
-    """
+    """A scene of blocks: contacts by names, friction, settings, and the size of its elements."""
 
     blocks: tuple[Block, ...]
     contacts: tuple[tuple[str, str], ...]
@@ -100,7 +98,7 @@ class Blocks:
         return Scene("search", bodies=(*bodies, *self.rigid), contacts=pairs, degree=degree, **own)
 
     def matching(self, rng: Random, depth: float | None = None) -> Way:
-        """The first way: quadrilaterals or triangles cut from them, or bricks, whose nodes match."""
+        """The first way: quadrilaterals, triangles cut from them, or bricks; nodes match."""
         cut, degree = rng.random() < 0.3, int(rng.integers(1, 3 if depth is None else 2))
         marks = [
             x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")
@@ -119,9 +117,7 @@ class Blocks:
         return Way(build, (0, 1) if depth is None else (0, 1, 2))
 
     def unlike(self, rng: Random, depth: float | None = None, rows: int = 0) -> Way:
-        """The second way: Gmsh's triangles, or bricks and tetrahedra, by mortar, exchanged and
-        moved.
-        """
+        """The second way: Gmsh's triangles, bricks or tetrahedra, by mortar, and moved."""
         shares = {block.name: float(rng.uniform(0.7, 1.3)) for block in self.blocks}
         cut = {block.name: rng.random() < 0.3 for block in self.blocks}
         locking = depth is not None and any(cut.values())  # linear tetrahedra are too stiff
@@ -175,9 +171,7 @@ def inside(blocks: tuple[Block, ...]) -> dict[str, list[tuple[float, ...]]]:
 
 
 def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
-    """Blocks one upon another, thin ones and gaps among them: in the plane, as a slab between
-    rollers, or in space.
-    """
+    """Blocks one upon another, some thin or apart: in the plane, as a slab, or in space."""
     # Without friction nothing says where a body between two others is along them.
     mu, depth = friction(rng) or (0.3 if layers > 2 else 0.0), float(rng.uniform(0.3, 1.0))
     force = float(10 ** rng.uniform(-3, -1))
@@ -197,7 +191,6 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     push = load.get("x", 0.0) / force
     free = mu > 0.1 and abs(push) * y < 0.2 * min(c[1][0] - c[0][0] for c in corners)
     kind = rng.choice(["plate", "moved", "traction", "weight"] if free else ["plate", "moved"])
-    third = (0.0,) if solid else ()
     carried: tuple[Any, ...] = (Plate("top", load),)
     if kind == "traction":
         carried = (Traction("top", (push * force / span / depth, -force / span / depth)),)
@@ -230,23 +223,7 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
         return Case(
             f"{layers} blocks", (plane.matching(rng), plane.unlike(rng)), points, loose=loose
         )
-    ends = tuple(Support(name, {"z": 0.0}) for name in ("near", "far")) if solid == "slab" else ()
-    blocks = tuple(
-        replace(
-            block,
-            supports=tuple(
-                held if held.displacement is None else Support("top", {**shift, "z": 0.0})
-                for held in block.supports
-            )
-            + ends,
-            loads=tuple(
-                own if kind == "plate" else replace(own, value=own.value + third)
-                for own in block.loads
-            ),
-        )
-        for block in plane.blocks
-    )
-    space = replace(plane, blocks=blocks, settings=(("kind", "solid"),))
+    space = in_space(plane, solid)
     if solid == "space":
         points = {name: [(*x, 0.4 * depth) for x in own] for name, own in points.items()}
         ways = space.matching(rng, depth), space.unlike(rng, depth)
@@ -256,10 +233,25 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     return Case(f"slab of {layers} blocks", (plane.matching(rng), second), points, loose=loose)
 
 
+def in_space(plane: Blocks, solid: str) -> Blocks:
+    """The scene in space; a slab is held along z at both ends."""
+    ends = tuple(Support(name, {"z": 0.0}) for name in ("near", "far")) if solid == "slab" else ()
+    blocks = []
+    for block in plane.blocks:
+        held = [
+            own if own.displacement is None else Support("top", {**own.displacement, "z": 0.0})
+            for own in block.supports
+        ]
+        loads = [
+            own if isinstance(own, Plate) else replace(own, value=(*own.value, 0.0))
+            for own in block.loads
+        ]
+        blocks.append(replace(block, supports=(*held, *ends), loads=tuple(loads)))
+    return replace(plane, blocks=tuple(blocks), settings=(("kind", "solid"),))
+
+
 def crown(rng: Random, ring: bool = False) -> Case:
-    """A body with a slightly round face on a flat one: smooth pressure, a contact whose edge nobody
-    knows.
-    """
+    """A body with a slightly round face on a flat one: nobody knows the contact's edge."""
     one, two, mu, a = material(rng), material(rng), friction(rng), float(rng.uniform(0.25, 0.5))
     radius, high, low = float(rng.uniform(50, 500)), *map(float, rng.uniform(0.6, 1.5, 2))
     modulus, left, base = contact_modulus(one, two), 0.0 if ring else -1.0, float(rng.uniform(1, 2))
@@ -284,10 +276,8 @@ def crown(rng: Random, ring: bool = False) -> Case:
     )
     kind = "axisymmetric" if ring else "plane-strain"
     scene = Blocks(blocks, (("upper", "lower"),), mu, a / 4, settings=(("kind", kind),))
-    ways, points = (
-        (scene.matching(rng), scene.unlike(rng)),
-        {"upper": [(0.3, 0.6 * high)], "lower": [(0.2, -0.5 * low)]},
-    )
+    ways = (scene.matching(rng), scene.unlike(rng))
+    points = {"upper": [(0.3, 0.6 * high)], "lower": [(0.2, -0.5 * low)]}
     return Case(
         f"crown, {kind}", ways, points, not ring, True, loose=a**2 / radius, strain=a / radius
     )
@@ -295,16 +285,10 @@ def crown(rng: Random, ring: bool = False) -> Case:
 
 def wedge(rng: Random) -> Case:
     """A wedge pressed obliquely between two flanks."""
-    angle, high, half = (
-        np.radians(rng.uniform(15, 60)),
-        float(rng.uniform(0.6, 1.2)),
-        float(rng.uniform(0.15, 0.5)),
-    )
-    mu, side, out = (
-        float(rng.uniform(0, 0.6)),
-        high * np.tan(angle),
-        half + high * np.tan(angle) + 1.0,
-    )
+    angle, high = np.radians(rng.uniform(15, 60)), float(rng.uniform(0.6, 1.2))
+    half = float(rng.uniform(0.15, 0.5))
+    mu, side = float(rng.uniform(0, 0.6)), high * np.tan(angle)
+    out = half + high * np.tan(angle) + 1.0
     load = Plate("top", {"x": float(rng.uniform(-3e-3, 3e-3)), "y": -0.01})
     corners = [(-half, 0.0), (half, 0.0), (half + side, high), (-half - side, high)]
     left = [(-out, 0.0), (-half, 0.0), (-half - side, high), (-out, high)]
@@ -322,11 +306,8 @@ def wedge(rng: Random) -> Case:
 
 def bridge(rng: Random) -> Case:
     """A beam on two piers: one surface in two pairs."""
-    mu, long, (thick, high) = (
-        friction(rng),
-        float(rng.uniform(3, 5)),
-        map(float, rng.uniform(0.4, 1.2, 2)),
-    )
+    mu, long = friction(rng), float(rng.uniform(3, 5))
+    (thick, high) = map(float, rng.uniform(0.4, 1.2, 2))
     feet = {
         "left": (0.0, float(rng.uniform(0.4, 1))),
         "right": (long - float(rng.uniform(0.4, 1)), long),
@@ -348,21 +329,13 @@ def bridge(rng: Random) -> Case:
 
 
 def floor(rng: Random) -> Case:
-    """An uneven block on a rigid floor: its shape is a function of the gap, or the shape of its
-    mesh.
-    """
-    mu, own, wide, high = (
-        friction(rng),
-        material(rng),
-        float(rng.uniform(1, 3)),
-        float(rng.uniform(0.5, 2)),
-    )
+    """An uneven block on a rigid floor: uneven by the gap's function, or by its mesh."""
+    mu, own, wide = friction(rng), material(rng), float(rng.uniform(1, 3))
+    high = float(rng.uniform(0.5, 2))
     depth, waves = float(10 ** rng.uniform(-5, -3.5)) * wide, rng.uniform(0.5, 4, 3) * np.pi / wide
     phase, sizes, pushed = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.2, 1, 3), rng.random() < 0.3
-    force, lift = (
-        own.E * depth * float(10 ** rng.uniform(-0.7, 0.7)),
-        depth * float(rng.uniform(0.2, 2)),
-    )
+    force = own.E * depth * float(10 ** rng.uniform(-0.7, 0.7))
+    lift = depth * float(rng.uniform(0.2, 2))
 
     def shape(x: np.ndarray) -> np.ndarray:
         at = np.concatenate([np.linspace(0, wide, 1000), x[0]])
@@ -372,10 +345,8 @@ def floor(rng: Random) -> Case:
     def bend(x: np.ndarray) -> np.ndarray:
         return np.stack([x[0], x[1] + shape(x) * (1 - x[1] / high)])
 
-    corners, touch = (
-        [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)],
-        {"under": ("bottom", 0.0, wide)},
-    )
+    corners = [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)]
+    touch = {"under": ("bottom", 0.0, wide)}
     block = Block("block", corners, own, touch, (), (Plate("top", oblique(rng, mu, force)),))
     ground = Rigid("floor", (0.0, 1.0), shape)
     if pushed:  # the floor is lifted in one way, the block pushed down in the other

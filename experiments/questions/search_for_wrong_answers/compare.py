@@ -1,6 +1,4 @@
-"""What two ways say of one scene, level by level, and where they differ by more than their own
-levels do.
-"""
+"""What two ways say of one scene, and where they differ by more than their levels do."""
 
 from __future__ import annotations
 
@@ -89,9 +87,7 @@ def _turned(part: Any) -> Any:
 
 
 def read(way: Way, level: int, case: Case, moved: bool = True, degree: int | None = None) -> Values:
-    """Solve a level of a way, and read all quantities in the frame and units of the case; raises
-    what goes wrong.
-    """
+    """Solve a level of a way; all quantities in the frame and units of the case."""
     scene = way.build(level)
     scene = scene if degree is None else replace(scene, degree=degree)
     scene = swapped(scene) if way.swapped else scene
@@ -165,13 +161,16 @@ def fitted(offsets: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def scale_of(name: str, values: list[Values]) -> float:
-    """What a quantity is measured by: forces by the largest force, displacements by the largest,
-    others by themselves.
-    """
+    """What a quantity is measured by: forces by the largest force, others by their kind."""
     kind = name.split()[0]
-    groups = {"force": ("force", "normal"), "friction": ("normal",), "moved": ("moved",), "mean_stress": ("von_mises",
-              "mean_stress", "pressure"), "von_mises": ("von_mises", "mean_stress", "pressure"),
-              "centre": ("reach",)}  # fmt: skip
+    groups = {
+        "force": ("force", "normal"),
+        "friction": ("normal",),
+        "moved": ("moved",),
+        "mean_stress": ("von_mises", "mean_stress", "pressure"),
+        "von_mises": ("von_mises", "mean_stress", "pressure"),
+        "centre": ("reach",),
+    }
     same = groups.get(kind, (name,))
     if kind == "stick":
         return 1.0
@@ -182,9 +181,7 @@ def scale_of(name: str, values: list[Values]) -> float:
 
 
 def error(row: np.ndarray) -> float:
-    """The error of the last of three levels: the range of all, or more if the differences hardly
-    shrink (Richardson).
-    """
+    """The error of the last of three levels: their range, or more if they hardly converge."""
     if len(row) < 3:
         return 0.0
     first, last = np.abs(np.diff(row))[-2:]
@@ -212,9 +209,7 @@ class Verdict:
 
 
 def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[float]]:
-    """What the two ways disagree on beyond the errors of their last three levels, and the widths of
-    all estimates.
-    """
+    """What two ways disagree on beyond their errors, and the widths of all estimates."""
     wrong, widths = [], []
     everything = [own for way in levels for own in way]
     for name in levels[0][0].keys() & levels[1][0].keys():
@@ -235,9 +230,9 @@ def judge(seed: int, case: Case) -> Verdict:
     """Compare the two ways of a case, and the second with itself where it is not moved.
 
     Where they disagree, both are compared once more on finer meshes, and then with quadratic
-    displacements: linear elements lock in thin lips, and three of their levels may then differ less than the last
-    one errs. Where friction leaves several solutions, two ways may find two of them, and both are
-    right.
+    displacements: linear elements lock in thin lips, and three of their levels may then differ less
+    than the last one errs. Where friction leaves several solutions, two ways may find two of them,
+    and both are right.
     """
     try:
         wrong, widths = compared(case, read_levels(case, LEVELS))

@@ -1,6 +1,4 @@
-"""Meshes of two makers, structured and Gmsh's, and scenes moved as a whole: turned, mirrored, in
-other units and numbers.
-"""
+"""Structured meshes and Gmsh's, and scenes moved: turned, mirrored, in other units."""
 
 from __future__ import annotations
 
@@ -82,9 +80,7 @@ def extruded(mesh: Any, z: np.ndarray) -> Any:
 
 
 def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
-    """Triangles of Gmsh within outlines, the first outer one around holes, by a file; `arcs`: of
-    circles about the origin.
-    """
+    """Triangles within outlines, by a file of Gmsh; `arcs`: of circles about the origin."""
     import gmsh
 
     gmsh.initialize(interruptible=False)
@@ -97,10 +93,8 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
             points = [geo.addPoint(x, y, 0, size) for x, y, size, _ in loop]
             lines = []
             for i, (*_, name) in enumerate(loop):
-                ends, bent = (
-                    (points[i], points[(i + 1) % len(loop)]),
-                    arcs and not name.startswith("straight"),
-                )
+                ends = (points[i], points[(i + 1) % len(loop)])
+                bent = arcs and not name.startswith("straight")
                 lines.append(
                     geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends)
                 )
@@ -123,9 +117,7 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A scene as another user would write it: x -> length R x, stresses times stress, nodes and
-    elements renumbered.
-    """
+    """A scene as another would write it: x -> length R x, other stresses and numbers."""
 
     R: np.ndarray
     length: float = 1.0
@@ -174,10 +166,8 @@ class Move:
         if isinstance(part, HalfSpace):
             force = None if part.force is None else self.vector(part.force, names, S * L**2)
             height = None if part.height is None else lambda x: L * part.height(x / L)
-            points, depth = (
-                tuple(L * row for row in part.points),
-                None if part.depth is None else L * part.depth,
-            )
+            points = tuple(L * row for row in part.points)
+            depth = None if part.depth is None else L * part.depth
             own = replace(part.material, E=part.material.E * S)
             return replace(
                 part, points=points, height=height, force=force, depth=depth, material=own
@@ -252,8 +242,13 @@ def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -
             if isinstance(part, Part)
             for support in part.supports
         ]
-        given += [load.force for part in scene.bodies if isinstance(part, Part) for load in part.loads
-                  if isinstance(load, Plate)]  # fmt: skip
+        given += [
+            load.force
+            for part in scene.bodies
+            if isinstance(part, Part)
+            for load in part.loads
+            if isinstance(load, Plate)
+        ]
         given += [
             value
             for part in scene.bodies

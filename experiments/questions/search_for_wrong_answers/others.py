@@ -20,7 +20,7 @@ from experiments.questions.search_for_wrong_answers.blocks import (
     material,
     oblique,
 )
-from experiments.questions.search_for_wrong_answers.compare import Case, Way
+from experiments.questions.search_for_wrong_answers.compare import Case, Values, Way
 from experiments.questions.search_for_wrong_answers.meshes import (
     named,
     outlined,
@@ -55,15 +55,9 @@ def circle(radius: float, y: float = 0.0) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def pin(rng: Random) -> Case:
-    """A pin with a hole, loaded obliquely, in a bush that is held outside; with or without
-    clearance.
-    """
-    hole, outer, mu, turn = (
-        float(rng.uniform(0.3, 0.6)),
-        float(rng.uniform(1.6, 2.5)),
-        friction(rng),
-        rng.uniform(0, 6),
-    )
+    """A pin with a hole in a bush that is held outside; with or without clearance."""
+    hole, outer, mu = float(rng.uniform(0.3, 0.6)), float(rng.uniform(1.6, 2.5)), friction(rng)
+    turn = rng.uniform(0, 6)
     play = 0.0 if rng.random() < 0.3 else float(10 ** rng.uniform(-4, -1))
     one, two, angle = material(rng), material(rng), rng.uniform(0, 2 * np.pi)
     force = min(one.E, two.E) * min(play or 1e-3, 1e-3) * float(rng.uniform(0.3, 3))
@@ -114,17 +108,11 @@ def pin(rng: Random) -> Case:
 
 def fit(rng: Random) -> Case:
     """A press fit: a quarter of two rings against Lame's solution."""
-    bore, outer, d = (
-        float(rng.uniform(0.3, 0.7)),
-        float(rng.uniform(1.4, 2.5)),
-        float(10 ** rng.uniform(-4, -2.5)),
-    )
+    bore, outer = float(rng.uniform(0.3, 0.7)), float(rng.uniform(1.4, 2.5))
+    d = float(10 ** rng.uniform(-4, -2.5))
     shaft, hub, share, mu = material(rng), material(rng), float(rng.uniform(0, 1)), friction(rng)
-    rims, order, sizes = (
-        (1 + share * d, 1 - (1 - share) * d),
-        int(rng.integers(1, 3)),
-        rng.uniform(0.1, 0.2, 2),
-    )
+    rims, order = (1 + share * d, 1 - (1 - share) * d), int(rng.integers(1, 3))
+    sizes = rng.uniform(0.1, 0.2, 2)
     given, exact = mortar(rng, order), press_fit(d, bore, 1.0, outer, shaft, hub).peak or 0.0
     sides = (Support("straight x", {"y": 0.0}), Support("straight y", {"x": 0.0}))
 
@@ -162,24 +150,14 @@ def fit(rng: Random) -> Case:
 
 
 def roller(rng: Random) -> Case:
-    """A cylinder on a flat body: half of it graded around the contact, or all of it, coarse where
-    surfaces are apart.
-    """
+    """A cylinder on a flat body: half of it, graded, or all of it, coarse far from contact."""
     one, two, mu = material(rng), material(rng), friction(rng)
-    a, wide, high = (
-        float(rng.uniform(0.03, 0.1)),
-        float(rng.uniform(1.5, 4)),
-        float(rng.uniform(1, 3)),
-    )
-    force, fine, far = (
-        np.pi * contact_modulus(one, two) * a**2 / 4,
-        float(rng.uniform(0.8, 1.3)),
-        float(rng.uniform(0.1, 0.5)),
-    )
-    given, sizes = (
-        mortar(rng),
-        {"foundation_width": wide, "foundation_height": high, "force": force},
-    )
+    a, wide = float(rng.uniform(0.03, 0.1)), float(rng.uniform(1.5, 4))
+    high = float(rng.uniform(1, 3))
+    force, fine = np.pi * contact_modulus(one, two) * a**2 / 4, float(rng.uniform(0.8, 1.3))
+    far = float(rng.uniform(0.1, 0.5))
+    given = mortar(rng)
+    sizes = {"foundation_width": wide, "foundation_height": high, "force": force}
 
     def half(level: int) -> Scene:
         return cylinder(
@@ -197,8 +175,14 @@ def roller(rng: Random) -> Case:
         disc = type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(
             made.boundaries
         )
-        flat = [(-c, -high, far, "bottom"), (c, -high, far, "right"), (c, 0.0, far, "over"), (1.3 * a, 0.0, h, "over"),
-                (-1.3 * a, 0.0, h, "over"), (-c, 0.0, far, "left")]  # fmt: skip
+        flat = [
+            (-c, -high, far, "bottom"),
+            (c, -high, far, "right"),
+            (c, 0.0, far, "over"),
+            (1.3 * a, 0.0, h, "over"),
+            (-1.3 * a, 0.0, h, "over"),
+            (-c, 0.0, far, "left"),
+        ]
         load = Plate("straight top", {"y": -force})
         bodies = [
             Part("cylinder", disc, one, (), (load,), curve={"arc": circle(1.0, 1.0)}),
@@ -214,11 +198,8 @@ def roller(rng: Random) -> Case:
 def ball(rng: Random) -> Case:
     """A round body with a crowned face on a plate: its section, and the half of it in space."""
     one, two, mu, a = material(rng), material(rng), friction(rng), float(rng.uniform(0.3, 0.5))
-    radius, heights, share = (
-        float(rng.uniform(50, 500)),
-        rng.uniform(0.6, 1.2, 2),
-        (1.0, float(rng.uniform(0.8, 1.3))),
-    )
+    radius, heights = float(rng.uniform(50, 500)), rng.uniform(0.6, 1.2, 2)
+    share = (1.0, float(rng.uniform(0.8, 1.3)))
     force = 4 / 3 * contact_modulus(one, two) * a**3 / radius
 
     def build(level: int, section: bool) -> Scene:
@@ -259,51 +240,45 @@ def ball(rng: Random) -> Case:
     return replace(case, without=("reach",))  # of which a section shows one component
 
 
-def exact(rng: Random) -> Case:
-    """Round bodies on half-spaces without friction, against Hertz, and a wave on a periodic
-    half-plane, against Westergaard.
-    """
-    solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
-    rigid, radius, a, shift = (
-        wave or rng.random() < 0.4,
-        float(rng.uniform(5, 50)),
-        1.0,
-        rng.uniform(-0.1, 0.1, 2),
-    )
-    modulus, share, wide = (
-        contact_modulus(None if rigid else one, two),
-        float(rng.uniform(0.1, 0.8)),
-        float(rng.uniform(1.3, 3)),
-    )
-    solid = solid and not wave
-    if wave:  # of amplitude a^2 / radius and period 2 a / share
-        length, tall = 2 * a / share, a**2 / radius
-        t = (np.arange(4000) + 0.5) / 4000 * np.pi - np.pi / 2
-        x, dx, closed = a * np.sin(t), a * np.cos(t) * np.pi / 4000, np.sin(np.pi * share / 2) ** 2
-        p = 2 * np.pi * modulus * tall / length * np.cos(np.pi * x / length)
-        p *= np.sqrt(np.maximum(closed - np.sin(np.pi * x / length) ** 2, 0))
-        force, peak = float(p @ dx), float(p.max())
-        mean, reach = float(p**2 @ dx / force), float(np.sqrt(p * x**2 @ dx / force))
-        bearing = float((np.sqrt(p) @ dx) ** 2 / force)
-    elif solid:
+def westergaard(modulus: float, tall: float, length: float, a: float) -> Values:
+    """What is known of a wave on a periodic half-plane that touches on 2 a of every `length`."""
+    t = (np.arange(4000) + 0.5) / 4000 * np.pi - np.pi / 2
+    x, dx, closed = a * np.sin(t), a * np.cos(t) * np.pi / 4000, np.sin(np.pi * a / length) ** 2
+    p = 2 * np.pi * modulus * tall / length * np.cos(np.pi * x / length)
+    p *= np.sqrt(np.maximum(closed - np.sin(np.pi * x / length) ** 2, 0))
+    force = float(p @ dx)
+    mean, reach = float(p**2 @ dx / force), float(np.sqrt(p * x**2 @ dx / force))
+    bearing = float((np.sqrt(p) @ dx) ** 2 / force)
+    return of_contact(mean, reach, float(p.max()), bearing, force)
+
+
+def hertzian(solid: bool, modulus: float, radius: float, a: float) -> Values:
+    """What is known of Hertz's contact of half-width a."""
+    if solid:
         force = 4 / 3 * modulus * a**3 / radius
         peak = hertz_point(force, radius, modulus).peak or 0.0
-        mean, reach, bearing = 0.75 * peak, a * 0.4**0.5, 0.96 * np.pi * a**2
-    else:
-        force = np.pi * modulus * a**2 / (4 * radius)
-        peak = hertz_line(force, radius, modulus).peak or 0.0
-        mean, reach, bearing = (
-            8 / (3 * np.pi) * peak,
-            a / 2,
-            2 * (gamma(1.25) / gamma(1.75)) ** 2 * a,
-        )
-    known = {
-        "pressure 0": mean,
-        "reach 0": reach,
-        "peak 0": peak,
-        "bearing 0": bearing,
-        "normal 0": force,
-    }
+        return of_contact(0.75 * peak, a * 0.4**0.5, peak, 0.96 * np.pi * a**2, force)
+    force = np.pi * modulus * a**2 / (4 * radius)
+    peak = hertz_line(force, radius, modulus).peak or 0.0
+    bearing = 2 * (gamma(1.25) / gamma(1.75)) ** 2 * a
+    return of_contact(8 / (3 * np.pi) * peak, a / 2, peak, bearing, force)
+
+
+def of_contact(mean: float, reach: float, peak: float, bearing: float, force: float) -> Values:
+    known = {"pressure": mean, "reach": reach, "peak": peak, "bearing": bearing, "normal": force}
+    return {f"{name} 0": value for name, value in known.items()}
+
+
+def exact(rng: Random) -> Case:
+    """Round bodies against Hertz, and a wave on a periodic half-plane against Westergaard."""
+    solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
+    rigid, radius, a = wave or rng.random() < 0.4, float(rng.uniform(5, 50)), 1.0
+    shift = rng.uniform(-0.1, 0.1, 2)
+    modulus, share = contact_modulus(None if rigid else one, two), float(rng.uniform(0.1, 0.8))
+    wide = float(rng.uniform(1.3, 3))
+    solid = solid and not wave
+    length, tall = 2 * a / share, a**2 / radius  # period and amplitude of the wave
+    known = westergaard(modulus, tall, length, a) if wave else hertzian(solid, modulus, radius, a)
 
     def gap(x: np.ndarray) -> np.ndarray:
         if wave:
@@ -322,7 +297,7 @@ def exact(rng: Random) -> Case:
             if solid
             else (row - a / share * wave,)
         )
-        load = {"z" if solid else "y": -force}
+        load = {"z" if solid else "y": -known["normal 0"]}
         upper: Any = Rigid("upper", gap=gap, force=load)
         if not rigid:
             upper = HalfSpace("upper", one, points, height=lambda x: -gap(x), force=load)
@@ -336,20 +311,11 @@ def exact(rng: Random) -> Case:
 
 
 def heights(rng: Random) -> Case:
-    """A rigid uneven body on a half-space: as a gap, or as the height of the half-space; with
-    friction.
-    """
-    solid, periodic, mu, own = (
-        rng.random() < 0.4,
-        bool(rng.random() < 0.4),
-        friction(rng),
-        material(rng),
-    )
-    tall, k, phase = (
-        float(10 ** rng.uniform(-4, -3)),
-        rng.integers(1, 4, (4, 2)),
-        rng.uniform(0, 2 * np.pi, 4),
-    )
+    """A rigid uneven body on a half-space: as a gap, or as the height of the half-space."""
+    solid, periodic, mu = rng.random() < 0.4, bool(rng.random() < 0.4), friction(rng)
+    own = material(rng)
+    tall, k = float(10 ** rng.uniform(-4, -3)), rng.integers(1, 4, (4, 2))
+    phase = rng.uniform(0, 2 * np.pi, 4)
     force = contact_modulus(None, own) * tall * float(10 ** rng.uniform(-1, 0.3))
     load, axes, first = oblique(rng, mu, force), (0, 1, 2) if solid else (0, 1), 10 if solid else 40
     load = {"z" if solid and name == "y" else name: value for name, value in load.items()}
@@ -378,15 +344,9 @@ def heights(rng: Random) -> Case:
 
 
 def large(rng: Random) -> Case:
-    """A rigid profile on a half-plane, and on a body of finite elements that is larger from level
-    to level.
-    """
-    own, mu, radius, bumps = (
-        material(rng),
-        friction(rng),
-        float(rng.uniform(10, 50)),
-        float(rng.uniform(0, 0.5)),
-    )
+    """A rigid profile on a half-plane, and on larger and larger bodies of finite elements."""
+    own, mu, radius = material(rng), friction(rng), float(rng.uniform(10, 50))
+    bumps = float(rng.uniform(0, 0.5))
     phase, period, share, degree = (
         *map(float, rng.uniform([0, 0.5, 0.8], [6, 1.5, 1.2])),
         int(rng.integers(1, 3)),
@@ -403,15 +363,21 @@ def large(rng: Random) -> Case:
 
     def finite(level: int) -> Scene:
         c, h = 15.0 * 2**level, share / (8 * 2**level)
-        ends = [(-c, -c, "bottom"), (c, -c, "right"), (c, 0, "top"), (2, 0, "over"), (1.3, 0, "over"), (-1.3, 0, "over"),
-                (-2, 0, "top"), (-c, 0, "left")]  # fmt: skip
+        ends = [
+            (-c, -c, "bottom"),
+            (c, -c, "right"),
+            (c, 0, "top"),
+            (2, 0, "over"),
+            (1.3, 0, "over"),
+            (-1.3, 0, "over"),
+            (-2, 0, "top"),
+            (-c, 0, "left"),
+        ]
         mesh = outlined(
             [(x, y, 3.0 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends]
         )
-        part, body = (
-            Part("ground", mesh, own, (Support("bottom"),)),
-            Rigid("body", (0.0, 1.0), gap, load),
-        )
+        part = Part("ground", mesh, own, (Support("bottom"),))
+        body = Rigid("body", (0.0, 1.0), gap, load)
         return scene_of([body, part], ("body", "ground:over"), mu, degree=degree)
 
     second = Way(finite)

@@ -4,16 +4,14 @@ it make?
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from typing import Any
 
 from experiments.questions.simplest import nearly
 from experiments.questions.simplest.chart import bias, chart_rows, draw_chart
-from experiments.report import REPORTS, markdown, write
+from experiments.report import markdown, measure
 
-FOLDER = REPORTS / "simplest"
 # random scenes; the first argument may be another number, for a quick look at them alone
 COUNT = 500
 PARTS: dict[str, Callable[[], list[dict[str, Any]]]] = {
@@ -63,30 +61,13 @@ once, as in a search for an accuracy.
 """
 
 
-def main(chosen: list[str]) -> None:
-    """Measure the chosen parts, or all, and write the report once all are known; a number: so many
-    scenes, no report.
-    """
-    if chosen and chosen[0].isdigit():
-        print(markdown(nearly.table(nearly.rows(int(chosen[0])))))
-        return
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    kept = FOLDER / "parts.json"
-    tables = json.loads(kept.read_text()) if kept.exists() else {}
-    for name in chosen or PARTS:
-        if name != "report":
-            tables[name] = PARTS[name]()
-            kept.write_text(json.dumps(tables, indent=1, default=float) + "\n")
-    if set(PARTS) <= set(tables):
-        model_error = abs(float(next(iter(tables["bias"][0].values()))))
-        write(
-            "simplest",
-            "The cheapest model first",
-            TEXT,
-            tables,
-            {"chart": draw_chart(tables["chart"], model_error)},
-        )
+def figures(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
+    model_error = abs(float(next(iter(tables["bias"][0].values()))))
+    return {"chart": draw_chart(tables["chart"], model_error)}
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    if sys.argv[1:] and sys.argv[1].isdigit():  # so many scenes, for a quick look
+        print(markdown(nearly.table(nearly.rows(int(sys.argv[1])))))
+    else:
+        measure("simplest", "The cheapest model first", TEXT, PARTS, figures)

@@ -55,7 +55,7 @@ def uniform(count: float, force: float) -> Answer:
 
 
 def graded_by_hand(count: float, force: float) -> Answer:
-    """Squares on the contact, growing away from it; the finer they are, the more slowly they grow."""
+    """Squares that grow away from the contact, the more slowly the finer they are."""
     growth = 1 + 1.6 / count
     side = contact_grid(1.5 * A, round(1.5 * count), SIZE, growth)
     mesh = tensor_mesh(np.concatenate([-side[:0:-1], side]), -graded(SIZE, A / count, growth)[::-1])
@@ -76,9 +76,7 @@ def solved(scene: Scene) -> Answer:
 
 
 def adaptive(goal: float, force: float) -> Answer:
-    """The last of the meshes that refinement makes, from a coarse one on; the time is that of all
-    of them.
-    """
+    """The last of the meshes of a refinement; the time is that of all of them."""
     coarse = tensor_mesh(np.linspace(-SIZE, SIZE, 17), np.linspace(-SIZE, 0, 9))
     found, estimate = refine(
         [block(coarse, force)], "pressure", goal, limits=Limits(60_000), adaptive=True
@@ -95,9 +93,7 @@ WAYS: dict[str, tuple[Callable[[float, float], Answer], tuple[float, ...]]] = {
 
 
 def chart_rows() -> list[Row]:
-    """One row for every setting of every way: root mean square of the errors, least of the seconds
-    over all forces.
-    """
+    """One row for every setting: root mean square of errors, least seconds over all forces."""
     rows = []
     for way, (run, settings) in WAYS.items():
         run(settings[0], 1.0)  # imports and caches do not count
@@ -117,9 +113,7 @@ def chart_rows() -> list[Row]:
 
 
 def bias() -> float:
-    """By how much the peak pressure of the block misses that of a half-plane, on the finest graded
-    mesh.
-    """
+    """By how much the block's peak misses that of a half-plane, on the finest graded mesh."""
     return graded_by_hand(GRADED[-1], 1.0)[1] / EXACT[1.0].peak - 1
 
 

@@ -1,6 +1,4 @@
-"""Random scenes, symmetric or nearly so: what is called exact, beside the solution and the
-certificate of the whole.
-"""
+"""Random scenes, nearly symmetric: what is called exact, beside the solved whole."""
 
 from __future__ import annotations
 
@@ -44,9 +42,7 @@ WRONG = 1e-4  # relative difference from the whole from which on an exact answer
 
 
 def block(rng: np.random.Generator, spoil: float) -> Scene:
-    """A rigid indenter on a block: an asperity, a patch of other friction, a force, a traction or
-    the mesh is on one side.
-    """
+    """A rigid indenter on a block: a gap, friction, force, traction or mesh is on one side."""
     count, way = int(rng.integers(6, 20)), rng.integers(5) if spoil else -1
     ticks = (
         np.sin(np.linspace(-np.pi / 2, np.pi / 2, 2 * count + 1)) if rng.random() < 0.5 else None
@@ -83,7 +79,7 @@ def block(rng: np.random.Generator, spoil: float) -> Scene:
 
 
 def punch(rng: np.random.Generator, spoil: float) -> Scene:
-    """A punch on a larger block, of squares or of triangles: its load, a traction or a node is off."""
+    """A punch on a larger block: its load, a traction or a node is off."""
     across, way = int(rng.integers(3, 7)), rng.integers(4) if spoil else -1
     fine = rng.integers(1, 3)
     upper = tensor_mesh(np.linspace(-2, 2, 2 * across + 1), np.linspace(0, 2, across + 1))
@@ -127,9 +123,7 @@ def _crossed(mesh: MeshQuad) -> MeshTri:
 
 
 def tube(rng: np.random.Generator, spoil: float) -> Scene:
-    """A tube under a flat plate: its bore is off the middle, or it is turned, or one spot of its
-    rim is higher.
-    """
+    """A tube under a plate: its bore is off, it is turned, or a spot of its rim is higher."""
     sectors, way = 4 * int(rng.integers(4, 10)), rng.integers(3) if spoil else -1
     angles = np.linspace(0, 2 * np.pi, sectors + 1) + (np.deg2rad(5) * spoil if way == 1 else 0.0)
     inner, radii = rng.uniform(0.3, 0.7), int(rng.integers(3, 6))
@@ -156,9 +150,7 @@ def tube(rng: np.random.Generator, spoil: float) -> Scene:
 
 
 def bridge(rng: np.random.Generator, spoil: float) -> Scene:
-    """A beam on two piers on a rigid floor: one pier is heavier, softer or more slippery, or the
-    floor is lower there.
-    """
+    """A beam on two piers: one is heavier, softer, more slippery, or its floor is lower."""
     way, count = rng.integers(4) if spoil else -1, int(rng.integers(1, 4))
 
     def solid(
@@ -175,10 +167,8 @@ def bridge(rng: np.random.Generator, spoil: float) -> Scene:
             name, rename(tensor_mesh(*ticks), contact="y-", top="y+"), material, loads=loads
         )
 
-    left, right = (
-        solid("left", (-5, -3), (0, 4), 5.0, False),
-        solid("right", (3, 5), (0, 4), 5.0, True),
-    )
+    left = solid("left", (-5, -3), (0, 4), 5.0, False)
+    right = solid("right", (3, 5), (0, 4), 5.0, True)
     beam = solid("beam", (-6, 6), (4, 6), 20.0, False)
     mu = rng.uniform(0.3, 0.7)
     pairs = [
@@ -191,9 +181,7 @@ def bridge(rng: np.random.Generator, spoil: float) -> Scene:
 
 
 def roller(rng: np.random.Generator, spoil: float) -> Scene:
-    """A rigid roller on a solid block between rollers: a ridge, a slippery band, a crown, or an end
-    that is free.
-    """
+    """A rigid roller on a block: a ridge, a slippery band, a crown, or an end that is free."""
     way, count = rng.integers(5) if spoil else -1, int(rng.integers(3, 6))
     depth, place, wide = rng.uniform(1, 4), rng.uniform(0, 1), rng.uniform(0.03, 0.3)
     ticks = (
@@ -239,10 +227,8 @@ def numbers(solved: Solved) -> np.ndarray:
     """Energy, approach and peak pressure of the whole, whatever part of it is modelled."""
     problem, solution = solved.reduction.problem, solved.solution
     r = solution.reactions
-    energy, peak = (
-        elastic_energy(solved.reduction, solution),
-        float((r[:, 0] / problem.areas).max()),
-    )
+    energy = elastic_energy(solved.reduction, solution)
+    peak = float((r[:, 0] / problem.areas).max())
     return np.array([energy, approach(problem, solution) or 0.0, peak])
 
 
@@ -256,9 +242,7 @@ def scene_of(number: int) -> tuple[Scene, float]:
 
 
 def checked(number: int) -> Row:
-    """One scene: whether something was called exact, its proof, and the same by the reduced whole
-    and by its solution.
-    """
+    """One scene: what was called exact, its proof, the reduced whole and its solution."""
     scene, spoil = scene_of(number)
     found = simplify(scene)
     exact = [each for each in found.found if each.exact]

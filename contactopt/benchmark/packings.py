@@ -1,0 +1,112 @@
+"""Discrete problems of many rigid bodies: packings of discs or spheres, of blocks with several
+contact points a face.
+
+One implicit time step of rigid bodies with inverse masses 1 / m and 1 / J: W = H M^-1 H', q = H v +
+gap / step, H the contact velocities of the bodies' velocities. More contact components than
+freedom: W is sparse and of deficient rank.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import Delaunay
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws.coulomb import Coulomb
+
+
+def packing(
+    dim: int = 2,
+    bodies: int = 25,
+    seed: int = 0,
+    mu: float = 0.5,
+    points: int = 1,
+    disorder: float = 0.3,
+    shake: float = 1.0,
+) -> InterfaceProblem:
+    """A packing under its own weight on a fixed floor, read from the Delaunay graph of jittered
+    lattice places.
+
+    points    contacts per pair of bodies: one for discs, several for faces that touch
+    disorder  jitter of the places over their distance; also the spread of the radii
+    shake     random part of the free velocity, over that which gravity makes in the step
+    """
+    if dim not in (2, 3) or bodies < 2**dim or points < 1:
+        raise InputError("packing needs dim 2 or 3, at least 2^dim bodies, and points at least 1.")
+    rng = np.random.default_rng(seed)
+    side = int(np.ceil(bodies ** (1 / dim)))
+    grid = np.stack(
+        np.meshgrid(*[np.arange(side, dtype=float)] * dim, indexing="ij"), axis=-1
+    ).reshape(-1, dim)[:bodies]
+    places = grid + disorder * rng.uniform(-0.5, 0.5, grid.shape)
+    pairs = _pairs(places, 1.5)
+    fixed = places[:, -1] < 0.5
+    pairs = pairs[~(fixed[pairs[:, 0]] & fixed[pairs[:, 1]])]
+    radius = 0.5 * (1 + disorder * rng.uniform(-0.5, 0.5, len(places)))
+    mass = radius**dim
+    inertia = 0.4 * mass * radius**2
+    turns = 1 if dim == 2 else 3
+    inverse = np.concatenate(
+        [np.repeat(1 / mass[:, None], dim, 1), np.repeat(1 / inertia[:, None], turns, 1)], axis=1
+    )
+    inverse[fixed] = 0.0
+    H = _velocities(places, np.repeat(pairs, points, axis=0), points, rng)
+    free = np.zeros((len(places), dim + turns))
+    free[:, dim - 1] = -1.0
+    free += shake * 0.3 * rng.normal(size=free.shape)
+    free[fixed] = 0.0
+    W = H @ sp.diags_array(inverse.ravel()) @ H.T
+    q = (H @ free.ravel()).reshape(-1, dim)
+    q[:, 0] += np.maximum(0.0, rng.normal(size=len(q)) - 0.5) * 0.2  # some are not touching yet
+    return InterfaceProblem(sp.csr_array(W), q, Coulomb(np.full(len(q), mu)))
+
+
+def _pairs(places: np.ndarray, longest: float) -> np.ndarray:
+    """(m, 2) neighbours in the Delaunay graph that are no further apart than that."""
+    corners = Delaunay(places).simplices
+    n = corners.shape[1]
+    edges = np.concatenate([corners[:, [a, b]] for a in range(n) for b in range(a)])
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    return edges[np.linalg.norm(places[edges[:, 0]] - places[edges[:, 1]], axis=1) <= longest]
+
+
+def _velocities(
+    places: np.ndarray, pairs: np.ndarray, points: int, rng: np.random.Generator
+) -> sp.csr_array:
+    """H (dim m, freedom): velocity of the second body of each pair relative to the first in the
+    contact's frame.
+    """
+    dim = places.shape[1]
+    freedom = 3 if dim == 2 else 6
+    axis = places[pairs[:, 1]] - places[pairs[:, 0]]
+    normal = axis / np.linalg.norm(axis, axis=1)[:, None]
+    frame = np.linalg.qr(
+        np.concatenate([normal[:, :, None], rng.normal(size=(len(pairs), dim, dim - 1))], axis=2)
+    )[0]
+    frame[:, :, 0] = normal
+    where = places[pairs].mean(axis=1)
+    if points > 1:  # spread over a face
+        spread = 0.25 * rng.uniform(-1, 1, (len(pairs), dim - 1))
+        where = where + np.einsum("mij,mj->mi", frame[:, :, 1:], spread)
+    i, j, x = [], [], []
+    rows = np.arange(len(pairs))[:, None] * dim + np.arange(dim)
+    for side, sign in ((1, 1.0), (0, -1.0)):
+        arm = where - places[pairs[:, side]]
+        move = np.swapaxes(frame, 1, 2)  # (m, dim components, dim)
+        if dim == 2:
+            spin = np.einsum("mai,mi->ma", move, np.stack([-arm[:, 1], arm[:, 0]], axis=1))[
+                :, :, None
+            ]
+        else:
+            spin = np.cross(arm[:, None, :], move)
+        block = sign * np.concatenate([move, spin], axis=2)
+        columns = pairs[:, side, None, None] * freedom + np.arange(freedom)
+        i.append(np.broadcast_to(rows[:, :, None], block.shape).ravel())
+        j.append(np.broadcast_to(columns, block.shape).ravel())
+        x.append(block.ravel())
+    shape = (len(pairs) * dim, len(places) * freedom)
+    return sp.csr_array(
+        sp.coo_array((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=shape)
+    )

@@ -1,0 +1,149 @@
+"""The commands that the reports name exist, import, and say what they write; the quick ones run."""
+
+import re
+import subprocess
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+QUESTIONS = ROOT / "experiments" / "questions"
+MODULES = sorted(
+    path.relative_to(ROOT).with_suffix("").as_posix() for path in QUESTIONS.rglob("*.py")
+)
+REPORTS = sorted(path for path in (ROOT / "reports").glob("*/report.md"))
+
+
+def command(path: Path) -> list[str]:
+    """The questions that a page names as the commands that made it."""
+    return re.findall(r"python -m experiments\.([\w.]+)", path.read_text())
+
+
+@pytest.mark.parametrize("path", MODULES)
+def test_every_experiment_imports_what_exists(path):
+    module = import_module(path.replace("/", ".").removesuffix(".__init__"))
+    assert module.__doc__ and module.__doc__[0] not in " \n"
+
+
+@pytest.mark.parametrize("path", REPORTS, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_the_command_that_a_report_names_exists(path):
+    if "Experiment: [" in path.read_text():  # made by `contactopt report` from a campaign
+        assert (ROOT / "experiments" / "campaigns" / f"{path.parent.name}.toml").exists()
+        return
+    made_by = command(path)[-1]
+    name = path.parent.name
+    assert made_by == f"questions.{name}"
+    assert (QUESTIONS / f"{name}.py").exists() or (QUESTIONS / name / "__main__.py").exists()
+
+
+def test_the_index_of_the_reports_names_each_of_them():
+    named = re.findall(r"\((\w+)/report\.md\)", (ROOT / "reports" / "README.md").read_text())
+    assert sorted(set(named)) == sorted(path.parent.name for path in REPORTS)
+
+
+def test_a_report_names_the_command_that_writes_it(tmp_path, monkeypatch, capsys):
+    from experiments import report
+
+    monkeypatch.setattr(report, "REPORTS", tmp_path)
+    report.write("hertz", "Title", "{table}", {"table": [{"x": 1.0}]}, {})
+    assert command(tmp_path / "hertz" / "report.md") == ["questions.hertz"]
+
+
+def test_a_question_runs_as_a_command_and_measures_what_it_says():
+    """The patch test is the quickest: its report is exact to rounding.
+
+    It runs in a process, and writes nothing here.
+    """
+    code = (
+        "import runpy, experiments.report as report\nfrom unittest.mock import patch\ndef"
+        " show(name, title, text, tables, figures): print(name, [row for rows in tables.values()"
+        " for row in rows])\nwith patch.object(report, 'write', show):\n   "
+        " runpy.run_module('experiments.questions.patch_test', run_name='__main__')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    name, rows = done.stdout.split(" ", 1)
+    assert name == "patch_test"
+    errors = [
+        value
+        for row in eval(rows, {"np": __import__("numpy")})
+        for value in row.values()
+        if isinstance(value, float)
+    ]
+    assert errors and max(errors) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["accuracy", "calculix"])
+def test_a_question_in_a_folder_is_a_command_too(name):
+    """Its functions may be sent to other processes, which cannot import what stands in __main__."""
+    source = (QUESTIONS / name / "__main__.py").read_text()
+    assert '__name__ == "__main__"' in source and "get_context" not in source
+
+
+def test_the_comparison_without_crossover_goes_without_it():
+    """It patches a name of the package, which may move."""
+    from contactopt import reduce, scenes, solve
+    from experiments.questions.qp_backends import without_crossover
+
+    problem = reduce(scenes.flat_punch(2, elements=8))
+    raw = without_crossover("clarabel", problem)
+    mended = solve(problem, "alternating", normal="clarabel", tangential="clarabel", tol=1e-9)
+    assert mended.solved and abs(raw.reactions - mended.reactions).max() > 1e-14
+
+
+def test_the_picture_of_the_readme_shows_what_its_caption_says():
+    """Computed dots on exact curves, slip and stick named; away from the corners of the curves,
+    where elements blur them.
+    """
+    import numpy as np
+
+    from experiments.questions.contact_picture import picture
+
+    axes = picture().axes[1]
+    assert [text.get_text() for text in axes.texts] == ["slip", "stick", "slip"]
+    pressure, friction, *dots = axes.lines
+    for exact, computed in zip((pressure, friction), dots):
+        x, y = computed.get_data()
+        inside = np.abs(x) < exact.get_xdata().max()
+        expected = np.interp(x, *exact.get_data())
+        assert np.median(np.abs(y - expected)[inside]) < 0.01 * expected.max()
+        assert np.abs(y - expected)[inside].max() < 0.1 * expected.max()
+
+
+def test_questions_stand_in_their_folder():
+    files = {path.name for path in (ROOT / "experiments").glob("*.py")}
+    assert files == {"__init__.py", "report.py"}, "move the question to experiments/questions/"
+
+
+def test_every_command_that_is_named_somewhere_exists():
+    files = [
+        ROOT / "README.md",
+        *ROOT.glob("contactopt/**/*.py"),
+        *ROOT.glob("reports/**/*.md"),
+        *ROOT.glob("docs/**/*.md"),
+    ]
+    named = {
+        (match[1], str(path.relative_to(ROOT)))
+        for path in files
+        for match in re.finditer(
+            r"python -m\s+(experiments(?:\.\w+)+)", path.read_text(encoding="utf-8")
+        )
+    }
+    assert len(named) > 5
+    assert not [(module, path) for module, path in sorted(named) if find_spec(module) is None]
+
+
+def test_what_is_called_exact_of_nearly_symmetric_scenes_is_right():
+    from experiments.questions.simplest import nearly
+
+    checks = [nearly.checked(number) for number in (4, 13, 17, 31, 1, 3)]
+    assert [bool(row["exact"]) for row in checks] == [row["spoilt by"] == 0 for row in checks]
+    assert (
+        max(row["certificate"] for row in checks) < 1e-8
+        and sum(row["wrong"] for row in nearly.table(checks)) == 0
+    )
