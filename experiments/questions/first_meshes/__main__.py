@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from contactopt.readings.quantities import find_quantity
 
 from contactopt import InputError, Scene
 from contactopt.accuracy import refine
+from contactopt.readings.quantities import find_quantity
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.first_meshes.parts import (
