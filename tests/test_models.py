@@ -263,9 +263,7 @@ def test_exported_qp_has_the_same_answer(name, problem):
 
 @pytest.mark.parametrize("problem", ["solid"], indirect=True)
 def test_exported_conic_data_are_the_program(problem):
-    """The cost of random forces, and on which side of the cones they lie, computed from
-    the arrays.
-    """
+    """The cost of random forces, and their side of the cones, computed from the arrays."""
     program = build("acary_cadoux", problem)
     data = models.as_conic(program)
     assert data["zero"] == 1 and data["soc"] == [3] * problem.contacts
