@@ -1,6 +1,4 @@
-"""Blocks that rest on each other: scenes of several bodies whose forces statics alone
-determines.
-"""
+"""Blocks that rest on each other: scenes of bodies whose forces statics alone determines."""
 
 from __future__ import annotations
 

@@ -264,9 +264,7 @@ def test_a_scene_without_a_plate_has_no_approach():
 
 
 def test_a_quantity_of_one_of_several_pairs():
-    """A cylinder on a block, and elsewhere a block on a floor: the cylinder's pressure is
-    Hertz's.
-    """
+    """A cylinder on a block, and elsewhere a block on a floor: its pressure is Hertz's."""
     round_one = scenes.cylinder(mu=0.0, force=30.0)
     mesh = rename(
         tensor_mesh(np.linspace(0, 2, 3), np.linspace(0, 1, 3)), axis="x-", contact="y-", top="y+"

@@ -174,9 +174,7 @@ def rigid_table(gaps, mu=0.3, push=(-100.0, 20.0)):
 @pytest.mark.parametrize("gaps", [(0.0, 0.0, 0.0), (0.5, 0.7, 0.4), (1e-3, 2e-3, 5e-3)])
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
 def test_rigid_bodies_without_any_compliance(gaps, unit):
-    """Statics alone: the forces balance the load, and the legs that bear force stand on
-    the floor.
-    """
+    """Statics alone: the forces balance the load, and legs that bear force stand on the floor."""
     problem = rigid_table(unit * np.array(gaps))
     solution = solve(problem)
     assert solution.solved

@@ -10,9 +10,7 @@ number = st.floats(-10, 10)
 
 @given(st.lists(st.tuples(number, number, number), min_size=1, max_size=5), st.floats(0, 3))
 def test_coulomb_cone_projection_is_characterised_by_moreau(points, mu):
-    """x = P(x) - (P(x) - x) with P in the cone, P(x) - x in its dual, orthogonal: Moreau's
-    theorem.
-    """
+    """Moreau: x = P(x) - (P(x) - x), P(x) in the cone, P(x) - x in its dual, orthogonal."""
     x = np.array(points)
     p = coulomb_cone(x, np.full(len(x), mu))
     rest = p - x

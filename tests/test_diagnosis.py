@@ -61,9 +61,7 @@ def rate(problem: InterfaceProblem, solution: Solution, method, steps: int = 150
 
 
 def test_one_contact_is_exact():
-    """K = [[1, 1.5], [1.5, 4]]: mu* = K_tt / |K_tn| = 2/3, for both iterations and for
-    uniqueness.
-    """
+    """K = [[1, 1.5], [1.5, 4]]: mu* = K_tt / |K_tn| = 2/3, for iterations and uniqueness."""
     report = diagnose(one_contact((-10.0, 1.0), 1.0))
     assert report.exact and report.guaranteed == report.uniform_slip
     assert [
@@ -77,9 +75,7 @@ def test_one_contact_is_exact():
 @pytest.mark.parametrize("name,method", BOTH)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_one_contact_against_the_iterations(name, method, way):
-    """Within 1e-3 of the threshold they change from approaching a slipping solution to
-    leaving it.
-    """
+    """Within 1e-3 of the threshold they cease to approach a slipping solution and leave it."""
     problem = one_contact((0.0, 0.0), 1.0)
     threshold = getattr(diagnose(problem).guaranteed, name)
     for factor in (0.999, 1.001):
@@ -113,9 +109,7 @@ def test_a_plate_that_determines_the_normal_force_leaves_no_threshold():
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("plate", [False, True])
 def test_guarantees_hold(dim, plate):
-    """Below them both iterations converge from rest for any load, and in 2D there is one
-    solution.
-    """
+    """Below them both iterations converge from rest for any load; in 2D one solution exists."""
     rng = np.random.default_rng(0)
     for seed in range(5):
         problem = random_problem(seed, dim, plate)
@@ -152,9 +146,7 @@ def test_uniform_slip_loses_uniqueness_at_its_threshold(plate):
 
 @pytest.mark.parametrize("name,method", BOTH)
 def test_uniform_slip_stops_the_iterations_at_its_threshold(name, method):
-    """Beside a uniformly slipping solution they approach it below the threshold and leave
-    it above.
-    """
+    """Beside a uniformly slipping solution they approach it below the threshold only."""
     problem = reduce(scenes.flat_punch(2, elements=5))
     threshold = getattr(diagnose(problem).uniform_slip, name)
     for factor in (0.999, 1.001):

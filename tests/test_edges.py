@@ -99,9 +99,7 @@ def test_several_patches_add_up():
 
 
 def test_a_zone_that_ends_at_a_corner_on_one_side():
-    """Contact from the end of the surface to 0.4: the half-width is half the distance of
-    the two.
-    """
+    """Contact from the surface's end to 0.4: the half-width is half the distance of the two."""
     x = np.linspace(-1.0, 1.0, 101)
     scene, problem = contact(x[None], "plane-strain", np.full(101, 0.02))
     # zero at .403, its mirror image at -1.597

@@ -1,6 +1,4 @@
-"""Problems of other codes, read where they lie; the files themselves are not part of the
-project.
-"""
+"""Problems of other codes, read where they lie; the files are not part of the project."""
 
 from pathlib import Path
 

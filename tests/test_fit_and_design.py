@@ -111,9 +111,7 @@ def punch(cells=24, mu=0.0, **changes):
 
 
 def test_the_designed_profile_is_the_exact_one_of_uniform_pressure():
-    """Johnson (1985), eq (2.27): a uniform pressure on a strip makes a displacement in
-    closed form.
-    """
+    """Johnson (1985), eq (2.27): displacement under a uniform pressure on a strip."""
     found = contactopt.design(punch(), lambda places: np.eye(places.shape[1]))
     assert found.converged and found.unevenness == pytest.approx(1.0, abs=1e-6)
     x = found.reduction.problem.chart.places[0] / HALF

@@ -271,9 +271,7 @@ def test_levers_are_what_keeps_the_moments():
 
 
 def test_a_gap_of_the_geometry_stays_a_lever():
-    """Friction forces at a large gap act where the surfaces are; the gap closes before
-    they arise.
-    """
+    """Friction at a large gap acts where the surfaces are; the gap closes before it arises."""
     upper, lower = line(grid(4), 1, False, y=lambda x: 0.5 + 0 * x), line(grid(6), 1, True)
     m = mortar(upper, lower)
     assert np.allclose(m.gap, 0.5) and np.abs(m.lever).max() == pytest.approx(1 / 6 / 8)

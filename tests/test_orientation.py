@@ -36,9 +36,7 @@ def plain():
 
 @pytest.mark.parametrize("name,_,R", MOVES, ids=[f"{name}-{how}" for name, how, _ in MOVES])
 def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
-    """Q, q, V, s and the chart in local frames; multipliers are vectors in space and turn
-    with it.
-    """
+    """Q, q, V, s and the chart in local frames; multipliers are vectors that turn with space."""
     a, b = plain[name], reduce_bodies(turned.moved(SCENES[name](), R))
     p, k, dim = a.problem, *a.problem.q.shape
     distance, own = KDTree(b.problem.coordinates.T).query((R @ p.coordinates).T)

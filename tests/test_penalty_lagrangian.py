@@ -56,9 +56,7 @@ def test_regularised_friction_slips_in_proportion_before_the_bound(punch):
 
 
 def test_penalty_helps_where_forces_are_not_unique():
-    """Two nodes at the same place share the load equally; without penalty any share is a
-    solution.
-    """
+    """Two nodes at one place share the load equally; without penalty any share is a solution."""
     Q = np.kron(np.ones((2, 2)), np.eye(2))
     r = solve(InterfaceProblem(Q, [[-1.0, 0.0]] * 2, 0.2), Penalty(1e4)).reactions
     assert np.allclose(r[:, 0], 0.5, atol=1e-4)
@@ -102,9 +100,7 @@ def test_dragged_plate_has_two_multipliers(name):
 
 
 def dragged(mu: float, k: int = 6) -> InterfaceProblem:
-    """A plate pressed with 6 and pulled sideways with 1 on k springs coupled to their
-    neighbours.
-    """
+    """A plate pressed with 6 and pulled sideways with 1 on k springs coupled to neighbours."""
     n = 2 * k
     A = np.random.default_rng(2).normal(size=(n, n))
     V = np.zeros((n, 2))
@@ -159,9 +155,7 @@ def test_settings_without_sense(wrong):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("law", ["cone", "cylinder", "disc"])
 def test_balanced_projection_is_the_nearest_balanced_point(law, dim):
-    """No balanced point of the set is nearer to y: checked against many, made by
-    projecting others.
-    """
+    """No balanced point of the set is nearer to y than it is: checked against many others."""
     rng = np.random.default_rng(0)
     k, step = 7, 0.3
     mu = np.where(np.arange(k) == 0, 0.0, 0.6)

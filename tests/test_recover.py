@@ -110,9 +110,7 @@ EDGES = {
     ("solid", True, "tetra10"), ("solid", False, "hexahedron27"),
 ])  # fmt: skip
 def test_a_quadratic_displacement_is_kept_at_every_node(kind, cut, name, tmp_path):
-    """u_i = x_i^2 (i + 1) + x_0 x_1: its strain is linear, so that stresses are exact at
-    all nodes.
-    """
+    """u_i = x_i^2 (i + 1) + x_0 x_1 has a linear strain: stresses are exact at all nodes."""
     scene = two_blocks(kind)
     mesh = simplices(scene.upper.mesh) if cut else scene.upper.mesh
     scene = replace(scene, degree=2, upper=replace(scene.upper, mesh=mesh))

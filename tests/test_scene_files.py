@@ -1,6 +1,4 @@
-"""Scene files: they say what the Python API says, and every mistake in them is named with
-its line.
-"""
+"""Scene files say what the Python API says, and mistakes in them are named with their line."""
 
 import os
 import tomllib

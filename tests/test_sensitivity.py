@@ -176,9 +176,7 @@ def test_every_form_of_the_operator_gives_the_derivatives_of_the_dense_one(scene
 
 
 def at_kinks(kind, dim, seed):
-    """A problem and its exact solution: contacts 0 to 2 lie on kinks, 3 sticks, 4 slips, 5
-    is open.
-    """
+    """A problem and its solution: contacts 0 to 2 lie on kinks, 3 sticks, 4 slips, 5 is open."""
     rng = np.random.default_rng(seed)
     k = 6
     A = rng.normal(size=(k * dim, k * dim))

@@ -328,9 +328,7 @@ def test_a_contact_in_the_plane_is_told():
 
 
 def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
-    """The plane punch as a solid: its section is across the axis, whose ends are held on
-    rollers.
-    """
+    """The plane punch as a solid: its section is across the axis, with rollers at both ends."""
     plane = punch(force={"x": 1.0, "y": -10.0})
     components = "xyz"
     across = [components[other] for other in range(3) if other != axis]

@@ -1,6 +1,4 @@
-"""Half models stand for the whole, wherever the contact is; answers beyond what is assumed
-say so.
-"""
+"""Half models stand for the whole; answers beyond what is assumed say so."""
 
 import numpy as np
 import pytest
