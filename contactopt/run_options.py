@@ -1,7 +1,7 @@
 """The options of a run, declared once.
 
 contactopt.run takes them as keywords, `contactopt run` as options of the same names, and the table
-[solve] of a scene file as keys.
+[solve] of a scene file as keys, which contactopt.scenes.scene_files reads and checks.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Runs made by worker processes: problems built, methods run, answers certified."""
+"""Runs made by worker processes, each within its limit of time, at which contactopt.benchmark.process
+kills it: problems built, methods run, answers certified.
+"""
 
 from __future__ import annotations
 

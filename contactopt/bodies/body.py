@@ -16,7 +16,7 @@ from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import Weight, contact_trace, make_basis, node_unknowns, weight_at
-from contactopt.bodies.mirror_planes import mirrored_nodes
+from contactopt.bodies.mirrored_nodes import mirrored_nodes
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError

@@ -1,4 +1,6 @@
-"""Planes of symmetry that cut a contact surface, or mirror the bodies of a scene to whole ones."""
+"""Planes of symmetry, recognised by what supports hold or named by the scene: those that cut a
+contact surface, and those across which copies make the bodies whole.
+"""
 
 from __future__ import annotations
 

@@ -37,8 +37,8 @@ from contactopt.checks import check_count, check_number
 from contactopt.coupling.compliance import compliance, filling, operator
 from contactopt.coupling.costs import MOST_EXPLICIT, form_of
 from contactopt.coupling.coupling import Coupling, couple
-from contactopt.coupling.interface_problem import problem_of, signed_map
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
+from contactopt.coupling.problem_of_bodies import problem_of, signed_map
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import each, one_blas_thread

@@ -1,4 +1,5 @@
-"""Planes across which a scene is its own mirror image, and the parts of it that they leave.
+"""Planes across which a whole scene is its own mirror image, and the parts that they leave. Those
+of a scene that is cut already are found in contactopt.coupling.planes_of_symmetry.
 
 The plane lies in the middle between the outermost nodes, across an axis of space or across a
 principal axis of the nodes.
