@@ -1,4 +1,4 @@
-"""The estimated error of a quantity, by body and element, and the elements that are marked for it."""
+"""The estimated error of a quantity, by body and element, and which elements it marks."""
 
 from __future__ import annotations
 

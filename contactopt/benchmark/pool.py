@@ -1,5 +1,5 @@
-"""Runs made by worker processes, each within its limit of time, at which contactopt.benchmark.process
-kills it: problems built, methods run, answers certified.
+"""Runs made by worker processes, each within its limit of time: problems built, methods run,
+answers certified. contactopt.benchmark.process kills a worker at the limit.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ def frame(random: np.random.Generator, dim: int) -> np.ndarray:
 def box(
     random: np.random.Generator, turned: np.ndarray, elements: int, up: bool, width: float
 ) -> object:
-    """A block whose contact surface is at height zero, graded at random, turned about the origin."""
+    """A block whose contact surface lies at height zero, graded at random and turned."""
     dim = len(turned)
     sides = [np.cumsum(np.append(0, random.uniform(0.6, 1.6, elements))) for _ in range(dim - 1)]
     axes = [width * (side / side[-1] - 0.5) for side in sides]
@@ -140,11 +140,11 @@ def summary(rows: list[dict[str, object]]) -> list[dict[str, object]]:
     return table
 
 
-TEXT = """Is a body found that nothing but friction holds? A rigid paraboloid or an elastic body is pressed on an elastic block, along
-the block's normal or inside the friction cone about it. Directions, meshes, materials, units and
-the friction coefficient, from {least:g} to {most:g}, are random. The default method solves {count}
-problems in the plane and as many in space to a certificate of {tol:g}. Times are CPU seconds of one
-thread, the least of {repeats} solves.
+TEXT = """Is a body found that nothing but friction holds? A rigid paraboloid or an elastic body is
+pressed on an elastic block, along the block's normal or inside the friction cone about it.
+Directions, meshes, materials, units and the friction coefficient, from {least:g} to {most:g}, are
+random. The default method solves {count} problems in the plane and as many in space to a
+certificate of {tol:g}. Times are CPU seconds of one thread, the least of {repeats} solves.
 
 {{rows}}
 
