@@ -20,7 +20,7 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import make_scene
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Scene
 
 KINDS = ("scene", "fclib", "family")
 MATERIALS = ("upper_E", "upper_nu", "lower_E", "lower_nu", "stiffness_ratio")
@@ -99,7 +99,7 @@ def scene(name: str, **parameters: Any) -> Scene:
     if not given:
         return made
     bodies = {"upper": made.upper, "lower": made.lower}
-    if not all(isinstance(part, Part) for part in bodies.values()):
+    if len(made.meshed) < len(bodies):
         raise InputError(
             f"scene '{name}' has a rigid body; give its deformable material as arguments of the"
             " scene."

@@ -18,7 +18,7 @@ from pathlib import Path
 from contactopt.cards import count
 from contactopt.checks import check_count
 from contactopt.errors import InputError
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Scene
 
 OUTCOME = "CONTACTOPT_OUTCOME"  # environment variable: the file that takes the exit code of rank 0
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -140,7 +140,7 @@ def check_bodies(scene: Scene, ranks: int) -> None:
     InputError : If there are more ranks than elastic bodies.
     """
     check_count("the number of ranks", ranks)
-    bodies = sum(isinstance(part, Part) for part in scene.parts)
+    bodies = len(scene.meshed)
     if ranks > max(bodies, 1):
         have = f"only {count(bodies, 'elastic body', 'elastic bodies')}"
         raise InputError(

@@ -205,7 +205,7 @@ def spread(scene: Scene, team: Team) -> Scene:
     -------
     The scene with RemotePart in place of the bodies on other ranks.
     """
-    elastic = [part.name for part in scene.parts if isinstance(part, Part)]
+    elastic = list(scene.meshed)
 
     def placed(part: Any) -> Any:
         rank = elastic.index(part.name) % team.size if part.name in elastic else 0

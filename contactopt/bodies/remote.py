@@ -34,7 +34,7 @@ def _sent(scene: Scene, part: Part) -> bytes:
     """Scene and part as their rank needs them: without the meshes of the other bodies."""
 
     def change(other: Any) -> Any:
-        if not isinstance(other, Part):
+        if not other.meshed:
             return other
         without = {} if other.name == part.name else {"mesh": None, "curve": None}
         return Part(**values_of(other) | without)

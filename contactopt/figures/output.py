@@ -17,7 +17,6 @@ from contactopt.outcome import Outcome, squeeze
 from contactopt.problem import alone, part_of
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.contact_fields import contact_fields, on_nodes
-from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
     from contactopt.coupling.back_to_bodies import Fields
@@ -54,7 +53,7 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
     if result.fields:
         picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
         save(picture.figure, "deformed")
-    if any(isinstance(part, HalfSpace) for part in result.scene.parts):
+    if any(part.elastic and not part.meshed for part in result.scene.parts):
         from contactopt.figures.maps import maps_figure
 
         save(maps_figure(result.reduction, result.solution), "maps")

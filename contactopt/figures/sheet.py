@@ -16,7 +16,7 @@ from contactopt.figures.pieces import pieces, surface, triangles
 from contactopt.figures.solids import nearest
 from contactopt.meshes.cells import elements_of
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
-from contactopt.scenes.scene import HalfSpace, Part, Plate, Scene, Traction
+from contactopt.scenes.scene import Plate, Scene, Traction
 
 COLUMNS, ROWS = 60, 24  # of the sketch, at most
 ASPECT = 2.0  # height of a character over its width
@@ -53,9 +53,8 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     kind = f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}"
     lines = [*head, kind, ""]
     meshes = {
-        part.name: part.build_mesh(min(scene.elements, 8), scene.zone)
-        for part in scene.parts
-        if isinstance(part, Part)
+        name: part.build_mesh(min(scene.elements, 8), scene.zone)
+        for name, part in scene.meshed.items()
     }
     if meshes:
         legend = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes))
@@ -122,7 +121,7 @@ def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
             what = "clamped" if held is None else _components(held)
             lines.append(f"  support '{support.boundary}': {what}")
         lines += [f"  {_load(load)}" for load in part.loads]
-    elif not isinstance(part, HalfSpace):
+    elif not part.elastic:
         lines[0] += ": rigid"
     if getattr(part, "force", None):
         lines.append(f"  total force: {_components(part.force)}")

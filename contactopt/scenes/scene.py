@@ -132,6 +132,16 @@ class Scene:
         return self.upper, self.lower
 
     @property
+    def meshed(self) -> dict[str, Part]:
+        """The bodies with meshes, by their names."""
+        return {part.name: part for part in self.parts if isinstance(part, Part)}
+
+    @property
+    def rigid(self) -> dict[str, Rigid]:
+        """The rigid bodies, by their names."""
+        return {part.name: part for part in self.parts if isinstance(part, Rigid)}
+
+    @property
     def pairs(self) -> tuple[Contact, ...]:
         """The pairs of surfaces that may touch."""
         if self.upper is None or self.lower is None or self.mu is None:

@@ -35,11 +35,11 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
     pairs = tuple(pair for pair in scene.pairs if _keeps(pair, whole, images, kept, plane))
     rigid = {name for pair in pairs for name in pair.bodies if name in whole.rigid}
     bodies: list[Any] = []
-    for part in scene.parts:
-        if isinstance(part, Part) and part.name in kept:
-            bodies.append(_half_part(whole, images, part, plane, component))
-        elif isinstance(part, Rigid) and part.name in rigid:
-            bodies.append(_half_rigid(images, part, component))
+    for name in (part.name for part in scene.parts):
+        if name in whole.parts and name in kept:
+            bodies.append(_half_part(whole, images, whole.parts[name], plane, component))
+        elif name in rigid:
+            bodies.append(_half_rigid(images, whole.rigid[name], component))
     made = with_pairs(scene, tuple(bodies), pairs, copies=2 * scene.copies)
     there = {("body", name) for name in kept | rigid} | {("pair", pair.name) for pair in pairs}
     partner = {("body", name): ("body", image) for name, image in images.bodies.items()}

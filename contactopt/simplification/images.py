@@ -154,7 +154,7 @@ class _Condition(NamedTuple):
 def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
     """All of a body."""
     whole = np.eye(len(components))
-    if not isinstance(part, Part):
+    if not part.meshed:
         for what in ("force", "displacement"):
             yield _Condition(what, "", *held_space(components, getattr(part, what) or {}), None)
         normal = np.zeros(len(components)) if part.normal is None else np.array(part.normal, float)

@@ -28,7 +28,7 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.coupling.coupling import Coupling, couple, law_of
 from contactopt.problem.certificate import Yardsticks, yardsticks
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import Rigid, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import NEAR
 from contactopt.solving.solve_scene import Solved
 
@@ -72,8 +72,8 @@ def certificate_of_whole(
         return np.inf
     for each in whole.parts:
         U, F = moves[each.name], forces[each.name]
-        if isinstance(each, Rigid):
-            errors.append(_rigid(whole, each, U, F))
+        if each.name in whole.rigid:
+            errors.append(_rigid(whole, whole.rigid[each.name], U, F))
         else:
             errors.append(_elastic(bodies[each.name].body, U, F))
     return max(errors) if np.all(np.isfinite(errors)) else np.inf
@@ -103,7 +103,7 @@ class Spread:
 
     def displacement(self, each: Any, body: Any) -> np.ndarray:
         """U (n,) of a body of the whole; of a rigid one its translation, then zeros."""
-        if isinstance(each, Rigid):
+        if not each.meshed:
             dim = len(body.components)
             key, _, turns = self.folded(("body", each.name), np.zeros((dim, 1)))
             U = self.displaced[key[1]]

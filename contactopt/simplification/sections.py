@@ -17,7 +17,7 @@ import numpy as np
 import skfem
 from scipy.spatial import KDTree
 
-from contactopt.scenes.scene import BodyForce, Plate, Rigid, Scene
+from contactopt.scenes.scene import BodyForce, Plate, Scene
 from contactopt.simplification.constants import NEAR, ROUNDED
 from contactopt.simplification.findings import Simplification
 from contactopt.simplification.images import equal_functions
@@ -156,7 +156,7 @@ def _flattened(prism: _Prism) -> Scene:
         return lambda x: function(prism.lift(x))[axes]
 
     def part_of(part: Any) -> Any:
-        if isinstance(part, Rigid):
+        if not part.meshed:
             normal = None if part.normal is None else tuple(part.normal[axis] for axis in axes)
             given = {"force": values(part.force), "displacement": values(part.displacement)}
             return replace(part, normal=normal, gap=below(part.gap), **given)

@@ -27,12 +27,12 @@ class Whole:
     @cached_property
     def parts(self) -> dict[str, Part]:
         """The elastic bodies by their names."""
-        return {part.name: part for part in self.scene.parts if isinstance(part, Part)}
+        return self.scene.meshed
 
     @cached_property
     def rigid(self) -> dict[str, Rigid]:
         """The rigid bodies by their names."""
-        return {part.name: part for part in self.scene.parts if isinstance(part, Rigid)}
+        return self.scene.rigid
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -108,15 +108,16 @@ def lattice_points(corners: np.ndarray) -> np.ndarray:
 
 def has_meshes(scene: Scene) -> bool:
     """Whether all bodies are elastic with meshes, or rigid."""
-    return all(isinstance(part, (Part, Rigid)) for part in scene.parts)
+    return len(scene.meshed) + len(scene.rigid) == len(scene.parts)
 
 
 def whole_of(scene: Scene) -> Whole:
     """The scene with its meshes."""
-    parts = [part for part in scene.parts if isinstance(part, Part)]
-    meshes = {part.name: part.build_mesh(scene.elements, scene.zone) for part in parts}
-    for part in parts:
-        check_mesh(scene, part, meshes[part.name])
+    meshes = {
+        name: part.build_mesh(scene.elements, scene.zone) for name, part in scene.meshed.items()
+    }
+    for name, part in scene.meshed.items():
+        check_mesh(scene, part, meshes[name])
     return Whole(scene, meshes)
 
 
