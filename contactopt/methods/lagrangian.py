@@ -49,7 +49,7 @@ class Lagrangian(TwoStage):
         return Normal(problem, pushes, True), Tangential(problem, ~pushes, False)
 
 
-class Part(Components):
+class Subproblem(Components):
     """Normal or tangential components, and how each of them is solved for."""
 
     def __init__(self, problem: InterfaceProblem, own: np.ndarray, normal: bool):
@@ -57,7 +57,7 @@ class Part(Components):
         self.step = 1 / eigenvalue_bound(self.Q)
 
 
-class Normal(Part):
+class Normal(Subproblem):
     """The normal QP."""
 
     def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
@@ -69,7 +69,7 @@ class Normal(Part):
         return np.concatenate([r_n, r[:, 1:]], axis=1), own
 
 
-class Tangential(Part):
+class Tangential(Subproblem):
     """The tangential program, until a step moves r_t by no more than `accuracy` of its size: a
     hundredth of what the last solve moved it.
     """

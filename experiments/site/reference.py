@@ -31,7 +31,6 @@ Pages = Iterator[tuple[Path, str | Path]]
 ROOMS = {
     "cli": "The command line reads the options and prints what `run` returns.",
     "runner": "One call leads from a scene to its solution, its figures and its files.",
-    "result": "What a run returns: the solution, its problem, the fields of the bodies.",
     "benchmark": (
         "Campaigns run methods on problems, each run in a process of its own, and write tables and"
         " reports."
