@@ -220,8 +220,10 @@ assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 #
 # **The iteration fails.** With $\mu = 1.5$ the node still has exactly one solution, and slips to
 # the right. In Tresca's iteration the new normal force is $r_n = 3 - g$, and the next bound is $\mu
-# (3 - g)$. So every iteration multiplies an error of the bound by $-\mu$. For $\mu > 1$ the error
-# grows.
+# (3 - g)$, as long as the node slips. So every iteration multiplies a small error of the bound by
+# $-\mu$. For $\mu > 1$ a small error grows. It does not grow for ever: as soon as the bound is
+# larger than 2 N, the node sticks with $r_n = 1$ N, whatever the bound is. So the iteration ends in
+# a cycle, in which the node slips and sticks in turn.
 
 # %%
 much, g, history = 1.5, 1.0, []
@@ -238,7 +240,38 @@ ax.legend(frameon=False)
 
 assert len(exact) == 1 and np.allclose(exact[0].reactions, [[1.2, -1.8]])
 assert abs(history[-1] - 1.2) > 0.1  # it has not converged
+assert np.isclose(min(history), 1.0, atol=1e-4)  # it sticks in every second iteration
 assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
+
+# %% [markdown]
+# **The shift can fail, too.** Let the node slip to the right. On the edge of the cone $r_t = -\mu
+# r_n$, and the minimum along this edge is $r_n = (-q_n + \mu q_t - \mu \sigma) / d$ with $d = Q_{nn}
+# - 2 \mu Q_{nt} + \mu^2 Q_{tt}$. So an error of $\sigma$ comes back multiplied by
+#
+# $$ \frac{\mu\, (\mu Q_{tt} - Q_{nt})}{Q_{nn} - 2 \mu Q_{nt} + \mu^2 Q_{tt}} . $$
+#
+# This factor is below $+1$ exactly if $\mu Q_{nt} < Q_{nn}$, which is also the condition of a
+# unique solution. So strong friction alone does no harm: for our node, with $Q_{nt} = -1$, the
+# factor stays between 0 and 1 for every $\mu$. But if the directions are nearly parallel, $Q_{nt}^2 >
+# \tfrac89 Q_{nn} Q_{tt}$, the factor falls below $-1$ for some coefficients. Then the iteration runs
+# in a cycle, although the solution is unique.
+
+# %%
+coupled, pulled, friction = np.array([[1.0, 0.99], [0.99, 1.0]]), np.array([-0.307, 0.71]), 0.7
+f, sigma = cp.Variable(2), cp.Parameter(nonneg=True, value=0.9)
+energy = cp.quad_form(f, cp.psd_wrap(coupled)) / 2 + pulled @ f + friction * sigma * f[0]
+program, slips = cp.Problem(cp.Minimize(energy), [cp.SOC(friction * f[0], f[1:])]), []
+for _ in range(12):
+    program.solve(solver=cp.CLARABEL)
+    sigma.value = abs(float((coupled @ f.value + pulled)[1]))
+    slips.append(sigma.value)
+(only,) = all_solutions(InterfaceProblem(coupled, [pulled], friction))
+right = (coupled @ only.reactions[0] + pulled)[1]
+print(f"slip of the only solution {right:.3f} mm; of the iteration", np.round(slips[-4:], 3))
+
+bottom = 1.0 - 2 * friction * 0.99 + friction**2
+assert friction * (friction - 0.99) / bottom < -1 and np.isclose(right, 1.0)
+assert min(np.abs(np.array(slips[-4:]) - right)) > 0.1  # it has not converged
 
 # %% [markdown]
 # **Uniqueness fails.** If the node slips to the *left*, friction pushes it to the right with $r_t =
@@ -266,7 +299,7 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # |---|---|---|
 # | Tresca's iteration | the box program, again and again | $\mu$ times the coupling $\lvert Q_{nt} \rvert / Q_{nn}$ exceeds 1 while the node slips |
 # | cone program | associated friction | the node slips: then it is another law |
-# | Acary and Cadoux | the cone program with a shift, again and again | friction is strong; there is no proof of convergence |
+# | Acary and Cadoux | the cone program with a shift, again and again | the factor below exceeds 1; for many nodes there is no proof of convergence |
 #
 # ## Exercises
 #

@@ -22,8 +22,10 @@ from contactopt.teaching import Slider, check
 # ## The mechanical system
 #
 # A plate presses a rubber block, 40 mm wide and 40 mm high, on a foundation of the same rubber with
-# 100 N. Under the load both bodies spread sideways, the foundation less than the block. Friction
-# resists the difference. The system is symmetric, so we model its right half.
+# 100 N. Under the load the lower edge of the block moves outwards. The surface of the foundation
+# moves the other way: below a pressure the surface of a wide body is drawn inwards, towards the
+# middle of the load. Friction resists the difference. The system is symmetric, so we model its right
+# half.
 #
 # The normal $n$ points out of the foundation, upwards. The tangent $t$ points to the right, which
 # is outwards. $r$ is the force on the block. The vectors $u$, $r$ and $q$ hold the components of
@@ -213,8 +215,10 @@ errors = [solve(problem, "penalty", factor=10.0**j).residual for j in (1, 2, 3)]
 assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 # %% [markdown]
-# A chart like this one compares methods fairly. It asks: *how long does each method take to reach
-# the same certificate?* The times are those of the machine that drew the figure.
+# A chart like this one asks the right question: *how long does each method take to reach the same
+# certificate?* Every point is one run on the machine that drew the figure, so that small
+# differences of time say nothing. A fair comparison repeats each run, and uses many problems, as
+# `contactopt bench` does.
 #
 # ## What more friction does
 #
@@ -255,9 +259,9 @@ Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=
 #
 # | method | it fails if |
 # |---|---|
-# | Tresca's iteration | friction is strong: an error grows from step to step (chapter 2) |
+# | Tresca's iteration | friction is strong: a small error grows from step to step (chapter 2) |
 # | Newton on the states | the states repeat in a cycle, which happens for strong friction or a singular $Q$ |
-# | cones with a shift | friction is strong; there is no proof of convergence |
+# | cones with a shift | the coupling of normal and tangential directions is strong (chapter 2); there is no proof of convergence |
 # | penalty | an exact answer is asked for: its error is proportional to $1 / \kappa$ |
 # | any method | the load cannot be balanced: there is no solution |
 

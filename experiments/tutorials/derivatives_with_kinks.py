@@ -145,9 +145,10 @@ assert not np.allclose(more, -less)  # a derivative would be linear in the direc
 #   program**.
 # - The conditions of the follower, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$ and so on, can be
 #   written as constraints of the leader. Then the whole is a **mathematical program with
-#   equilibrium constraints**, an MPEC. It is awkward for solvers of nonlinear programs. At a point
-#   with $u_n = r_n = 0$ the gradients of these constraints are not independent, and multipliers
-#   need not exist.
+#   equilibrium constraints**, an MPEC. It is awkward for solvers of nonlinear programs. At *every*
+#   feasible point the gradients of the active constraints are dependent: where $r_n > 0$, for
+#   instance, $u_n \ge 0$ is active, and the gradient of $u_n r_n$ is $r_n$ times that of $u_n$. So
+#   multipliers need not exist, and those that exist are not unique.
 # - We take a third way. A contact solver answers for the follower, with a certificate, and we use
 #   the derivative of its answer. This is called *implicit programming*. The leader then minimises a
 #   function with kinks.

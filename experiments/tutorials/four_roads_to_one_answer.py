@@ -21,7 +21,8 @@ from contactopt import diagnose, natural_map_residual, reduce, scenes, solve
 # A block, 40 mm wide and 40 mm high, is pressed on a foundation of the same rubber with 100 N. It
 # is symmetric, so we model its right half. The normal $n$ points up, out of the foundation. The
 # tangent $t$ points to the right, which is outwards. $r$ is the force on the block. Under the load
-# both surfaces stretch, but not equally, and friction resists the difference. With $\mu = 0.2$
+# the lower edge of the block moves outwards, and the surface of the foundation is drawn inwards.
+# Friction resists the difference. With $\mu = 0.2$
 # about half of the nodes slip.
 
 # %%
@@ -74,8 +75,9 @@ _ = ax.legend(frameon=False)
 #
 # Can we know the slope of the straight lines beforehand? Near the solution the iteration is a
 # linear map. Change the normal forces a little; the friction forces of the slipping nodes change,
-# and in turn the normal forces change. This map is called the *slip map*, and its largest
-# eigenvalue is the factor. `diagnose` computes it.
+# and in turn the normal forces change. Each of the two iterations has its own map of this kind. The
+# largest modulus of its eigenvalues is the factor. `diagnose` computes both. (The maps exist where no
+# node is between two states.)
 
 # %%
 local = diagnose(problem, answers["newton"]).local

@@ -1,7 +1,8 @@
 # %% [markdown]
 # # 5. When friction has no solution, two or three
 #
-# A problem of elasticity has one solution, and so has contact without friction. With friction this
+# A problem of elasticity has one solution if the bodies are supported, and so has contact without
+# friction. With friction this
 # need not be so. This tutorial shows problems with a single contact that have three solutions,
 # exactly two, and none at all. It also shows a method that runs in circles although there is
 # exactly one solution. And it shows the tools that tell you all this before you solve.
@@ -140,8 +141,8 @@ assert count == {0.6: 1, 0.7: 1, 0.8: 2, 0.9: 3}
 # At $\mu = 0.8$ there are *exactly two* solutions: in one of them the node is open, and in the
 # other it sticks with all the friction that there is. For a larger $\mu$ this solution splits into
 # two, one with stick and one with slip. Such a border case is an exception. For all data but
-# exceptional ones the number of solutions is *odd*, as long as $Q$ is positive definite, because
-# solutions appear and disappear in pairs. Loads drawn at random show this.
+# exceptional ones the number of solutions is *odd*, as long as $Q$ is positive definite and no body
+# is free to move, because solutions appear and disappear in pairs. Loads drawn at random show this.
 
 # %%
 random = np.random.default_rng(0)
@@ -181,7 +182,8 @@ _ = ax.legend(frameon=False)
 #
 # For many contacts no such formula is known. `diagnose` then gives two bounds: a coefficient below
 # which the solution is *guaranteed* to be unique for every load, and a coefficient at which some
-# load has several. Between the two bounds `diagnose` makes no statement.
+# load has several. Between the two bounds `diagnose` makes no statement. If a plate can move along
+# the surface, nothing is guaranteed, and the first bound is zero.
 #
 # ## One solution, and a method that runs in circles
 #
@@ -255,7 +257,8 @@ for remedy in (half_steps, newton):
 # %% [markdown]
 # ## No solution
 #
-# If $Q$ is positive definite there is always a solution. So let $Q$ be singular, and consider a
+# If $Q$ is positive definite and no body is free to move, there is always a solution. So let $Q$ be
+# singular, and consider a
 # piston in a rigid guide at 45 degrees. It can move up and to the right at the same time, or down
 # and to the left, and in no other way: $Q = m m'$ with $m = (1, 1)$. The floor below it rises by 1
 # mm, so that $q = (-1, 0)$. The piston has to give way and moves up in its guide. So it slips over
@@ -284,7 +287,7 @@ assert not jammed.solved and jammed.residual > 0.1
 # %% [markdown]
 # No method finds a solution that does not exist, and the certificate shows this. The model is at
 # fault, because nothing is perfectly rigid. Let the guide give way a little, with the compliance
-# $\varepsilon$. Now $Q$ is positive definite, and a solution exists. For $\mu = 2$ the piston
+# $\varepsilon$. Now $Q$ is positive definite, nothing is free to move, and a solution exists. For $\mu = 2$ the piston
 # sticks: it is wedged in the guide with a force of about $1 / (2 \varepsilon)$.
 
 # %%
@@ -298,6 +301,23 @@ ax.legend(frameon=False)
 
 assert np.isclose(force[0], 1 / (2 * gives[0]), rtol=0.01)
 assert len(all_solutions(piston(2.0, give=1e-2))) == 1
+
+# %% [markdown]
+# A positive definite $Q$ is not enough if something can move freely. Let a node with $Q = I$ hang on
+# a slide that runs along the floor, and pull the slide with 0.5 N. In our letters $V = (0, 1)'$ and
+# $s = 0.5$, so that the balance $V' r + s = 0$ asks for $r_t = -0.5$ N. With $\mu = 0.3$ the cone
+# then asks for $r_n \ge 1.67$ N. But the node overlaps the floor by 1 mm only, $q = (-1, 0)$. The
+# gap would be $u_n = r_n - 1 \ge 0.67$ mm, and an open contact carries no force. The cone contains
+# forces that hold the slide; the contact cannot make them.
+
+# %%
+dragged = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3, [[0.0], [1.0]], [0.5])
+answer = solve(dragged)
+print(f"slide: {answer.status}, certificate {answer.residual:.2f}")
+
+assert not answer.solved and answer.residual > 0.1
+held = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.6, [[0.0], [1.0]], [0.5])
+assert np.allclose(solve(held).reactions, [[1.0, -0.5]])  # with more friction there is a solution
 
 # %% [markdown]
 # ## Exercises

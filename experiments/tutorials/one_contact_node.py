@@ -226,8 +226,8 @@ assert np.isclose(u[0], mu * abs(u[1]), atol=1e-5)
 # %% [markdown]
 # Look at the gap. The node slips and presses on the floor, and yet it floats above the floor by
 # $\mu |u_t|$. The minimum over the cone obeys another law, *associated friction*, in which a
-# contact that slips also opens. This program is convex, so it always has an answer, but the answer
-# is not Coulomb's. (We have left the shift in the cost at zero.)
+# contact that slips also opens. The program is convex, and $Q$ is positive definite, so it has exactly one
+# answer. But the answer is not Coulomb's. (We have left the shift in the cost at zero.)
 #
 # Acary and Cadoux found the cure: we shift the gap by exactly what the cone adds to it. With $s =
 # |u_t|$ and the term $\mu s\, r_n$ added to the cost, the optimality condition becomes $u_n + \mu s

@@ -146,9 +146,11 @@ ax.set(xlabel="number of the wave [-]", ylabel="what the preconditioner multipli
 _ = ax.legend(frameon=False)
 
 # %% [markdown]
-# All of them follow the dashed line within a constant factor, and no more is needed. If $c_1 |\xi|
-# \le$ symbol $\le c_2 |\xi|$, then the condition number of $P Q$ is at most about $c_2 / c_1$ on
-# every mesh. This is what *spectrally equivalent* means.
+# All of them follow the dashed line within a constant factor. On a closed curve, where waves are the
+# eigenvectors of both $P$ and $Q$, no more is needed: if $c_1 |\xi| \le$ symbol $\le c_2 |\xi|$,
+# then the condition number of $P Q$ is at most about $c_2 / c_1$ on every mesh. This is what
+# *spectrally equivalent* means. Our contact has ends, where waves are not eigenvectors. What the
+# ends do is shown below.
 #
 # ## Count
 
