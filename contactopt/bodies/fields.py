@@ -77,7 +77,7 @@ class Validity(NamedTuple):
 
     imbalance  sum of the nodal forces that nothing balances, relative to that of all forces on the
                body
-    strain     largest principal strain, and rotation  largest rotation [rad], of the mean of an
+    strain     largest principal strain, and rotation  largest rotation [rad], in the middle of an
                element
     moved      largest displacement [length]
     """
