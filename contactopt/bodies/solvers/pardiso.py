@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import weakref
-from functools import cached_property
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 
+# iparm: own settings; METIS; perturbed pivots; scaling, which symmetric definite matrices go without
+SETTINGS = {1: 1, 2: 2, 10: 13, 21: 1}
+FACTORISE, SOLVE = 12, 33  # phases
+
 
 class PardisoSolver(BodySolver):
     """Cholesky factors of oneMKL PARDISO in its own nested dissection order (pip install
     pypardiso).
+
+    One factorisation gives both the factors and the Schur complement of the unknowns `trailing`,
+    which are eliminated last (iparm(36) = 2, perm = 1 at these unknowns).
     """
 
     name = "pardiso"
@@ -30,32 +37,32 @@ class PardisoSolver(BodySolver):
             ) from error
         super().__init__(system)
         library()  # so that pypardiso need not search for it
+        trailing = np.zeros(0, int) if self.trailing is None else self.trailing
+        m = len(trailing)
         self.upper = sp.triu(system.A, format="csr")
-        self.factors = PyPardisoSolver(mtype=2)  # real, symmetric positive definite
-        self.factors.factorize(self.upper)
+        self.upper.sort_indices()
+        self.factors = PyPardisoSolver(mtype=2, phase=FACTORISE)  # symmetric positive definite
         # MKL's memory is not Python's
         weakref.finalize(self, self.factors.free_memory, everything=True)
+        for index, value in (SETTINGS | ({36: 2} if m else {})).items():
+            self.factors.set_iparm(index, value)
+        self.factors.perm = np.zeros(self.n, dtype=np.int32)
+        self.factors.perm[trailing] = 1
+        # what comes back is the Schur complement, in the order of the sorted unknowns
+        schur = self.factors._call_pardiso(self.upper, np.zeros((m, m) if m else (self.n, 1)))
+        triangle = la.cholesky(schur.T, lower=True, overwrite_a=True) if m else np.zeros((0, 0))
+        self._triangle = triangle, np.argsort(np.argsort(trailing))
+        self.factors.set_phase(SOLVE)
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         if not load.size:
             return np.zeros(load.shape)
-        return np.asarray(self.factors.solve(self.upper, np.asfortranarray(load, dtype=float)))
+        # the public method of pypardiso compares the whole matrix with that of the factors
+        return np.asarray(
+            self.factors._call_pardiso(self.upper, np.asfortranarray(load, dtype=float))
+        )
 
-    @cached_property
+    @property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray]:
-        """A second factorisation, which stops before these unknowns, leaves it."""
-        from pypardiso import PyPardisoSolver
-
-        trailing = self._asked()
-        if not len(trailing):
-            return np.zeros((0, 0)), np.zeros(0, int)
-        partial = PyPardisoSolver(mtype=2, phase=12)
-        # own values; METIS; defaults; Schur complement
-        for index, value in {1: 1, 2: 2, 10: 13, 21: 1, 36: 1}.items():
-            partial.set_iparm(index, value)
-        partial.perm = np.zeros(self.n, dtype=np.int32)
-        partial.perm[trailing] = 1
-        # the Schur complement in the order of the sorted unknowns
-        S = partial._call_pardiso(self.upper, np.zeros((len(trailing), len(trailing))))
-        partial.free_memory(everything=True)
-        return np.linalg.cholesky(S), np.argsort(np.argsort(trailing))
+        self._asked()
+        return self._triangle

@@ -133,8 +133,8 @@ class BodySolver(ABC):
         at, triangle = self._asked(), self.trailing_triangle
         if triangle is not None:
             R, place = triangle
-            X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
-            C = X.T @ X  # NumPy keeps it symmetric
+            C, _ = la.lapack.dpotri(R, lower=True)  # its lower triangle
+            C = np.tril(C) + np.tril(C, -1).T
             return np.asarray(C[np.ix_(place, place)])
         C = np.empty((len(at), len(at)))
         for start in range(0, len(at), COLUMNS):
