@@ -12,8 +12,7 @@ from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 
-# iparm: own settings; METIS; perturbed pivots; scaling, which symmetric definite matrices go without
-SETTINGS = {1: 1, 2: 2, 10: 13, 21: 1}
+SETTINGS = {1: 1, 2: 2}  # iparm: own settings; nested dissection by METIS
 FACTORISE, SOLVE = 12, 33  # phases
 
 
