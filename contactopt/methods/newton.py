@@ -111,10 +111,12 @@ class Newton(Method):
         last, rtol = np.inf, KRYLOV_FIRST
         while True:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
-            sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
+            Q = loosened(problem.Q, SHARP * aim)
+            sharp = equations if Q is problem.Q else replace(equations, Q=Q)
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            displacements = partial(sharp.displacements, r, multipliers)
-            change = settled(sharp, problem.law, r, D, displacements)
+            change = settled(
+                sharp, problem.law, r, D, partial(sharp.displacements, r, multipliers)
+            )
             if change is not None:
                 multipliers = multipliers + change
                 residual, error, balance, D = sharp.evaluate(r, multipliers)

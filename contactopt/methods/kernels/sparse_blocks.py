@@ -10,13 +10,12 @@ factors.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
@@ -41,6 +40,43 @@ class Solver:
         return self.apply(right)
 
 
+def assembled(
+    Q: np.ndarray, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray
+) -> np.ndarray:
+    """Write the rows and columns `kept` (n,), of whole contacts or not, of diag(left) Q +
+    diag(added) as an array of its own; left, added (k, d, d). left None stands for the identity.
+    """
+    k, d = added.shape[:2]
+    used = kept.reshape(k, d).any(axis=1)
+    if not used.all():  # only their contacts, then only their components
+        rows = np.flatnonzero(np.repeat(used, d))
+        Q, added, kept = Q[np.ix_(rows, rows)], added[used], kept[rows]
+        left, k = None if left is None else left[used], len(added)
+    n = k * d
+    A = Q.copy() if left is None else (left @ Q.reshape(k, d, n)).reshape(n, n)
+    own = np.arange(k)
+    A.reshape(k, d, k, d)[own, :, own, :] += added
+    return A if kept.all() else A[np.ix_(kept, kept)]
+
+
+def factorised(A: np.ndarray) -> Solver | None:
+    """The solver with an array A (n, n), which is overwritten; None if A is singular.
+
+    The transpose of an array in rows is what LAPACK factorises in place.
+    """
+    if not len(A):
+        return Solver(lambda right: right, lambda: 1.0)
+    lu, swapped, info = dgetrf(np.ascontiguousarray(A).T, overwrite_a=True)
+    if info:
+        return None
+
+    def sign() -> float:
+        swaps = np.count_nonzero(swapped != np.arange(len(lu)))
+        return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
+
+    return Solver(lambda right: np.asarray(dgetrs(lu, swapped, right, trans=1)[0]), sign)
+
+
 class DenseBlocks:
     """Q (n, n) as an array, blocks of d."""
 
@@ -53,26 +89,7 @@ class DenseBlocks:
 
         left None stands for the identity.
         """
-        k, d, n = len(added), self.d, len(self.Q)
-        A = self.Q.copy() if left is None else (left @ self.Q.reshape(k, d, n)).reshape(n, n)
-        diagonal = np.arange(k)
-        A.reshape(k, d, k, d)[diagonal, :, diagonal, :] += added
-        A = A if kept.all() else A[np.ix_(kept, kept)]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
-            try:
-                factors = la.lu_factor(A, overwrite_a=True, check_finite=False)
-            except (la.LinAlgError, ValueError):
-                return None
-        lu, swapped = factors
-
-        def sign() -> float:
-            swaps = np.count_nonzero(swapped != np.arange(len(lu)))
-            return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
-
-        return Solver(
-            lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign
-        )
+        return factorised(assembled(self.Q, left, added, kept))
 
 
 class SparseBlocks:

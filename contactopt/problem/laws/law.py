@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from contactopt.checks import real_array
 from contactopt.errors import InputError
-from contactopt.problem.cones import unit
+from contactopt.problem.cones import lengths, unit
 from contactopt.problem.laws.place import Place
 
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
@@ -85,7 +86,7 @@ class Law:
         """(k,) least normal force [force]: 0 where a contact may open, -inf where it cannot."""
         return np.zeros(self.contacts)
 
-    @property
+    @cached_property
     def unilateral(self) -> bool:
         """Whether every contact may open."""
         return bool(np.all(self.lowest == 0))
@@ -186,6 +187,10 @@ class Law:
         """
         return self.nearest_derivative(y, y[:, 0])
 
+    def mapped(self, y: np.ndarray) -> np.ndarray:
+        """P(y) (k, dim) of `project` alone."""
+        return self.project(y)[0]
+
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
         """Differentiate `project` by the law's parameter at each contact.
 
@@ -215,7 +220,7 @@ class Law:
         Two masks (k,).
         """
         normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
-        slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound_along(y)
+        slack = lengths(y[:, 1:]) - self.bound_along(y)
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
@@ -296,7 +301,7 @@ class Law:
         (k,) mask.
         """
         return self.pressed(r) & (
-            np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound_along(r)
+            lengths(r[:, 1:]) < (1 - BELOW) * self.bound_along(r)
         )
 
     def scaled(self, force: float) -> Self:
