@@ -4,19 +4,21 @@ proximal loop.
 0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
    falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
-   force at all) while its residual falls. Elastic bodies end here. Where its
-   sortings go round in a circle near a solution, a few proximal steps break out of it.
-2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
+   force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
+   circle near a solution, a few proximal steps break out of it.
+2. Where Q is sparse and singular: the proximal loop, as long as its subproblems are easy and each
+   of them halves the residual.
+3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-3. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
+4. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
    linear systems of it.
-4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
-5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early
-   says nothing of the next; then the proximal loop from the best of all points, its weight falling
-   slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved the
-   residual, the same again on other paths, with twice the patience.
-6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
+5. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
+6. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
+   early says nothing of the next; then the proximal loop from the best of all points, its weight
+   falling slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved
+   the residual, the same again on other paths, with twice the patience.
+7. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
@@ -42,6 +44,7 @@ from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.constants import (
     CLOSE,
     CONE_PROGRAMS,
+    EAGER_ALPHA,
     FEW_ENTRIES,
     GENTLE_ALPHA,
     LARGER,
@@ -53,6 +56,7 @@ from contactopt.methods.constants import (
     POLISH,
     PROGRESS,
     ROUND,
+    SMALL,
     SPARSE_ROUND,
     TURNING,
 )
@@ -65,7 +69,7 @@ from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
-from contactopt.methods.proximal import Proximal, proximal_iterates
+from contactopt.methods.proximal import EAGER, GENTLE, STEADY, Pace, Proximal, proximal_iterates
 from contactopt.problem import InterfaceProblem, infeasibility
 
 logger = logging.getLogger(__name__)
@@ -104,7 +108,10 @@ class Auto(Method):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        loose = sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q))
+        sparse = sp.issparse(problem.Q)
+        if sparse and problem.q.size <= SMALL:
+            problem = problem.altered(Q=problem.Q.toarray())
+        loose = sparse and not (problem.symmetric and definite(problem.Q))
         if loose:
             reached = start or at_rest(problem)
         else:
@@ -123,7 +130,7 @@ class Auto(Method):
                     return
                 reached = yield from _newton(problem, None, None)  # its steps are exact now
             note(logger, NO_PROGRESS)
-        yield from _Robust(problem).iterates(start, reached)
+        yield from _Robust(problem, loose).iterates(start, reached)
 
 
 class _Robust:
@@ -133,9 +140,9 @@ class _Robust:
     given.
     """
 
-    def __init__(self, problem: InterfaceProblem):
+    def __init__(self, problem: InterfaceProblem, loose: bool):
         self.problem, self.matrix = problem, block_matrix(problem.Q, problem.dim)
-        self.sparse = sp.issparse(problem.Q)
+        self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
 
@@ -147,9 +154,11 @@ class _Robust:
         self, start: Iterate | None, reached: Iterate
     ) -> Generator[Iterate | Known, None, None]:
         problem = self.problem
-        if self.sparse and start is not None:
+        if self.loose and start is not None:
             reached = yield from self.proximal(start, POLISH, LEAST_ALPHA)
-        elif not self.sparse:
+        elif self.loose:
+            reached = yield from self.proximal(reached, 1, EAGER_ALPHA, EAGER)
+        else:
             residual = coulomb_equations(problem).evaluate(*reached)[0]
             if residual <= NEARBY * np.linalg.norm(reached[0]):
                 reached = yield from self.proximal(reached, 1, LEAST_ALPHA, aim=residual / 2)
@@ -162,9 +171,9 @@ class _Robust:
         if self.conic:
             turning = homotopy_iterates(problem, self.matrix, TURNING)
             reached = yield from self.interior(reached, turning)
-            if problem.symmetric and not self.sparse:
+            if problem.symmetric and not self.loose:
                 reached = yield from self.cones(reached)
-        yield from self.jammed(reached) if self.sparse else self.restarted(reached)
+        yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
     def restarted(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Without end: the proximal loop from `reached`, and then from random forces."""
@@ -191,7 +200,7 @@ class _Robust:
                 points = interior_iterates(problem, matrix, path)
                 reached = yield from self.interior(reached, points)
             patience = SPARSE_ROUND * 2**restarts
-            last = yield from self.proximal(reached, patience, GENTLE_ALPHA, gentle=True)
+            last = yield from self.proximal(reached, patience, GENTLE_ALPHA, GENTLE)
             reached = self.better(reached, last)
             note(logger, NO_PROGRESS_JAMMED)
 
@@ -221,14 +230,19 @@ class _Robust:
         return self.better(start, reached)
 
     def proximal(
-        self, start: Iterate, patience: int, alpha: float, gentle: bool = False, aim: float = np.inf
+        self,
+        start: Iterate,
+        patience: int,
+        alpha: float,
+        pace: Pace = STEADY,
+        aim: float = np.inf,
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns
         the last. `aim` is the residual that the first of these rounds must reach.
         """
         equations = coulomb_equations(self.problem)
         best, target, point = np.inf, aim, start
-        iterates = proximal_iterates(self.problem, self.matrix, start, alpha, gentle)
+        iterates = proximal_iterates(self.problem, self.matrix, start, alpha, pace)
         for done, point in enumerate(iterates, start=1):
             try:
                 yield point

@@ -114,9 +114,7 @@ class Newton(Method):
             Q = loosened(problem.Q, SHARP * aim)
             sharp = equations if Q is problem.Q else replace(equations, Q=Q)
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            change = settled(
-                sharp, problem.law, r, D, partial(sharp.displacements, r, multipliers)
-            )
+            change = settled(sharp, problem.law, r, D, partial(sharp.displacements, r, multipliers))
             if change is not None:
                 multipliers = multipliers + change
                 residual, error, balance, D = sharp.evaluate(r, multipliers)

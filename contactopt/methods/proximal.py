@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.methods.constants import (
+    EAGER_STEPS,
     EASY,
     FALL,
     GENTLE_FALL,
@@ -35,6 +36,23 @@ from contactopt.problem import InterfaceProblem
 
 # of the proximal term; where even the largest fails, the loop ends
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
+
+
+class Pace(NamedTuple):
+    """How the weight changes: it falls by a factor after a subproblem that took few steps, and
+    rises by another one after a subproblem that was not solved in the most steps.
+    """
+
+    fall: float
+    rise: float
+    few: int
+    most: int = SUBPROBLEM_STEPS
+
+
+STEADY = Pace(FALL, RISE, SUBPROBLEM_STEPS)
+# few subproblems fail: for problems on which every smaller weight soon fails
+GENTLE = Pace(GENTLE_FALL, GENTLE_RISE, EASY)
+EAGER = Pace(FALL, np.inf, EAGER_STEPS, EAGER_STEPS)  # ends with the first that is not easy
 
 
 @dataclass(frozen=True)
@@ -61,23 +79,19 @@ class Proximal(Method):
 
 
 def proximal_iterates(
-    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, gentle: bool = False
+    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, pace: Pace = STEADY
 ) -> Iterator[Iterate]:
     """The solution of one proximal subproblem after another, or of a failed one the point that
     Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
 
-    `alpha` is the first weight of the proximal term. It changes slowly if the loop is gentle, so
-    that few subproblems fail: for problems on which every smaller alpha soon fails.
+    `alpha` is the first weight of the proximal term, and `pace` says how it changes.
     """
-    fall, rise, easy = FALL, RISE, SUBPROBLEM_STEPS
-    if gentle:
-        fall, rise, easy = GENTLE_FALL, GENTLE_RISE, EASY
     while alpha < LARGEST_WEIGHT:
         equations = coulomb_equations(problem, point[0], alpha)
-        new, solved, steps = solve_subproblem(equations, matrix, point)
+        new, solved, steps = solve_subproblem(equations, matrix, point, pace.most)
         yield new
         point = new if solved else point
         if not solved:
-            alpha *= rise
-        elif steps <= easy:
-            alpha = max(alpha / fall, LEAST_WEIGHT)
+            alpha *= pace.rise
+        elif steps <= pace.few:
+            alpha = max(alpha / pace.fall, LEAST_WEIGHT)

@@ -31,7 +31,7 @@ def lengths(t: np.ndarray) -> np.ndarray:
     """Lengths (k,) of vectors (k, d)."""
     if t.shape[1] == 1:
         return np.asarray(np.abs(t[:, 0]))
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", t, t)))
+    return np.asarray(np.sqrt(np.vecdot(t, t)))
 
 
 def unit(t: np.ndarray) -> np.ndarray:

@@ -93,15 +93,23 @@ def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> n
     return problem.law.nearest(r, np.maximum(r[:, 0], problem.law.lowest))
 
 
-def definite(Q: sp.csr_array) -> bool:
-    """Say whether a sparse symmetric Q is safely positive definite, as that of elastic bodies
-    without redundant contacts; False also where its factorisation fails.
+def definite(Q: np.ndarray | sp.csr_array) -> bool:
+    """Say whether a symmetric Q, sparse or an array, is safely positive definite, as that of
+    elastic bodies without redundant contacts; False also where its factorisation fails.
     """
     try:
-        factors = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except RuntimeError:
+        if sp.issparse(Q):
+            factors = splu(
+                sp.csc_array(Q),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+            pivots = factors.U.diagonal()
+        else:
+            pivots = np.linalg.cholesky(Q).diagonal() ** 2
+    except (RuntimeError, np.linalg.LinAlgError):
         return False
-    pivots = factors.U.diagonal()
     return bool(pivots.min() > LEAST_PIVOT**2 * pivots.max())
 
 

@@ -104,22 +104,21 @@ class SparseBlocks:
 
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
-        # Every entry belongs to the block of its row's and its column's contact. Blocks are
-        # numbered row by row, and every diagonal block is there, because something will be added.
-        entries = sp.coo_array(Q)
-        i, j = (index.astype(np.int64) for index in entries.coords)
-        own = np.arange(self.k)
-        keys = np.concatenate([(i // d) * self.k + j // d, own * self.k + own])
+        # Blocks are numbered row by row, and every diagonal block is there, because something will
+        # be added.
+        filled, own = sp.bsr_array(Q, blocksize=(d, d)), np.arange(self.k)
+        rows = np.repeat(own, np.diff(filled.indptr))
+        keys = np.concatenate([rows * self.k + filled.indices, own * self.k + own])
         unique, where = np.unique(keys, return_inverse=True)
         self.rows, self.columns = unique // self.k, unique % self.k
         self.blocks = np.zeros((len(unique), d, d))
-        self.blocks[where[: len(i)], i % d, j % d] = entries.data
-        self.home = where[len(i) :]
-        self.unknown, self.order, self.row, self.column = self._arranged()
+        self.blocks[where[: len(rows)]] = filled.data
+        self.home = where[len(rows) :]
+        self.unknown, self.entries = self._arranged()
 
-    def _arranged(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The unknowns in an order of elimination of least degree, and the entries by compressed
-        columns of that order.
+    def _arranged(self) -> tuple[np.ndarray, sp.csc_array]:
+        """The unknowns in an order of elimination of least degree, and the numbers of the entries
+        of all blocks in compressed columns of that order.
         """
         d, n = self.d, self.d * self.k
         # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that
@@ -137,23 +136,22 @@ class SparseBlocks:
         columns = (self.columns[:, None] * d + local)[:, None, :]
         row = place[np.broadcast_to(rows, self.blocks.shape)].ravel()
         column = place[np.broadcast_to(columns, self.blocks.shape)].ravel()
-        order = np.lexsort((row, column))
-        return np.argsort(place), order, row[order], column[order]
+        numbers = np.arange(self.blocks.size)
+        return np.argsort(place), sp.csr_array((numbers, (row, column)), shape=(n, n)).tocsc()
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
         """As DenseBlocks.factor."""
         blocks = self.blocks.copy() if left is None else left[self.rows] @ self.blocks
         blocks[self.home] += added
         # Take the entries by columns, and leave out the unknowns that are not kept.
-        values, row, column = blocks.ravel()[self.order], self.row, self.column
-        stays = kept[self.unknown]  # in the order of elimination
-        m = int(stays.sum())
-        if m < len(stays):
-            inside = stays[row] & stays[column]
-            new = np.cumsum(stays) - 1
-            values, row, column = values[inside], new[row[inside]], new[column[inside]]
-        ends = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=m))])
-        matrix = sp.csc_array((values, row.astype(np.int32), ends.astype(np.int32)), shape=(m, m))
+        places = self.entries
+        index = self.unknown  # places in the right-hand side, in the order of elimination
+        if not kept.all():
+            stays = np.flatnonzero(kept[index])
+            places = places[:, stays][stays]
+            index = (np.cumsum(kept) - 1)[index[stays]]
+        values = blocks.ravel()[places.data]
+        matrix = sp.csc_array((values, places.indices, places.indptr), shape=places.shape)
         try:
             factors = splu(
                 matrix,
@@ -163,7 +161,6 @@ class SparseBlocks:
             )
         except (RuntimeError, ValueError):
             return None
-        index = (np.cumsum(kept) - 1)[self.unknown[stays]]  # places in the right-hand side
 
         def solve(right: np.ndarray) -> np.ndarray:
             x = np.empty_like(right)

@@ -51,14 +51,14 @@ def block_step(
 
 
 def solve_subproblem(
-    equations: Equations, matrix: Blocks, point: Iterate
+    equations: Equations, matrix: Blocks, point: Iterate, most: int = SUBPROBLEM_STEPS
 ) -> tuple[Iterate, bool, int]:
     """The last iterate of Newton's method with a line search on the equations of a proximal
-    subproblem, whether it solves the subproblem, and the steps.
+    subproblem, whether it solves the subproblem, and the steps, `most` of which are taken.
     """
     residual, error, balance, D = equations.evaluate(*point)
     recent = [residual]
-    for steps in range(1, SUBPROBLEM_STEPS + 1):
+    for steps in range(1, most + 1):
         check_time()
         change = block_step(equations, matrix, error, balance, D)
         if change is None:
@@ -78,4 +78,4 @@ def solve_subproblem(
         goal = ENOUGH * equations.weight * float(np.linalg.norm(moved))
         if residual <= max(DONE * float(np.linalg.norm(point[0])), goal):
             return point, True, steps
-    return point, False, SUBPROBLEM_STEPS
+    return point, False, most

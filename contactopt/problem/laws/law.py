@@ -300,9 +300,7 @@ class Law:
         -------
         (k,) mask.
         """
-        return self.pressed(r) & (
-            lengths(r[:, 1:]) < (1 - BELOW) * self.bound_along(r)
-        )
+        return self.pressed(r) & (lengths(r[:, 1:]) < (1 - BELOW) * self.bound_along(r))
 
     def scaled(self, force: float) -> Self:
         """The same law with forces in another unit."""
