@@ -152,11 +152,11 @@ def _run(
     scaled, scales = dimensionless(isotropic(problem))
     stretch = problem.law.stretch(problem.dim)
     scales = scales if stretch is None else replace(scales, stretch=stretch)
-    recorder = _Recorder(problem, scales, limits)
     first = None if start is None else _dimensionless_start(start, problem, scales)
+    recorder = _Recorder(problem, scales, limits, first or at_rest(scaled))
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
     if not recorder.history:
-        recorder.residual = natural_map_residual(problem, *at_rest(problem))
+        recorder.residual = recorder.certificate([])
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
@@ -278,13 +278,14 @@ def _dimensionless_start(
 class _Recorder:
     """Certificate, history and stopping rule of one solve.
 
-    clock counts the method's own seconds, certified those of the certificate.
+    clock counts the method's own seconds, certified those of the certificate. Without an iterate
+    the answer is the dimensionless point `first`.
     """
 
-    def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits):
+    def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits, first: Iterate):
         self.began = time.perf_counter()
         self.problem, self.scales, self.limits = problem, scales, limits
-        self.reactions, self.multipliers = at_rest(problem)
+        self.reactions, self.multipliers = scales.to_physical(*first)
         self.displacements: Stacked | None = None
         self.residual = np.inf
         self.history: list[dict[str, float]] = []
@@ -293,7 +294,7 @@ class _Recorder:
         self.repeated = 0
         self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
 
-    def _certificate(self, known: Sequence[Moved]) -> float:
+    def certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by Q r from the method where it is known.
 
         Where products cost iterations it is computed to a digit as long as it is far from the
@@ -323,7 +324,7 @@ class _Recorder:
             # be small beside.
             self.multipliers = np.zeros(len(lam))
         begin = time.perf_counter()
-        self.residual = self._certificate(known)
+        self.residual = self.certificate(known)
         self.certified += time.perf_counter() - begin
         change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])
