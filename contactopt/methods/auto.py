@@ -39,27 +39,8 @@ import scipy.sparse as sp
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
-from contactopt.methods import Repeated
+from contactopt.methods import Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
-from contactopt.methods.constants import (
-    CLOSE,
-    CONE_PROGRAMS,
-    EAGER_ALPHA,
-    FEW_ENTRIES,
-    GENTLE_ALPHA,
-    LARGER,
-    LEAST_ALPHA,
-    NEARBY,
-    NEWTON_STEPS,
-    PATHS,
-    PATIENCE,
-    POLISH,
-    PROGRESS,
-    ROUND,
-    SMALL,
-    SPARSE_ROUND,
-    TURNING,
-)
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
@@ -69,7 +50,7 @@ from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
-from contactopt.methods.proximal import EAGER, GENTLE, STEADY, Pace, Proximal, proximal_iterates
+from contactopt.methods.proximal import Pace, Proximal, proximal_iterates
 from contactopt.problem import InterfaceProblem, infeasibility
 
 logger = logging.getLogger(__name__)
@@ -109,7 +90,7 @@ class Auto(Method):
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
         sparse = sp.issparse(problem.Q)
-        if sparse and problem.q.size <= SMALL:
+        if sparse and problem.q.size <= constants.SMALL:
             problem = problem.altered(Q=problem.Q.toarray())
         loose = sparse and not (problem.symmetric and definite(problem.Q))
         if loose:
@@ -117,7 +98,9 @@ class Auto(Method):
         else:
             if isinstance(problem.Q, Convolution):
                 points = Nested().with_residuals(problem, start)
-                best, _ = yield from _followed(points, lambda steps, since: since >= PATIENCE)
+                best, _ = yield from _followed(
+                    points, lambda steps, since: since >= constants.PATIENCE
+                )
                 start = best or start
                 note(logger, NO_PROGRESS_NESTED)
             reached = yield from _newton(problem, start, self.preconditioner)
@@ -155,13 +138,15 @@ class _Robust:
     ) -> Generator[Iterate | Known, None, None]:
         problem = self.problem
         if self.loose and start is not None:
-            reached = yield from self.proximal(start, POLISH, LEAST_ALPHA)
+            reached = yield from self.proximal(start, constants.POLISH, constants.LEAST_ALPHA)
         elif self.loose:
-            reached = yield from self.proximal(reached, 1, EAGER_ALPHA, EAGER)
+            reached = yield from self.proximal(reached, 1, constants.EAGER_ALPHA, "eager")
         else:
             residual = coulomb_equations(problem).evaluate(*reached)[0]
-            if residual <= NEARBY * np.linalg.norm(reached[0]):
-                reached = yield from self.proximal(reached, 1, LEAST_ALPHA, aim=residual / 2)
+            if residual <= constants.NEARBY * np.linalg.norm(reached[0]):
+                reached = yield from self.proximal(
+                    reached, 1, constants.LEAST_ALPHA, aim=residual / 2
+                )
         if self.conic:
             for full in (True, False):
                 path = interior_iterates(problem, self.matrix, Path(full))
@@ -169,7 +154,7 @@ class _Robust:
         if infeasibility(problem) is not None:  # the driver says so
             return
         if self.conic:
-            turning = homotopy_iterates(problem, self.matrix, TURNING)
+            turning = homotopy_iterates(problem, self.matrix, constants.TURNING)
             reached = yield from self.interior(reached, turning)
             if problem.symmetric and not self.loose:
                 reached = yield from self.cones(reached)
@@ -179,10 +164,10 @@ class _Robust:
         """Without end: the proximal loop from `reached`, and then from random forces."""
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self.proximal(reached, ROUND * 2**restarts, Proximal.alpha)
+            last = yield from self.proximal(reached, constants.ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=self.problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
-            r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
+            r *= constants.LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
             reached = self.problem.law.nearest(r, r[:, 0]), last[1]
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
@@ -193,14 +178,16 @@ class _Robust:
         problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
             if self.conic and restarts:
-                turning = homotopy_iterates(problem, matrix, TURNING * 2**restarts, random)
+                turning = homotopy_iterates(
+                    problem, matrix, constants.TURNING * 2**restarts, random
+                )
                 reached = yield from self.interior(reached, turning)
-            for _ in range(PATHS if self.conic else 0):
+            for _ in range(constants.PATHS if self.conic else 0):
                 path = Path.random(random, problem.contacts)
                 points = interior_iterates(problem, matrix, path)
                 reached = yield from self.interior(reached, points)
-            patience = SPARSE_ROUND * 2**restarts
-            last = yield from self.proximal(reached, patience, GENTLE_ALPHA, GENTLE)
+            patience = constants.SPARSE_ROUND * 2**restarts
+            last = yield from self.proximal(reached, patience, constants.GENTLE_ALPHA, "gentle")
             reached = self.better(reached, last)
             note(logger, NO_PROGRESS_JAMMED)
 
@@ -210,7 +197,7 @@ class _Robust:
         points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(self.problem))
         try:
             found, residual = yield from _followed(
-                points, lambda steps, since: steps >= CONE_PROGRAMS
+                points, lambda steps, since: steps >= constants.CONE_PROGRAMS
             )
         except BackendError as error:  # no answer: the proximal loop needs none
             note(logger, f"the cone programs of the default method gave no answer: {error}")
@@ -225,8 +212,10 @@ class _Robust:
         """
         found, best = yield from _followed(points, lambda steps, since: False)
         reached = found or start
-        if best < CLOSE:
-            reached = yield from self.proximal(reached, POLISH, max(LEAST_ALPHA, 100 * best))
+        if best < constants.CLOSE:
+            reached = yield from self.proximal(
+                reached, constants.POLISH, max(constants.LEAST_ALPHA, 100 * best)
+            )
         return self.better(start, reached)
 
     def proximal(
@@ -234,7 +223,7 @@ class _Robust:
         start: Iterate,
         patience: int,
         alpha: float,
-        pace: Pace = STEADY,
+        pace: Pace = "steady",
         aim: float = np.inf,
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns
@@ -270,11 +259,11 @@ def _newton(
     """
     Q = problem.Q
     dear = isinstance(Q, InterfaceOperator) and (
-        Q.coupled is not None or problem.q.size > FEW_ENTRIES
+        Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES
     )
 
     def tired(steps: int, since: int) -> bool:
-        return since >= PATIENCE or steps > NEWTON_STEPS
+        return since >= constants.PATIENCE or steps > constants.NEWTON_STEPS
 
     def spent(steps: int, since: int) -> bool:
         cheaper = dear and isinstance(Q, InterfaceOperator) and Q.products < problem.q.size
@@ -306,7 +295,7 @@ def _followed(
             yield point
         except Repeated:
             break
-        since = 0 if residual < PROGRESS * best else since + 1
+        since = 0 if residual < constants.PROGRESS * best else since + 1
         if residual < best:
             best, reached = residual, point[:2]
         if tired(steps, since) or np.any(np.abs(seen - residual) <= SAME * residual):

@@ -14,20 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from contactopt.checks import check_number
-from contactopt.methods.constants import (
-    EAGER_STEPS,
-    EASY,
-    FALL,
-    GENTLE_FALL,
-    GENTLE_RISE,
-    RISE,
-    SUBPROBLEM_STEPS,
-)
+from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.methods.kernels.sparse_newton import solve_subproblem
@@ -36,23 +28,7 @@ from contactopt.problem import InterfaceProblem
 
 # of the proximal term; where even the largest fails, the loop ends
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
-
-
-class Pace(NamedTuple):
-    """How the weight changes: it falls by a factor after a subproblem that took few steps, and
-    rises by another one after a subproblem that was not solved in the most steps.
-    """
-
-    fall: float
-    rise: float
-    few: int
-    most: int = SUBPROBLEM_STEPS
-
-
-STEADY = Pace(FALL, RISE, SUBPROBLEM_STEPS)
-# few subproblems fail: for problems on which every smaller weight soon fails
-GENTLE = Pace(GENTLE_FALL, GENTLE_RISE, EASY)
-EAGER = Pace(FALL, np.inf, EAGER_STEPS, EAGER_STEPS)  # ends with the first that is not easy
+Pace = Literal["steady", "gentle", "eager"]
 
 
 @dataclass(frozen=True)
@@ -79,19 +55,36 @@ class Proximal(Method):
 
 
 def proximal_iterates(
-    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, pace: Pace = STEADY
+    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, pace: Pace = "steady"
 ) -> Iterator[Iterate]:
     """The solution of one proximal subproblem after another, or of a failed one the point that
     Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
 
-    `alpha` is the first weight of the proximal term, and `pace` says how it changes.
+    `alpha` is the first weight of the proximal term. It changes slowly at the pace `gentle`, so
+    that few subproblems fail: for problems on which every smaller alpha soon fails. The loop of the
+    pace `eager` ends with the first subproblem that is not solved in few steps.
     """
+    fall, rise, easy, most = {
+        "steady": (
+            constants.FALL,
+            constants.RISE,
+            constants.SUBPROBLEM_STEPS,
+            constants.SUBPROBLEM_STEPS,
+        ),
+        "gentle": (
+            constants.GENTLE_FALL,
+            constants.GENTLE_RISE,
+            constants.EASY,
+            constants.SUBPROBLEM_STEPS,
+        ),
+        "eager": (constants.FALL, np.inf, constants.EAGER_STEPS, constants.EAGER_STEPS),
+    }[pace]
     while alpha < LARGEST_WEIGHT:
         equations = coulomb_equations(problem, point[0], alpha)
-        new, solved, steps = solve_subproblem(equations, matrix, point, pace.most)
+        new, solved, steps = solve_subproblem(equations, matrix, point, most)
         yield new
         point = new if solved else point
         if not solved:
-            alpha *= pace.rise
-        elif steps <= pace.few:
-            alpha = max(alpha / pace.fall, LEAST_WEIGHT)
+            alpha *= rise
+        elif steps <= easy:
+            alpha = max(alpha / fall, LEAST_WEIGHT)

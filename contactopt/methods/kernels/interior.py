@@ -23,27 +23,7 @@ from math import sqrt
 
 import numpy as np
 
-from contactopt.methods.constants import (
-    BACKTRACK,
-    BOUNDARY,
-    CENTRAL,
-    CENTRAL_KEPT,
-    CORRECTED,
-    FRICTIONLESS,
-    INTERIOR_PROGRESS,
-    INTERIOR_STEPS,
-    LEAST_CENTERING,
-    LEAST_SMOOTHING,
-    MOST_CENTERING,
-    MOST_SMOOTHING,
-    PREDICTED,
-    ROUGHEST,
-    SHORT,
-    STALLED,
-    START,
-    STUCK,
-    STUCK_CENTERING,
-)
+from contactopt.methods import constants
 from contactopt.methods.kernels.sparse_blocks import Blocks, Solver, bordered
 from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
@@ -71,13 +51,13 @@ class Path:
 
     full: bool = True
     smooth: float = 0.0
-    first: np.ndarray = field(default_factory=lambda: np.full((2, 1), START))
+    first: np.ndarray = field(default_factory=lambda: np.full((2, 1), constants.START))
 
     @classmethod
     def random(cls, rng: np.random.Generator, contacts: int) -> Path:
         """A path drawn at random."""
-        size = START ** rng.uniform() * np.exp(rng.normal(size=(2, contacts)))
-        smooth = np.exp(rng.uniform(*np.log((LEAST_SMOOTHING, MOST_SMOOTHING))))
+        size = constants.START ** rng.uniform() * np.exp(rng.normal(size=(2, contacts)))
+        smooth = np.exp(rng.uniform(*np.log((constants.LEAST_SMOOTHING, constants.MOST_SMOOTHING))))
         return cls(smooth=float(smooth), first=size)
 
 
@@ -93,8 +73,8 @@ class Lorentz:
     def __init__(self, problem: InterfaceProblem, matrix: Blocks):
         self.problem, self.matrix = problem, matrix
         self.scale, self.kept = np.ones(problem.q.shape), np.ones(problem.q.shape, dtype=bool)
-        self.rough = problem.mu >= FRICTIONLESS
-        self.scale[:, 0] = 1 / np.where(self.rough, np.minimum(problem.mu, ROUGHEST), 1.0)
+        self.rough = problem.mu >= constants.FRICTIONLESS
+        self.scale[:, 0] = 1 / np.where(self.rough, np.minimum(problem.mu, constants.ROUGHEST), 1.0)
         self.kept[~self.rough, 1:] = False
         self.V = problem.V[self.kept.ravel()]
         self.square = self.scale[:, :, None] * self.scale[:, None, :]
@@ -186,23 +166,23 @@ def interior_iterates(
     x, z, lam = np.zeros(problem.q.shape), np.zeros(problem.q.shape), np.zeros(len(problem.s))
     x[:, 0], z[:, 0] = path.first
     best, since, length = np.inf, 0, 1.0
-    for _ in range(INTERIOR_STEPS):
+    for _ in range(constants.INTERIOR_STEPS):
         slip = np.sqrt(np.vecdot(z[:, 1:], z[:, 1:]) + (path.smooth * z[:, 0]) ** 2 + TINY)
         gap = cones.gap(x, z, lam, slip)
         point, error = cones.answer(x, z, lam, gap)
         yield point, error
-        since = 0 if error < INTERIOR_PROGRESS * best else since + 1
+        since = 0 if error < constants.INTERIOR_PROGRESS * best else since + 1
         best = min(best, error)
-        if error < NEAR or since >= STALLED or not np.isfinite(error):
+        if error < NEAR or since >= constants.STALLED or not np.isfinite(error):
             return
-        bent, slopes = path.full or length > STUCK, np.zeros_like(z)
+        bent, slopes = path.full or length > constants.STUCK, np.zeros_like(z)
         if bent:  # linearise |u_t| = |z_t|
             slopes[cones.rough, 1:] = (z[:, 1:] / slip[:, None])[cones.rough]
         system = cones.linearised(x, z, slopes)
         step = None if system is None else _centred_step(system, gap, bent)
         if system is None or step is None:
             return
-        boundary = SHORT if path.full else BOUNDARY
+        boundary = constants.SHORT if path.full else constants.BOUNDARY
         length = _way(system.scaling, step[0], step[1], boundary)
         x, z, lam = x + length * step[0], z + length * step[1], lam + length * step[2]
 
@@ -218,13 +198,13 @@ def _centred_step(
     first = system.direction(gap, unbalanced, -z)
     if first is None:
         return None
-    length = min(1.0, PREDICTED * scaling.longest(first[0], first[1]))
+    length = min(1.0, constants.PREDICTED * scaling.longest(first[0], first[1]))
     # The better the predictor, the less the next step is centred.
     ahead = float(np.vdot(x + length * first[0], z + length * first[1])) / k
-    least = LEAST_CENTERING if bent else STUCK_CENTERING
-    centering = min(max(min(max(ahead / mean, 0.0), 1.0) ** 3, least), MOST_CENTERING)
+    least = constants.LEAST_CENTERING if bent else constants.STUCK_CENTERING
+    centering = min(max(min(max(ahead / mean, 0.0), 1.0) ** 3, least), constants.MOST_CENTERING)
     # Corrector: the same system with the centring and the second-order term of the predictor.
-    second = scaling.corrector(first[0], first[1]) if length > CORRECTED else 0.0
+    second = scaling.corrector(first[0], first[1]) if length > constants.CORRECTED else 0.0
     return system.direction(gap, unbalanced, centering * mean * scaling.inverse - z - second)
 
 
@@ -235,13 +215,13 @@ def _way(scaling: Scaling, dx: np.ndarray, dz: np.ndarray, boundary: float) -> f
     x, z, k = scaling.x, scaling.z, len(scaling.x)
     mean = float(np.vdot(x, z)) / k
     length = min(1.0, boundary * scaling.longest(dx, dz))
-    least = np.minimum(CENTRAL, CENTRAL_KEPT * scaling.centrality / mean)
+    least = np.minimum(constants.CENTRAL, constants.CENTRAL_KEPT * scaling.centrality / mean)
     for _ in range(BACKTRACKS):
         ahead = x + length * dx, z + length * dz
         centrality = np.sqrt(np.maximum(det(ahead[0]) * det(ahead[1]), 0.0))
         if np.all(centrality >= least * np.vdot(*ahead) / k):
             break
-        length *= BACKTRACK
+        length *= constants.BACKTRACK
     return length
 
 
