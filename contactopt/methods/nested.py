@@ -31,7 +31,6 @@ from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.laws.law import Law
 
 logger = logging.getLogger(__name__)
 
@@ -45,9 +44,6 @@ class Nested(Method):
     """No settings."""
 
     implicit: ClassVar[bool] = True
-
-    def solves(self, law: Law) -> bool:
-        return True
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         for point, _ in self.with_residuals(problem, start):
