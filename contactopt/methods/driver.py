@@ -373,7 +373,7 @@ def _check_equilibrium(problem: InterfaceProblem) -> None:
         if found is not None:
             raise InputError(sentence(problem, found))
         return
-    if not problem.law.unilateral:
+    if not len(problem.s) or not problem.law.unilateral:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):

@@ -216,8 +216,15 @@ class InterfaceProblem:
         return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
 
     def altered(self, **values: Any) -> InterfaceProblem:
-        """The same problem with other values of its fields, which are known to fit and are not
-        checked again.
+        """Make the same problem with other values, which are known to fit and not checked again.
+
+        Parameters
+        ----------
+        values : New values of the fields, by their names.
+
+        Returns
+        -------
+        The problem with these values.
         """
         other = object.__new__(InterfaceProblem)
         other.__dict__.update({f.name: self.__dict__[f.name] for f in fields(self)} | values)

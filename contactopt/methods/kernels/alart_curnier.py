@@ -21,7 +21,7 @@ from contactopt.methods.constants import LOOSE
 from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded
 from contactopt.methods.kernels.krylov import krylov_step
 from contactopt.methods.kernels.semismooth import RIDGE, Equations
-from contactopt.methods.kernels.sparse_blocks import block_matrix
+from contactopt.methods.kernels.sparse_blocks import block_matrix, factorised
 from contactopt.methods.kernels.sparse_newton import block_step
 from contactopt.methods.method import Iterate
 from contactopt.methods.preconditioners import Preconditioner
@@ -177,12 +177,28 @@ def cold_start(
     if not glued.any():
         return zero
     equations = coulomb_equations(problem)
-    glue = replace(glued_projection(equations, glued), rho=np.ones(problem.contacts))
-    _, error, balance, D = glue.evaluate(*zero)
-    bonded = (step or newton_steps(problem)[1])(glue, error, balance, D, accuracy)
+    if isinstance(problem.Q, np.ndarray) and not len(problem.s):
+        bonded = _bonded(problem, np.repeat(glued, problem.dim))
+    else:
+        glue = replace(glued_projection(equations, glued), rho=np.ones(problem.contacts))
+        _, error, balance, D = glue.evaluate(*zero)
+        bonded = (step or newton_steps(problem)[1])(glue, error, balance, D, accuracy)
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda point: equations.evaluate(*point)[0])
+
+
+def _bonded(problem: InterfaceProblem, glued: np.ndarray) -> Iterate | None:
+    """The forces that hold the components `glued` (k dim,) at rest, for an array Q and no plate;
+    None if there are none.
+    """
+    Q = problem.Q if glued.all() else problem.Q[np.ix_(glued, glued)]
+    inverse = factorised(Q + GLUE * np.eye(len(Q)))
+    if inverse is None:
+        return None
+    r = np.zeros(problem.q.shape)
+    r.ravel()[glued] = inverse(-problem.q.ravel()[glued])
+    return (r, np.zeros(0)) if np.isfinite(r).all() else None
 
 
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
