@@ -14,15 +14,8 @@ DIRECTIONS = 16  # of the polygon in a disc
 
 
 def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split blocks into their normal and tangential parts.
-
-    Parameters
-    ----------
-    blocks : (k, dim) forces or displacements, normal component first.
-
-    Returns
-    -------
-    The normal part (k,) and the tangential part (k, dim - 1). Both are views.
+    """Split forces or displacements (k, dim) into views of their normal part (k,) and of their
+    tangential part (k, dim - 1).
     """
     return blocks[:, 0], blocks[:, 1:]
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg as la
@@ -123,26 +124,22 @@ def newton_steps(problem: InterfaceProblem, P: Preconditioner | None = None) -> 
             return krylov_step(equations, P, error, balance, D, rtol)
 
         return step, step
+    solver: Callable[..., Iterate | None]
     if sp.issparse(problem.Q):
-        matrix = block_matrix(problem.Q, problem.dim)
+        solver = partial(block_step, matrix=block_matrix(problem.Q, problem.dim))
+    else:
+        factor: Bonded | None = None
+        if len(problem.s):  # it pays for elastic bodies that a plate presses together
+            with suppress(la.LinAlgError):
+                factor = Bonded(problem.Q, problem.V)
+        solver = partial(_dense_step, factor=factor)
 
-        def sparse(ridge: float) -> Step:
-            return lambda equations, error, balance, D, rtol: block_step(
-                equations, matrix, error, balance, D, ridge
-            )
-
-        return sparse(RIDGE), sparse(GLUE)
-    factor: Bonded | None = None
-    if len(problem.s):  # it pays for elastic bodies that a plate presses together
-        with suppress(la.LinAlgError):
-            factor = Bonded(problem.Q, problem.V)
-
-    def dense(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: _dense_step(
-            equations, factor, error, balance, D, ridge
+    def exact(ridge: float) -> Step:
+        return lambda equations, error, balance, D, rtol: solver(
+            equations, error=error, balance=balance, D=D, ridge=ridge
         )
 
-    return dense(RIDGE), dense(GLUE)
+    return exact(RIDGE), exact(GLUE)
 
 
 def _dense_step(
