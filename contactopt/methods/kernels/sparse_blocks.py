@@ -22,9 +22,8 @@ from scipy.sparse.linalg import splu
 from contactopt.linear.operators import Interface
 from contactopt.methods.constants import FULL, SMALL
 
-# A diagonal entry this much smaller than the largest of its column is still a pivot. Other pivots
-# destroy the order of elimination: on packings at PIVOT = 1e-2 the factors have five times as many
-# entries.
+# A diagonal entry this much smaller than the largest of its column is still a pivot: other pivots
+# destroy the order of elimination, and the factors fill.
 PIVOT = 1e-4
 
 
