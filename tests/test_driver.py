@@ -36,6 +36,16 @@ def test_solved_is_the_certificates_word():
     assert solution.residual == natural_map_residual(PROBLEM, solution.reactions) < 1e-14
 
 
+def test_without_an_iterate_the_start_is_the_answer_and_the_certificate_judges_it():
+    solution = solve(PROBLEM)
+    kept = solve(PROBLEM, Scripted(()), start=solution)
+    assert kept.solved and kept.iterations == 0
+    np.testing.assert_allclose(kept.reactions, solution.reactions, rtol=1e-15)
+    wrong = solve(PROBLEM, Scripted(()), start=replace(solution, reactions=2 * solution.reactions))
+    assert wrong.status is Status.SETTLED
+    np.testing.assert_allclose(wrong.reactions, 2 * solution.reactions, rtol=1e-15)
+
+
 def test_limits_are_kept_and_the_last_iterate_survives():
     solution = solve(PROBLEM, Scripted(WRONG), max_iterations=7)
     assert (

@@ -16,23 +16,19 @@ Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy.linalg as la
-import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from contactopt.checks import check_number
-from contactopt.methods.constants import FIRST_BALANCING, LEAST_CHANGE, MOST_CHANGE
+from contactopt.methods import constants
+from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 
 OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
-Inverse = Callable[[np.ndarray], np.ndarray]  # x (n,) or (n, j) -> (Q + rho I)^-1 x
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ class ADMM(Method):
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         z, multipliers = start or at_rest(problem)
-        rho, count, check = self.rho, 0, FIRST_BALANCING
+        rho, count, check = self.rho, 0, constants.FIRST_BALANCING
         system = Balanced(problem, rho)
         x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
         law = problem.law
@@ -75,7 +71,7 @@ class ADMM(Method):
             if count == check:
                 check *= 2
                 change = _balancing(problem, r, z, old, x, rho)
-                if not 1 / LEAST_CHANGE < change < LEAST_CHANGE:
+                if not 1 / constants.LEAST_CHANGE < change < constants.LEAST_CHANGE:
                     rho, x = rho * change, x / change
                     system = Balanced(problem, rho)
 
@@ -97,7 +93,7 @@ def _balancing(
     size = max(*(float(np.linalg.norm(part)) for part in parts), 1e-300)
     dual = rho * float(np.linalg.norm(z - old)) / size
     wanted = np.sqrt(max(primal, 1e-300) / max(dual, 1e-300))
-    return float(np.clip(wanted, 1 / MOST_CHANGE, MOST_CHANGE))
+    return float(np.clip(wanted, 1 / constants.MOST_CHANGE, constants.MOST_CHANGE))
 
 
 class Balanced:
@@ -106,9 +102,12 @@ class Balanced:
     """
 
     def __init__(self, problem: InterfaceProblem, rho: float):
-        self.V = problem.V
-        inverse = _sparse_inverse if sp.issparse(problem.Q) else _inverse
-        self.inverse = inverse(problem.Q, rho)
+        (k, d), self.V = problem.q.shape, problem.V
+        weight, all_of_them = np.tile(rho * np.eye(d), (k, 1, 1)), np.ones(k * d, dtype=bool)
+        inverse = block_matrix(problem.Q, d).factor(None, weight, all_of_them)
+        if inverse is None:
+            raise np.linalg.LinAlgError("Q + rho I is singular")
+        self.inverse = inverse
         self.motions = self.inverse(problem.V) if problem.V.shape[1] else problem.V
         self.schur = problem.V.T @ self.motions
 
@@ -118,29 +117,3 @@ class Balanced:
             return r.reshape(right.shape), np.zeros(0)
         multipliers = np.linalg.lstsq(self.schur, self.V.T @ r + s, rcond=None)[0]
         return (r - self.motions @ multipliers).reshape(right.shape), multipliers
-
-
-def _inverse(Q: np.ndarray, rho: float) -> Inverse:
-    """The product with the inverse of Q + rho I, by LAPACK."""
-    matrix = Q.T.copy()  # LAPACK factorises the transpose of a C array in place
-    matrix[np.arange(len(Q)), np.arange(len(Q))] += rho
-    with warnings.catch_warnings():
-        # an indefinite Q: the driver sees what comes of it
-        warnings.simplefilter("ignore", la.LinAlgWarning)
-        factors = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
-    return lambda x: np.asarray(la.lu_solve(factors, x, check_finite=False))
-
-
-def _sparse_inverse(Q: sp.csr_array, rho: float) -> Inverse:
-    """The same for a sparse Q, by SuperLU; raises LinAlgError where a pivot is zero."""
-    matrix = sp.csc_array(Q + rho * sp.eye_array(Q.shape[0]))
-    try:
-        factors = splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.01,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError as error:
-        raise la.LinAlgError("Q + rho I is singular") from error
-    return lambda x: np.asarray(factors.solve(x))

@@ -4,19 +4,21 @@ proximal loop.
 0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
    falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
-   force at all) while its residual falls. Elastic bodies end here. Where its
-   sortings go round in a circle near a solution, a few proximal steps break out of it.
-2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
+   force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
+   circle near a solution, a few proximal steps break out of it.
+2. Where Q is sparse and singular: the proximal loop, as long as its subproblems are easy and each
+   of them halves the residual.
+3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-3. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
+4. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
    linear systems of it.
-4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
-5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early
-   says nothing of the next; then the proximal loop from the best of all points, its weight falling
-   slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved the
-   residual, the same again on other paths, with twice the patience.
-6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
+5. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
+6. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
+   early says nothing of the next; then the proximal loop from the best of all points, its weight
+   falling slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved
+   the residual, the same again on other paths, with twice the patience.
+7. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
@@ -37,25 +39,8 @@ import scipy.sparse as sp
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
-from contactopt.methods import Repeated
+from contactopt.methods import Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
-from contactopt.methods.constants import (
-    CLOSE,
-    CONE_PROGRAMS,
-    FEW_ENTRIES,
-    GENTLE_ALPHA,
-    LARGER,
-    LEAST_ALPHA,
-    NEARBY,
-    NEWTON_STEPS,
-    PATHS,
-    PATIENCE,
-    POLISH,
-    PROGRESS,
-    ROUND,
-    SPARSE_ROUND,
-    TURNING,
-)
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
@@ -65,7 +50,7 @@ from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
-from contactopt.methods.proximal import Proximal, proximal_iterates
+from contactopt.methods.proximal import Pace, Proximal, proximal_iterates
 from contactopt.problem import InterfaceProblem, infeasibility
 
 logger = logging.getLogger(__name__)
@@ -104,13 +89,18 @@ class Auto(Method):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        loose = sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q))
+        sparse = sp.issparse(problem.Q)
+        if sparse and problem.q.size <= constants.SMALL:
+            problem = problem.altered(Q=problem.Q.toarray())
+        loose = sparse and not (problem.symmetric and definite(problem.Q))
         if loose:
             reached = start or at_rest(problem)
         else:
             if isinstance(problem.Q, Convolution):
                 points = Nested().with_residuals(problem, start)
-                best, _ = yield from _followed(points, lambda steps, since: since >= PATIENCE)
+                best, _ = yield from _followed(
+                    points, lambda steps, since: since >= constants.PATIENCE
+                )
                 start = best or start
                 note(logger, NO_PROGRESS_NESTED)
             reached = yield from _newton(problem, start, self.preconditioner)
@@ -123,7 +113,7 @@ class Auto(Method):
                     return
                 reached = yield from _newton(problem, None, None)  # its steps are exact now
             note(logger, NO_PROGRESS)
-        yield from _Robust(problem).iterates(start, reached)
+        yield from _Robust(problem, loose).iterates(start, reached)
 
 
 class _Robust:
@@ -133,9 +123,9 @@ class _Robust:
     given.
     """
 
-    def __init__(self, problem: InterfaceProblem):
+    def __init__(self, problem: InterfaceProblem, loose: bool):
         self.problem, self.matrix = problem, block_matrix(problem.Q, problem.dim)
-        self.sparse = sp.issparse(problem.Q)
+        self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
 
@@ -147,12 +137,16 @@ class _Robust:
         self, start: Iterate | None, reached: Iterate
     ) -> Generator[Iterate | Known, None, None]:
         problem = self.problem
-        if self.sparse and start is not None:
-            reached = yield from self.proximal(start, POLISH, LEAST_ALPHA)
-        elif not self.sparse:
+        if self.loose and start is not None:
+            reached = yield from self.proximal(start, constants.POLISH, constants.LEAST_ALPHA)
+        elif self.loose:
+            reached = yield from self.proximal(reached, 1, constants.EAGER_ALPHA, "eager")
+        else:
             residual = coulomb_equations(problem).evaluate(*reached)[0]
-            if residual <= NEARBY * np.linalg.norm(reached[0]):
-                reached = yield from self.proximal(reached, 1, LEAST_ALPHA, aim=residual / 2)
+            if residual <= constants.NEARBY * np.linalg.norm(reached[0]):
+                reached = yield from self.proximal(
+                    reached, 1, constants.LEAST_ALPHA, aim=residual / 2
+                )
         if self.conic:
             for full in (True, False):
                 path = interior_iterates(problem, self.matrix, Path(full))
@@ -160,20 +154,20 @@ class _Robust:
         if infeasibility(problem) is not None:  # the driver says so
             return
         if self.conic:
-            turning = homotopy_iterates(problem, self.matrix, TURNING)
+            turning = homotopy_iterates(problem, self.matrix, constants.TURNING)
             reached = yield from self.interior(reached, turning)
-            if problem.symmetric and not self.sparse:
+            if problem.symmetric and not self.loose:
                 reached = yield from self.cones(reached)
-        yield from self.jammed(reached) if self.sparse else self.restarted(reached)
+        yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
     def restarted(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Without end: the proximal loop from `reached`, and then from random forces."""
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self.proximal(reached, ROUND * 2**restarts, Proximal.alpha)
+            last = yield from self.proximal(reached, constants.ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=self.problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
-            r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
+            r *= constants.LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
             reached = self.problem.law.nearest(r, r[:, 0]), last[1]
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
@@ -184,14 +178,16 @@ class _Robust:
         problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
             if self.conic and restarts:
-                turning = homotopy_iterates(problem, matrix, TURNING * 2**restarts, random)
+                turning = homotopy_iterates(
+                    problem, matrix, constants.TURNING * 2**restarts, random
+                )
                 reached = yield from self.interior(reached, turning)
-            for _ in range(PATHS if self.conic else 0):
+            for _ in range(constants.PATHS if self.conic else 0):
                 path = Path.random(random, problem.contacts)
                 points = interior_iterates(problem, matrix, path)
                 reached = yield from self.interior(reached, points)
-            patience = SPARSE_ROUND * 2**restarts
-            last = yield from self.proximal(reached, patience, GENTLE_ALPHA, gentle=True)
+            patience = constants.SPARSE_ROUND * 2**restarts
+            last = yield from self.proximal(reached, patience, constants.GENTLE_ALPHA, "gentle")
             reached = self.better(reached, last)
             note(logger, NO_PROGRESS_JAMMED)
 
@@ -201,7 +197,7 @@ class _Robust:
         points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(self.problem))
         try:
             found, residual = yield from _followed(
-                points, lambda steps, since: steps >= CONE_PROGRAMS
+                points, lambda steps, since: steps >= constants.CONE_PROGRAMS
             )
         except BackendError as error:  # no answer: the proximal loop needs none
             note(logger, f"the cone programs of the default method gave no answer: {error}")
@@ -216,19 +212,26 @@ class _Robust:
         """
         found, best = yield from _followed(points, lambda steps, since: False)
         reached = found or start
-        if best < CLOSE:
-            reached = yield from self.proximal(reached, POLISH, max(LEAST_ALPHA, 100 * best))
+        if best < constants.CLOSE:
+            reached = yield from self.proximal(
+                reached, constants.POLISH, max(constants.LEAST_ALPHA, 100 * best)
+            )
         return self.better(start, reached)
 
     def proximal(
-        self, start: Iterate, patience: int, alpha: float, gentle: bool = False, aim: float = np.inf
+        self,
+        start: Iterate,
+        patience: int,
+        alpha: float,
+        pace: Pace = "steady",
+        aim: float = np.inf,
     ) -> Generator[Iterate | Known, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns
         the last. `aim` is the residual that the first of these rounds must reach.
         """
         equations = coulomb_equations(self.problem)
         best, target, point = np.inf, aim, start
-        iterates = proximal_iterates(self.problem, self.matrix, start, alpha, gentle)
+        iterates = proximal_iterates(self.problem, self.matrix, start, alpha, pace)
         for done, point in enumerate(iterates, start=1):
             try:
                 yield point
@@ -256,11 +259,11 @@ def _newton(
     """
     Q = problem.Q
     dear = isinstance(Q, InterfaceOperator) and (
-        Q.coupled is not None or problem.q.size > FEW_ENTRIES
+        Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES
     )
 
     def tired(steps: int, since: int) -> bool:
-        return since >= PATIENCE or steps > NEWTON_STEPS
+        return since >= constants.PATIENCE or steps > constants.NEWTON_STEPS
 
     def spent(steps: int, since: int) -> bool:
         cheaper = dear and isinstance(Q, InterfaceOperator) and Q.products < problem.q.size
@@ -292,7 +295,7 @@ def _followed(
             yield point
         except Repeated:
             break
-        since = 0 if residual < PROGRESS * best else since + 1
+        since = 0 if residual < constants.PROGRESS * best else since + 1
         if residual < best:
             best, reached = residual, point[:2]
         if tired(steps, since) or np.any(np.abs(seen - residual) <= SAME * residual):

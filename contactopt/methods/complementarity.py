@@ -17,6 +17,7 @@ approach to three-dimensional contact problems with friction; Stewart, Trinkle (
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -26,8 +27,11 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.linear.deadline import check_time
 from contactopt.methods.method import NATIVE, Iterate, Method
+from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
+
+logger = logging.getLogger(__name__)
 
 MOST_CONTACTS = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
 PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
@@ -65,6 +69,7 @@ class Lemke(Method):
                 a, b = np.split(z[len(z) - 2 * len(problem.s) :], 2)
                 yield (C @ z[: C.shape[1]]).reshape(problem.q.shape), a - b
                 return
+        note(logger, "Lemke's method ended on a ray, so it has no answer")
 
 
 def complementarity_problem(

@@ -24,6 +24,7 @@ ROUND = 20  # outer iterations of the first proximal loop that must halve the re
 SPARSE_ROUND = 100  # of the first of a sparse Q, where random forces lead nowhere
 PATHS = 3  # interior-point paths drawn at random before each proximal loop of a sparse Q
 TURNING = 1000  # linear systems of the first path that turns back
+EAGER_ALPHA = 1e-2  # weight with which the eager loop begins
 GENTLE_ALPHA = 0.1  # weight with which the gentle loop begins
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
@@ -32,6 +33,7 @@ LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 FALL, RISE = 5.0, 8.0
 GENTLE_FALL, GENTLE_RISE = 1.5, 3.0
 EASY = 6
+EAGER_STEPS = 10  # Newton steps of a subproblem of the eager loop, which ends with a harder one
 
 # Its subproblems (contactopt.methods.kernels.sparse_newton).
 SUBPROBLEM_STEPS = 15  # Newton steps of one of them
@@ -42,7 +44,7 @@ ENOUGH = 0.1  # residual of a subproblem that is solved, over the change that it
 # Which linear algebra is faster (contactopt.methods.kernels.alart_curnier,
 # contactopt.methods.kernels.sparse_blocks).
 LOOSE = 0.5  # share of contacts that do not stick: less make the bonded factorisation cheaper
-SMALL = 60  # unknowns up to which LAPACK on an array is faster than a sparse factorisation
+SMALL = 150  # unknowns up to which LAPACK on an array is faster than a sparse factorisation
 FULL = 0.5  # share of entries that are not zero from which on it is faster at any size
 
 # Methods with an inner iteration (contactopt.methods.apg, contactopt.methods.lagrangian).

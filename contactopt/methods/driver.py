@@ -40,6 +40,7 @@ PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no s
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
 DOUBT = 1.0  # seconds of work before the proof is first looked for, then ten times as long, ...
 SAME = 1e-11  # relative distance at which two iterates are the same state
+State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 CONFIRM = 8  # repeated states in a row of a method that goes nowhere; some change course before
 
 
@@ -140,7 +141,7 @@ def _run(
     if problem.contacts == 0:
         return _without_contacts(problem, method, limits.tol)
     _check_equilibrium(problem)
-    if not problem.symmetric and not getattr(method, "unsymmetric", False):
+    if not getattr(method, "unsymmetric", False) and not problem.symmetric:
         name = type(method).__name__.lower()
         raise InputError(
             f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto"
@@ -149,10 +150,13 @@ def _run(
     if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(isotropic(problem))
-    scales = replace(scales, stretch=problem.law.stretch(problem.dim))
-    recorder = _Recorder(problem, scales, limits)
+    stretch = problem.law.stretch(problem.dim)
+    scales = scales if stretch is None else replace(scales, stretch=stretch)
     first = None if start is None else _dimensionless_start(start, problem, scales)
+    recorder = _Recorder(problem, scales, limits, first or at_rest(scaled))
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
+    if not recorder.history:
+        recorder.residual = recorder.certificate([])
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
@@ -218,7 +222,7 @@ def _next(
         return None, Status.BACKEND_FAILED, f"the method broke down in its linear algebra: {error}"
     if iterate is None:
         return None, repeated or Status.SETTLED, ""
-    if not all(np.all(np.isfinite(part)) for part in iterate[:2]):
+    if not (np.isfinite(iterate[0]).all() and np.isfinite(iterate[1]).all()):
         return None, Status.DIVERGED, ""
     return iterate, None, ""
 
@@ -274,22 +278,23 @@ def _dimensionless_start(
 class _Recorder:
     """Certificate, history and stopping rule of one solve.
 
-    clock counts the method's own seconds, certified those of the certificate.
+    clock counts the method's own seconds, certified those of the certificate. Without an iterate
+    the answer is the dimensionless point `first`.
     """
 
-    def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits):
+    def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits, first: Iterate):
         self.began = time.perf_counter()
         self.problem, self.scales, self.limits = problem, scales, limits
-        self.reactions, self.multipliers = at_rest(problem)
+        self.reactions, self.multipliers = scales.to_physical(*first)
         self.displacements: Stacked | None = None
-        self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
+        self.residual = np.inf
         self.history: list[dict[str, float]] = []
-        self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
+        self.recent: list[State] = [(np.zeros(problem.q.size + len(problem.s)), 0.0)]
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
         self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
 
-    def _certificate(self, known: Sequence[Moved]) -> float:
+    def certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by Q r from the method where it is known.
 
         Where products cost iterations it is computed to a digit as long as it is far from the
@@ -303,7 +308,7 @@ class _Recorder:
             return natural_map_residual(self.problem, *point, moved=moved)
         rough = loosened(self.problem.Q, ROUGH)
         if rough is not self.problem.Q:
-            residual = natural_map_residual(replace(self.problem, Q=rough), *point)
+            residual = natural_map_residual(self.problem.altered(Q=rough), *point)
             if residual > max(100 * ROUGH, 10 * self.limits.tol):
                 return residual
         return natural_map_residual(self.problem, *point)
@@ -319,12 +324,13 @@ class _Recorder:
             # be small beside.
             self.multipliers = np.zeros(len(lam))
         begin = time.perf_counter()
-        self.residual = self._certificate(known)
+        self.residual = self.certificate(known)
         self.certified += time.perf_counter() - begin
         change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])
-        same = [_relative(state, old) < SAME for old in reversed(self.recent)]
-        self.recent = [*self.recent[1 - CYCLE :], state]
+        now = state, float(np.linalg.norm(state))
+        same = [_same(now, old) for old in reversed(self.recent)]
+        self.recent = [*self.recent[1 - CYCLE :], now]
         row = {"residual": self.residual, "change": change, "seconds": self.clock}
         self.history.append(row | counts)
         if limits.progress is not None:
@@ -345,6 +351,12 @@ class _Recorder:
         return self.limits.time_limit - (time.perf_counter() - self.began)
 
 
+def _same(new: State, old: State) -> bool:
+    """Whether two states are one: their sizes tell at once that most are not."""
+    close = abs(new[1] - old[1]) <= SAME * new[1]
+    return close and _relative(new[0], old[0]) < SAME
+
+
 def _relative(new: np.ndarray, old: np.ndarray) -> float:
     size = float(np.linalg.norm(new))
     return float(np.linalg.norm(new - old)) / size if size > 0 else float(np.linalg.norm(old) > 0)
@@ -361,7 +373,7 @@ def _check_equilibrium(problem: InterfaceProblem) -> None:
         if found is not None:
             raise InputError(sentence(problem, found))
         return
-    if not problem.law.unilateral:
+    if not len(problem.s) or not problem.law.unilateral:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):

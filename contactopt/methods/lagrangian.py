@@ -16,6 +16,7 @@ Uzawa's method; Panagiotopoulos (1975) for the alternation.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,15 +50,7 @@ class Lagrangian(TwoStage):
         return Normal(problem, pushes, True), Tangential(problem, ~pushes, False)
 
 
-class Subproblem(Components):
-    """Normal or tangential components, and how each of them is solved for."""
-
-    def __init__(self, problem: InterfaceProblem, own: np.ndarray, normal: bool):
-        super().__init__(problem, own, normal)
-        self.step = 1 / eigenvalue_bound(self.Q)
-
-
-class Normal(Subproblem):
+class Normal(Components):
     """The normal QP."""
 
     def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
@@ -69,12 +62,17 @@ class Normal(Subproblem):
         return np.concatenate([r_n, r[:, 1:]], axis=1), own
 
 
-class Tangential(Subproblem):
+class Tangential(Components):
     """The tangential program, until a step moves r_t by no more than `accuracy` of its size: a
     hundredth of what the last solve moved it.
     """
 
     accuracy = SHARPER
+
+    @cached_property
+    def step(self) -> float:
+        """Of Uzawa's ascent: one over the largest eigenvalue of Q."""
+        return 1 / eigenvalue_bound(self.Q)
 
     def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
         c, s = self.given(r[:, 0], lam)

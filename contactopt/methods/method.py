@@ -21,16 +21,8 @@ class Method(Protocol):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        """Iterate on a dimensionless problem. The driver decides when to stop.
-
-        Parameters
-        ----------
-        problem : The dimensionless interface problem.
-        start : Reactions (k, dim) and multipliers (p,) to start from; None: a cold start.
-
-        Yields
-        ------
-        Reactions (k, dim), multipliers (p,) and, where the method knows it, Q r as a Moved.
+        """Iterate on a dimensionless problem, from a cold start if `start` is None. The driver
+        decides when to stop.
         """
         ...
 

@@ -24,23 +24,13 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.linear.convolution import Convolution
-from contactopt.methods import find_method
-from contactopt.methods.constants import (
-    CLOSER,
-    COARSE_ENOUGH,
-    COARSE_STEPS,
-    COARSE_TRIES,
-    COARSEST_ENOUGH,
-    NESTED_LOOSEST,
-    NESTED_TIGHTEST,
-)
+from contactopt.methods import constants, find_method
 from contactopt.methods.kernels.alart_curnier import forcing
 from contactopt.methods.kernels.level_steps import step
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.laws.law import Law
 
 logger = logging.getLogger(__name__)
 
@@ -54,9 +44,6 @@ class Nested(Method):
     """No settings."""
 
     implicit: ClassVar[bool] = True
-
-    def solves(self, law: Law) -> bool:
-        return True
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         for point, _ in self.with_residuals(problem, start):
@@ -87,7 +74,9 @@ class Nested(Method):
         finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
         if given is not None:
             other = finest.evaluate(*given)
-            point, at = (given, other) if other.residual < CLOSER * at.residual else (point, at)
+            point, at = (
+                (given, other) if other.residual < constants.CLOSER * at.residual else (point, at)
+            )
         while True:
             if (
                 at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0])))
@@ -131,9 +120,9 @@ def _robust_start(coarsest: Level, point: Point) -> Point:
     """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default
     method on an array Q.
     """
-    reached, at = _solve_level(coarsest, point, COARSEST_ENOUGH)
+    reached, at = _solve_level(coarsest, point, constants.COARSEST_ENOUGH)
     if (
-        at.residual <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
+        at.residual <= constants.COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
         or len(coarsest.components) < coarsest.kernel.dim
     ):
         return reached
@@ -147,22 +136,22 @@ def _robust_start(coarsest: Level, point: Point) -> Point:
         coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s
     )
     best = at.residual
-    for r, lam, *_ in islice(find_method("auto").iterate(small), COARSE_TRIES):
+    for r, lam, *_ in islice(find_method("auto").iterate(small), constants.COARSE_TRIES):
         candidate = np.ascontiguousarray(r.T), lam
         residual = coarsest.evaluate(*candidate).residual
         if residual < best:
             reached, best = candidate, residual
-        if best <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0])):
+        if best <= constants.COARSEST_ENOUGH * float(np.linalg.norm(reached[0])):
             break
     return reached
 
 
 def _solve_level(
-    level: Level, point: Point, enough: float = COARSE_ENOUGH
+    level: Level, point: Point, enough: float = constants.COARSE_ENOUGH
 ) -> tuple[Point, Evaluation]:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
     at, last = level.evaluate(*point), np.inf
-    for _ in range(COARSE_STEPS):
+    for _ in range(constants.COARSE_STEPS):
         if at.residual <= enough * float(np.linalg.norm(point[0])):
             break
         change, _ = step(level, at, _worth(at.residual, last))
@@ -174,7 +163,13 @@ def _solve_level(
 
 def _worth(residual: float, last: float) -> float:
     """Accuracy of a step: low while the residual does not fall, because contacts still change."""
-    return forcing(residual, last, NESTED_LOOSEST, NESTED_LOOSEST, NESTED_TIGHTEST)
+    return forcing(
+        residual,
+        last,
+        constants.NESTED_LOOSEST,
+        constants.NESTED_LOOSEST,
+        constants.NESTED_TIGHTEST,
+    )
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:

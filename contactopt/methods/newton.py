@@ -26,7 +26,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.linear.operators import InterfaceOperator, loosened
-from contactopt.methods.constants import KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST
+from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
     admissible,
     cold_start,
@@ -107,19 +107,25 @@ class Newton(Method):
         if P is not None and len(problem.pairs) > 1:
             equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
         step, first = newton_steps(problem, P)
-        r, multipliers = start or cold_start(problem, first, KRYLOV_FIRST)
-        last, rtol = np.inf, KRYLOV_FIRST
+        r, multipliers = start or cold_start(problem, first, constants.KRYLOV_FIRST)
+        last, rtol = np.inf, constants.KRYLOV_FIRST
         while True:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
-            sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
+            Q = loosened(problem.Q, SHARP * aim)
+            sharp = equations if Q is problem.Q else replace(equations, Q=Q)
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            displacements = partial(sharp.displacements, r, multipliers)
-            change = settled(sharp, problem.law, r, D, displacements)
+            change = settled(sharp, problem.law, r, D, partial(sharp.displacements, r, multipliers))
             if change is not None:
                 multipliers = multipliers + change
                 residual, error, balance, D = sharp.evaluate(r, multipliers)
             yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
-            rtol = forcing(residual, last, KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST)
+            rtol = forcing(
+                residual,
+                last,
+                constants.KRYLOV_FIRST,
+                constants.KRYLOV_LOOSEST,
+                constants.KRYLOV_TIGHTEST,
+            )
             moved = step(sharp, error, balance, D, rtol)
             if moved is None:
                 note(logger, UNSOLVED)

@@ -17,12 +17,8 @@ _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs"
 
 
 def note(logger: logging.Logger, sentence: str) -> None:
-    """Log a sentence, and keep it for the Solution of the solve that runs. A sentence is kept once.
-
-    Parameters
-    ----------
-    logger : The logger of the module that speaks.
-    sentence : What was done otherwise than asked or expected.
+    """Log what was done otherwise than asked or expected, and keep the sentence for the Solution of
+    the solve that runs. A sentence is kept once.
     """
     logger.info(sentence)
     notes = _notes.get()
@@ -32,12 +28,7 @@ def note(logger: logging.Logger, sentence: str) -> None:
 
 @contextmanager
 def collected() -> Iterator[list[str]]:
-    """Collect the notes that are made inside the `with` block.
-
-    Yields
-    ------
-    The sentences. The list grows while the block runs.
-    """
+    """Collect the notes that are made inside the `with` block, in a list that grows as it runs."""
     notes: list[str] = []
     token = _notes.set(notes)
     try:

@@ -14,19 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from contactopt.checks import check_number
-from contactopt.methods.constants import (
-    EASY,
-    FALL,
-    GENTLE_FALL,
-    GENTLE_RISE,
-    RISE,
-    SUBPROBLEM_STEPS,
-)
+from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.methods.kernels.sparse_newton import solve_subproblem
@@ -35,6 +28,7 @@ from contactopt.problem import InterfaceProblem
 
 # of the proximal term; where even the largest fails, the loop ends
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
+Pace = Literal["steady", "gentle", "eager"]
 
 
 @dataclass(frozen=True)
@@ -61,20 +55,33 @@ class Proximal(Method):
 
 
 def proximal_iterates(
-    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, gentle: bool = False
+    problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, pace: Pace = "steady"
 ) -> Iterator[Iterate]:
     """The solution of one proximal subproblem after another, or of a failed one the point that
     Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
 
-    `alpha` is the first weight of the proximal term. It changes slowly if the loop is gentle, so
-    that few subproblems fail: for problems on which every smaller alpha soon fails.
+    `alpha` is the first weight of the proximal term. It changes slowly at the pace `gentle`, so
+    that few subproblems fail: for problems on which every smaller alpha soon fails. The loop of the
+    pace `eager` ends with the first subproblem that is not solved in few steps.
     """
-    fall, rise, easy = FALL, RISE, SUBPROBLEM_STEPS
-    if gentle:
-        fall, rise, easy = GENTLE_FALL, GENTLE_RISE, EASY
+    fall, rise, easy, most = {
+        "steady": (
+            constants.FALL,
+            constants.RISE,
+            constants.SUBPROBLEM_STEPS,
+            constants.SUBPROBLEM_STEPS,
+        ),
+        "gentle": (
+            constants.GENTLE_FALL,
+            constants.GENTLE_RISE,
+            constants.EASY,
+            constants.SUBPROBLEM_STEPS,
+        ),
+        "eager": (constants.FALL, np.inf, constants.EAGER_STEPS, constants.EAGER_STEPS),
+    }[pace]
     while alpha < LARGEST_WEIGHT:
         equations = coulomb_equations(problem, point[0], alpha)
-        new, solved, steps = solve_subproblem(equations, matrix, point)
+        new, solved, steps = solve_subproblem(equations, matrix, point, most)
         yield new
         point = new if solved else point
         if not solved:

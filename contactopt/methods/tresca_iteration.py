@@ -24,8 +24,9 @@ from contactopt.checks import check_number
 from contactopt.methods.backends import CONIC, QP, find
 from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.qp import BoxQP
+from contactopt.methods.kernels.alart_curnier import cold_start
 from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.method import Iterate, Method
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws.law import Law
@@ -58,24 +59,13 @@ class Tresca(Method):
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         convex = TrescaProblem(self.backends(problem.dim)[0], problem)
-        r = _glued(problem) if start is None else start[0]
+        bonded = cold_start if len(problem.s) else at_rest
+        r = (start or bonded(problem))[0]
         g = problem.law.bound(r[:, 0])
         while True:
             r, multipliers = convex.solve(g, r)
             g = g + self.relaxation * (problem.law.bound(r[:, 0]) - g)
             yield r, multipliers
-
-
-def _glued(problem: InterfaceProblem) -> np.ndarray:
-    """Reactions (k, dim) of contacts that all stick if plates press the bodies together, else
-    zeros.
-    """
-    r, (k, dim) = np.zeros(problem.q.shape), problem.q.shape
-    if len(problem.s) == 0:
-        return r
-    eye = np.broadcast_to(np.eye(dim), (k, dim, dim))
-    c, lam = problem.q.ravel(), np.zeros(len(problem.s))
-    return crossover(problem.Q, c, problem.V, problem.s, lambda y: (y, eye), r, lam, steps=2)[0]
 
 
 class TrescaProblem:

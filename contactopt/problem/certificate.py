@@ -53,9 +53,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.linear.operators import diagonal
 from contactopt.linear.stacked import Stacked
+from contactopt.problem.cones import lengths
 from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.laws.law import Law
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
 # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
@@ -89,6 +90,12 @@ class Yardsticks:
     force: float
     length: float
     rho: np.ndarray
+
+    def errors(self, law: Law, r: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """e_i = |r_i - P(r_i - rho_i u_i)| / F (k,) of the head of this module, for forces r (k,
+        dim) [force] and displacements u (k, dim) [length].
+        """
+        return lengths(r - law.mapped(r - self.rho[:, None] * u)) / self.force
 
 
 @np.errstate(all="ignore")  # numbers beyond the range of floats are no solution
@@ -126,11 +133,10 @@ def natural_map_residual(
     w = problem.q + (problem.V @ lam).reshape(r.shape)
     u = d + w
     measure = yardsticks(problem, r, d, w)
-    errors = np.linalg.norm(r - problem.law.project(r - measure.rho[:, None] * u)[0], axis=1)
-    beyond = np.linalg.norm(r[:, 1:], axis=1) - problem.law.bound_along(r)
+    beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)
     worst = max(
-        float(np.max(errors)) / measure.force,
-        float(np.max(beyond)) / measure.force,
+        float(measure.errors(problem.law, r, u).max()),
+        float(beyond.max()) / measure.force,
         balance_residual(problem, r, measure.force),
         0.0 if moved is None else moved.accuracy,
     )
@@ -153,20 +159,22 @@ def yardsticks(
     -------
     What the errors are compared with.
     """
-    size = np.linalg.norm(r, axis=1)
+    size, gap = lengths(r), w[:, 0]
     largest = float(size.max())
     weight = np.minimum(1.0, size / (ACTS * largest)) if largest > 0 else np.zeros(len(r))
-    overlap = np.where(problem.law.lowest < 0, np.abs(w[:, 0]), np.maximum(-w[:, 0], 0.0))
+    overlap = -gap if problem.law.unilateral else np.where(problem.law.lowest < 0, abs(gap), -gap)
     length = max(
-        float(np.max(weight * np.linalg.norm(d, axis=1))),
+        float((weight * lengths(d)).max()),
         float(overlap.max()),
-        float(np.min(np.abs(w[:, 0]))),
-        ROUNDED * float(np.max(weight * np.linalg.norm(problem.q, axis=1))),
+        float(np.abs(gap).min()),
+        ROUNDED * float((weight * lengths(problem.q)).max()),
     )
-    compliance, plates = _compliances(problem), _plate_force(problem)
+    compliance, plates = problem.compliances, _plate_force(problem)
     moves = compliance > 0
-    shares = np.where(moves, size, 0.0) if np.any(size[moves] > 0) else moves.astype(float)
-    mean = float(shares @ compliance / shares.sum()) if shares.any() else 0.0
+    shares = size * moves
+    shares = shares if shares.any() else moves.astype(float)
+    total = float(shares.sum())
+    mean = float(shares @ compliance) / total if total > 0 else 0.0
     length = max(length, ROUNDED * mean * min(largest, plates))
     if length == 0:
         length = _least_displacement(r, d + w)
@@ -175,7 +183,8 @@ def yardsticks(
     force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:
         return Yardsticks(force, 0.0, np.zeros(len(r)))
-    stiff = np.clip(np.divide(mean, compliance, out=np.ones(len(r)), where=moves), 1.0, STIFFEST)
+    stiff = np.divide(mean, compliance, out=np.ones(len(r)), where=moves)
+    stiff = np.minimum(np.maximum(stiff, 1.0), STIFFEST)
     return Yardsticks(force, length, stiff * (force / length))
 
 
@@ -183,20 +192,10 @@ def _plate_force(problem: InterfaceProblem) -> float:
     """S = max_j |s_j| / max_i |V_ij|, the force on a plate [force]; 0 without a plate."""
     if len(problem.s) == 0:
         return 0.0
-    reach = np.abs(problem.V).max(axis=0, initial=0.0)
+    reach = problem.reach
     return float(
         np.max(np.divide(np.abs(problem.s), reach, out=np.zeros(len(reach)), where=reach > 0))
     )
-
-
-def _compliances(problem: InterfaceProblem) -> np.ndarray:
-    """(k,) mean of the positive diagonal entries of each block; 0 where there is none above
-    rounding.
-    """
-    entries = np.asarray(diagonal(problem.Q), dtype=float).reshape(problem.q.shape)
-    entries = np.where(entries > 1e-13 * entries.max(initial=0.0), entries, 0.0)
-    count = np.count_nonzero(entries, axis=1)
-    return np.asarray(entries.sum(axis=1) / np.maximum(count, 1))
 
 
 def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
@@ -231,7 +230,7 @@ def balance_residual(
     if force is None:
         force = float(np.linalg.norm(r, axis=1).max(initial=0.0))
     error = np.abs(problem.V.T @ r.ravel() + problem.s)
-    size = np.maximum(np.abs(problem.s), np.abs(problem.V).max(axis=0, initial=0.0) * force)
+    size = np.maximum(np.abs(problem.s), problem.reach * force)
     relative = np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0)
     return float(np.max(np.where(error > 0, relative, 0.0)))
 

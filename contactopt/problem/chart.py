@@ -55,16 +55,9 @@ class Chart:
 
         Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
         Otherwise the origin is the middle of the points, the axes are their principal directions,
-        and the sign of each axis is chosen so that its largest component in space is positive.
-
-        Parameters
-        ----------
-        coordinates : (d, k) points [length].
-        dim : Number of components of a contact, 2 or 3.
-
-        Returns
-        -------
-        The chart, open and without symmetry.
+        and the sign of each axis is chosen so that its largest component in space is positive. The
+        chart is open and without symmetry. `coordinates` are the points (d, k) [length], and `dim`
+        is the number of components of a contact.
         """
         count = dim - 1
         if len(coordinates) <= count:

@@ -14,22 +14,22 @@ DIRECTIONS = 16  # of the polygon in a disc
 
 
 def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split blocks into their normal and tangential parts.
-
-    Parameters
-    ----------
-    blocks : (k, dim) forces or displacements, normal component first.
-
-    Returns
-    -------
-    The normal part (k,) and the tangential part (k, dim - 1). Both are views.
+    """Split forces or displacements (k, dim) into views of their normal part (k,) and of their
+    tangential part (k, dim - 1).
     """
     return blocks[:, 0], blocks[:, 1:]
 
 
+def lengths(t: np.ndarray) -> np.ndarray:
+    """Lengths (k,) of vectors (k, d)."""
+    if t.shape[1] == 1:
+        return np.asarray(np.abs(t[:, 0]))
+    return np.asarray(np.sqrt(np.vecdot(t, t)))
+
+
 def unit(t: np.ndarray) -> np.ndarray:
     """Directions of vectors (k, d): of length one, and zero where t is zero."""
-    length = np.linalg.norm(t, axis=1)[:, None]
+    length = lengths(t)[:, None]
     return np.divide(t, length, out=np.zeros(t.shape), where=length > 0)
 
 
@@ -55,7 +55,7 @@ def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
     -------
     (k, d) the nearest points.
     """
-    length = np.linalg.norm(t, axis=1)
+    length = lengths(t)
     shrink = np.divide(radius, length, out=np.ones_like(length), where=length > radius)
     return np.asarray(t * shrink[:, None])
 
@@ -73,7 +73,7 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
     (k, dim) the nearest points.
     """
     n, t = split(r)
-    length = np.linalg.norm(t, axis=1)
+    length = lengths(t)
     inside = (length <= mu * n) & (n >= 0)  # without friction a tension is outside, too
     polar = mu * length <= -n  # nearest point is the apex
     height = np.where(inside, n, np.where(polar, 0.0, (n + mu * length) / (1 + mu**2)))
@@ -117,7 +117,7 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
         bound = np.broadcast_to(radius, (k,))[:, None]
         inside = np.abs(y) <= bound
         return np.minimum(np.maximum(y, -bound), bound), inside.astype(float)[:, :, None]
-    length = np.linalg.norm(y, axis=1)
+    length = lengths(y)
     outside = length > radius
     D = np.broadcast_to(np.eye(d), (k, d, d)).copy()
     shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
@@ -155,14 +155,14 @@ def disc_of_height(
     slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
     """
     k, dim = len(t), t.shape[1] + 1
-    bound, length = mu * np.abs(height), np.linalg.norm(t, axis=1)
+    bound, length = mu * np.abs(height), lengths(t)
     slip = length > bound
-    P = np.concatenate([height[:, None], disc(t, bound)], axis=1)
-    D = np.broadcast_to(np.eye(dim), (k, dim, dim)).copy()
-    way = t[slip] / length[slip, None]
-    D[slip, 1:, 0] = (mu * slope)[slip, None] * way
-    turn = (bound[slip] / length[slip])[:, None, None]
-    D[slip, 1:, 1:] = turn * _across(way) if dim == 3 else 0.0
+    size = np.where(slip, length, 1.0)
+    share, way = np.where(slip, bound / size, 1.0), t * (slip / size)[:, None]
+    P, D = np.empty((k, dim)), np.zeros((k, dim, dim))
+    P[:, 0], P[:, 1:] = height, t * share[:, None]
+    D[:, 0, 0], D[:, 1:, 0] = 1.0, (mu * slope)[:, None] * way
+    D[:, 1:, 1:] = share[:, None, None] * _across(way)
     return P, D
 
 
@@ -184,7 +184,7 @@ def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, 
     """
     k, dim = y.shape
     n, t = split(y)
-    length = np.linalg.norm(t, axis=1)
+    length = lengths(t)
     polar = mu * length <= -n
     surface = ~polar & ((length > mu * n) | (mu == 0))
     D = np.zeros((k, dim, dim))

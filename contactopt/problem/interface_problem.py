@@ -15,7 +15,7 @@ lambda is how far each of them goes, s collects minus what r must balance.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,7 @@ from contactopt.cards import card, count, line
 from contactopt.checks import given, real_array
 from contactopt.errors import InputError
 from contactopt.linear.operators import (
+    NOISE,
     Interface,
     InterfaceOperator,
     asymmetry,
@@ -200,6 +201,35 @@ class InterfaceProblem:
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]
 
+    @cached_property
+    def compliances(self) -> np.ndarray:
+        """(k,) mean of the positive diagonal entries of each block [length / force]; 0 where there
+        is none above rounding.
+        """
+        entries = np.asarray(diagonal(self.Q), dtype=float).reshape(self.q.shape)
+        entries = np.where(entries > NOISE * entries.max(initial=0.0), entries, 0.0)
+        return np.asarray(entries.sum(axis=1) / np.maximum(np.count_nonzero(entries, axis=1), 1))
+
+    @cached_property
+    def reach(self) -> np.ndarray:
+        """(p,) largest entry of every column of V."""
+        return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
+
+    def altered(self, **values: Any) -> InterfaceProblem:
+        """Make the same problem with other values, which are known to fit and not checked again.
+
+        Parameters
+        ----------
+        values : New values of the fields, by their names.
+
+        Returns
+        -------
+        The problem with these values.
+        """
+        other = object.__new__(InterfaceProblem)
+        other.__dict__.update({f.name: self.__dict__[f.name] for f in fields(self)} | values)
+        return other
+
     def explicit(self) -> InterfaceProblem:
         """Make the same problem with Q an array.
 
@@ -207,7 +237,7 @@ class InterfaceProblem:
         -------
         The problem itself if its Q is an array. InputError if that would be too large.
         """
-        return self if isinstance(self.Q, np.ndarray) else replace(self, Q=dense(self.Q))
+        return self if isinstance(self.Q, np.ndarray) else self.altered(Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Compute the relative displacements u = Q r + V lambda + q.

@@ -4,7 +4,7 @@ that is the same in all directions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -89,8 +89,7 @@ def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
     blocks[:, 1:, 1:] = stretch
     places = np.arange(problem.contacts + 1)
     S = sp.csr_array(sp.bsr_array((blocks, places[:-1], places), 2 * (problem.q.size,)))
-    return replace(
-        problem,
+    return problem.altered(
         Q=turned(problem.Q, S),
         q=(S @ problem.q.ravel()).reshape(problem.q.shape),
         V=S @ problem.V,
@@ -135,11 +134,9 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     elif sp.issparse(problem.Q):
         Q = sp.csr_array(problem.Q / compliance + sp.diags_array(held.astype(float)))
     else:
-        entries = np.array(problem.Q / compliance)
-        entries[held, held] = 1.0
-        Q = entries
-    scaled = replace(
-        problem,
+        Q = problem.Q / compliance
+        Q[held, held] = 1.0
+    scaled = problem.altered(
         Q=Q,
         q=problem.q / length,
         V=V / columns,

@@ -64,8 +64,7 @@ def certificate_of_whole(
             u = (made.upper @ moves[upper] - made.lower @ moves[lower]).reshape(r.shape)
             u[:, 0] += made.gap
             law = law_of(pair, made)
-            off = r - law.project(r - measure.rho[:, None] * u)[0]
-            errors.append(float(np.linalg.norm(off, axis=1).max(initial=0.0)) / measure.force)
+            errors.append(float(measure.errors(law, r, u).max(initial=0.0)))
             forces[upper] += made.upper.T @ r.ravel()
             forces[lower] -= made.lower.T @ r.ravel()
     except LookupError:

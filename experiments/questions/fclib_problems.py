@@ -1,18 +1,26 @@
 """How do the methods do on problems of other codes? `python -m experiments.questions.fclib_problems
-FOLDER [FOLDER ...]`.
+[--siconos PYTHON] FOLDER [FOLDER ...]`.
 
 The folders hold FCLib files (*.hdf5) and files in Siconos' text format (*.dat), which are not part
-of this project. The table of the default method beside the times of Siconos is printed first,
-within seconds; the other methods follow.
+of this project. PYTHON is an interpreter that can import siconos.numerics: its solvers then take
+the same files in the same run. The table of the default method is printed first; the other methods
+follow.
 """
 
 from __future__ import annotations
 
+import json
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
 
 from contactopt import InterfaceProblem, Solution, fclib, siconos_residual, solve
 from experiments.report import markdown, write
@@ -21,36 +29,57 @@ DEFAULT, OTHERS = "auto", ("proximal", "nsgs", "admm")
 TOL = 1e-8
 LIMIT, SHORT_LIMIT = 20.0, 5.0  # seconds a file, of the default method and of the others
 REPEATS, LONG = 3, 2.0  # a solve that takes longer than so many seconds is not repeated
-SOLVERS = ("PROX", "NSGS", "ADMM", "NSN_AC")
-# Seconds of four of Siconos' solvers (numerics component, August 2026, C, one core of the same kind
-# of machine, tolerance
-# 1e-8, at most 20 s, order of magnitude), by the beginning of the file's name; None: not certified
-# or not measured.
-SICONOS: dict[str, tuple[float | None, ...]] = {
-    "Box_Stacks": (0.0, 0.0, 0.0, 0.0),
-    "CubeH8": (0.0, 0.0, 0.0, 0.0),
-    "LMGC_100": (1.05, 1.85, None, None),
-    "local_problem": (0.04, None, 0.01, None),
-    "Capsules-i97": (0.14, 0.12, 0.06, None),
-    "Capsules-i100": (0.026, 1.11, 0.27, None),
-    "Capsules-i122": (0.316, 7.0, 4.7, None),
-    "KaplasTower": (7.6, 0.24, 0.045, None),
-    "fc2d_granularflow": (None, None, None, None),
-    "OneObject": (0.044, None, 0.004, 0.001),
-    "FrictionContactProblem00727": (None, 0.01, None, None),
-    "FrictionContactProblem00071": (None, 0.0, None, None),
-    "Confeti": (0.001, 0.0, None, 0.0),
-    "Rover1039": (0.001, 0.0, 0.001, 0.0),
-    "Rover9770": (0.001, 0.0, 0.001, 0.0),
-    "NESpheres": (0.0, 0.0, 0.0, 0.0),
-}
+SOLVERS = ("NSGS", "PROX", "ADMM", "NSN_AC", "VI_EG")
+SHIFT = 1e-3  # of the shifted geometric means [s]
+
+# What an interpreter with Siconos runs: a file, a solver, the tolerance, the repetitions. It prints
+# the median of the processor seconds of the solve alone, and the reactions.
+SICONOS = """
+import json, statistics, sys, time
+import numpy as np
+import siconos.numerics as sn
+problem = sn.frictionContact_new_from_filename(sys.argv[1])
+dim, times = problem.dimension, []
+solve = sn.fc3d_driver if dim == 3 else sn.fc2d_driver
+solver = getattr(sn, f"SICONOS_FRICTION_{dim}D_{sys.argv[2]}")
+while len(times) < int(sys.argv[4]) and sum(times) < 2:
+    r, v = np.zeros(problem.M.size0), np.zeros(problem.M.size0)
+    options = sn.SolverOptions(solver)
+    options.dparam[0], options.iparam[0] = float(sys.argv[3]), 100000
+    start = time.process_time()
+    solve(problem, r, v, options)
+    times.append(time.process_time() - start)
+print("ANSWER", json.dumps([statistics.median(times), r.tolist()]))
+"""
 
 
-def quoted(name: str) -> tuple[float | None, ...]:
-    """Seconds of Siconos' solvers for the file of that name."""
-    return next(
-        (t for start, t in SICONOS.items() if name.startswith(start)), (None,) * len(SOLVERS)
-    )
+def as_text(problem: InterfaceProblem) -> str:
+    """The problem in Siconos' text format, in sparse blocks."""
+    (k, d), Q = problem.q.shape, sp.bsr_array(sp.csr_array(problem.Q), blocksize=2 * (problem.dim,))
+    Q.sort_indices()
+    ends, blocks = d * np.arange(1, k + 1), len(Q.indices)
+    head = [d, k, 1, k * d, k * d, blocks, k, k, *ends, *ends, k + 1, blocks]
+    numbers = [*head, *Q.indptr, *Q.indices]
+    for number, block in enumerate(Q.data):
+        numbers += [number, *block.T.ravel().tolist()]
+    return "\n".join(map(str, [*numbers, *problem.q.ravel().tolist(), *problem.mu.tolist()]))
+
+
+def of_siconos(python: str, problem: InterfaceProblem, solver: str) -> float | None:
+    """Seconds of one of Siconos' solvers; None where it is not certified by its own measure."""
+    with tempfile.NamedTemporaryFile("w", suffix=".dat") as file:
+        file.write(as_text(problem))
+        file.flush()
+        command = [python, "-c", SICONOS, file.name, solver, str(TOL), str(REPEATS)]
+        with suppress(subprocess.TimeoutExpired):
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+            for line in done.stdout.splitlines():
+                if line.startswith("ANSWER"):
+                    seconds, r = json.loads(line.removeprefix("ANSWER"))
+                    reactions = np.array(r).reshape(problem.q.shape)
+                    good = siconos_residual(problem, reactions) <= TOL
+                    return float(seconds) if good else None
+    return None
 
 
 def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solution, float]:
@@ -63,11 +92,11 @@ def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solutio
     return solution, statistics.median(times)
 
 
-def beside_siconos(path: Path) -> dict[str, Any]:
-    """The default method on one file, and what Siconos' solvers take for it."""
+def beside_siconos(path: Path, python: str | None) -> dict[str, Any]:
+    """The default method on one file, and what Siconos' solvers take for it in the same run."""
     problem = fclib.read(path)
     solution, seconds = timed(problem, DEFAULT, LIMIT)
-    known = quoted(path.name)
+    known = [python and of_siconos(python, problem, solver) for solver in SOLVERS]
     return {
         "folder": path.parent.resolve().name,
         "problem": path.stem,
@@ -77,8 +106,8 @@ def beside_siconos(path: Path) -> dict[str, Any]:
         "Siconos' residual": siconos_residual(problem, solution.reactions, solution.multipliers),
         "iterations": solution.iterations,
         "seconds": seconds,
-        "best of Siconos": min((t for t in known if t is not None), default="-"),
-        **{solver: "-" if t is None else t for solver, t in zip(SOLVERS, known)},
+        "best of Siconos": min((t for t in known if t), default="-"),
+        **{solver: t or "-" for solver, t in zip(SOLVERS, known)},
     }
 
 
@@ -109,11 +138,29 @@ def totals(rows: list[dict[str, Any]], key: str) -> list[dict[str, Any]]:
     return out
 
 
+def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Shifted geometric means over the files that a solver of Siconos certifies."""
+    both = [row for row in rows if row["best of Siconos"] != "-"]
+    return [
+        {
+            "seconds of": name,
+            "files": len(both),
+            "shifted geometric mean [s]": float(
+                np.exp(np.mean([np.log(row[name] + SHIFT) for row in both])) - SHIFT
+            ),
+        }
+        for name in ("seconds", "best of Siconos")
+        if both
+    ]
+
+
 TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone,
 medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the
-published measure, which depends on units. The last columns quote the seconds that Siconos'
-solvers take for the same files on a machine of the same kind, as an order of magnitude; - where
-they do not reach 1e-8 in 20 s or were not measured.
+published measure, which depends on units. The last columns are the seconds of Siconos' solvers in
+the same run, certified by that measure; - where they do not reach 1e-8 in {limit:g} s. The shifted
+geometric means (1 ms) compare the default method with the best of these solvers for each file.
+
+{{means}}
 
 ## The default method
 
@@ -133,24 +180,28 @@ At most {short:g} s a file.
 """
 
 if __name__ == "__main__":
+    folders, python = sys.argv[1:], None
+    if folders[:1] == ["--siconos"]:
+        python, folders = folders[1], folders[2:]
     files = [
         path
-        for folder in sys.argv[1:]
+        for folder in folders
         for kind in ("*.hdf5", "*.dat")
         for path in sorted(Path(folder).glob(kind))
     ]
     if not files:
         sys.exit(
-            "usage: python -m experiments.questions.fclib_problems FOLDER [FOLDER ...], with files"
-            " *.hdf5 or *.dat"
+            "usage: python -m experiments.questions.fclib_problems [--siconos PYTHON] FOLDER"
+            " [FOLDER ...], with files *.hdf5 or *.dat"
         )
-    default = [beside_siconos(path) for path in files]
-    folders = totals(default, "folder")
-    print(markdown(folders), markdown(default), sep="\n\n", flush=True)
+    default = [beside_siconos(path, python) for path in files]
+    certified = totals(default, "folder")
+    print(markdown(certified), markdown(means(default)), markdown(default), sep="\n\n", flush=True)
     others = [of_another(path, method) for method in OTHERS for path in files]
     text = TEXT.format(long=LONG, limit=LIMIT, short=SHORT_LIMIT)
     tables = {
-        "folders": folders,
+        "folders": certified,
+        "means": means(default),
         "default": default,
         "methods": totals(others, "method"),
         "others": others,

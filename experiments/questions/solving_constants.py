@@ -25,12 +25,16 @@ HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
 USERS = {
     "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH "
-    "ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER": (
+    "ROUND SPARSE_ROUND PATHS TURNING EAGER_ALPHA GENTLE_ALPHA LARGER": (
         "auto",
         "auto",
         ("elastic", "rigid", "packing"),
     ),
-    "FALL RISE GENTLE_FALL GENTLE_RISE EASY": ("proximal", "proximal", ("elastic", "rigid")),
+    "FALL RISE GENTLE_FALL GENTLE_RISE EASY EAGER_STEPS": (
+        "proximal",
+        "proximal",
+        ("elastic", "rigid"),
+    ),
     "SUBPROBLEM_STEPS SHORTEST MEMORY ENOUGH": (
         "kernels.sparse_newton",
         "proximal",
@@ -115,8 +119,10 @@ def setting(name: str, value: Any) -> Iterator[None]:
         for names, (module, _, _) in USERS.items():
             if name in names.split():
                 user = import_module(f"{HOME}.{module}")
-                stack.callback(setattr, user, name, getattr(user, name))
-                setattr(user, name, value)
+                for where in (constants, user):
+                    if hasattr(where, name):
+                        stack.callback(setattr, where, name, getattr(where, name))
+                        setattr(where, name, value)
         yield
 
 

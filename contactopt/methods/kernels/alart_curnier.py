@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg as la
@@ -21,7 +22,7 @@ from contactopt.methods.constants import LOOSE
 from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded
 from contactopt.methods.kernels.krylov import krylov_step
 from contactopt.methods.kernels.semismooth import RIDGE, Equations
-from contactopt.methods.kernels.sparse_blocks import block_matrix
+from contactopt.methods.kernels.sparse_blocks import block_matrix, factorised
 from contactopt.methods.kernels.sparse_newton import block_step
 from contactopt.methods.method import Iterate
 from contactopt.methods.preconditioners import Preconditioner
@@ -93,15 +94,23 @@ def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> n
     return problem.law.nearest(r, np.maximum(r[:, 0], problem.law.lowest))
 
 
-def definite(Q: sp.csr_array) -> bool:
-    """Say whether a sparse symmetric Q is safely positive definite, as that of elastic bodies
-    without redundant contacts; False also where its factorisation fails.
+def definite(Q: np.ndarray | sp.csr_array) -> bool:
+    """Say whether a symmetric Q, sparse or an array, is safely positive definite, as that of
+    elastic bodies without redundant contacts; False also where its factorisation fails.
     """
     try:
-        factors = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except RuntimeError:
+        if sp.issparse(Q):
+            factors = splu(
+                sp.csc_array(Q),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+            pivots = factors.U.diagonal()
+        else:
+            pivots = np.linalg.cholesky(Q).diagonal() ** 2
+    except (RuntimeError, np.linalg.LinAlgError):
         return False
-    pivots = factors.U.diagonal()
     return bool(pivots.min() > LEAST_PIVOT**2 * pivots.max())
 
 
@@ -115,26 +124,22 @@ def newton_steps(problem: InterfaceProblem, P: Preconditioner | None = None) -> 
             return krylov_step(equations, P, error, balance, D, rtol)
 
         return step, step
+    solver: Callable[..., Iterate | None]
     if sp.issparse(problem.Q):
-        matrix = block_matrix(problem.Q, problem.dim)
+        solver = partial(block_step, matrix=block_matrix(problem.Q, problem.dim))
+    else:
+        factor: Bonded | None = None
+        if len(problem.s):  # it pays for elastic bodies that a plate presses together
+            with suppress(la.LinAlgError):
+                factor = Bonded(problem.Q, problem.V)
+        solver = partial(_dense_step, factor=factor)
 
-        def sparse(ridge: float) -> Step:
-            return lambda equations, error, balance, D, rtol: block_step(
-                equations, matrix, error, balance, D, ridge
-            )
-
-        return sparse(RIDGE), sparse(GLUE)
-    factor: Bonded | None = None
-    if len(problem.s):  # it pays for elastic bodies that a plate presses together
-        with suppress(la.LinAlgError):
-            factor = Bonded(problem.Q, problem.V)
-
-    def dense(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: _dense_step(
-            equations, factor, error, balance, D, ridge
+    def exact(ridge: float) -> Step:
+        return lambda equations, error, balance, D, rtol: solver(
+            equations, error=error, balance=balance, D=D, ridge=ridge
         )
 
-    return dense(RIDGE), dense(GLUE)
+    return exact(RIDGE), exact(GLUE)
 
 
 def _dense_step(
@@ -169,12 +174,28 @@ def cold_start(
     if not glued.any():
         return zero
     equations = coulomb_equations(problem)
-    glue = replace(glued_projection(equations, glued), rho=np.ones(problem.contacts))
-    _, error, balance, D = glue.evaluate(*zero)
-    bonded = (step or newton_steps(problem)[1])(glue, error, balance, D, accuracy)
+    if isinstance(problem.Q, np.ndarray) and not len(problem.s):
+        bonded = _bonded(problem, np.repeat(glued, problem.dim))
+    else:
+        glue = replace(glued_projection(equations, glued), rho=np.ones(problem.contacts))
+        _, error, balance, D = glue.evaluate(*zero)
+        bonded = (step or newton_steps(problem)[1])(glue, error, balance, D, accuracy)
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda point: equations.evaluate(*point)[0])
+
+
+def _bonded(problem: InterfaceProblem, glued: np.ndarray) -> Iterate | None:
+    """The forces that hold the components `glued` (k dim,) at rest, for an array Q and no plate;
+    None if there are none.
+    """
+    Q = problem.Q if glued.all() else problem.Q[np.ix_(glued, glued)]
+    inverse = factorised(Q + GLUE * np.eye(len(Q)))
+    if inverse is None:
+        return None
+    r = np.zeros(problem.q.shape)
+    r.ravel()[glued] = inverse(-problem.q.ravel()[glued])
+    return (r, np.zeros(0)) if np.isfinite(r).all() else None
 
 
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:

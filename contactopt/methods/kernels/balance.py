@@ -140,6 +140,8 @@ def settled(
     r are the forces (k, d), D is the derivative of the law's map there, and `displacements` gives u
     (k, d).
     """
+    if not len(equations.s):
+        return None
     loose = loose_motions(equations.V, D)
     if not loose.size:
         return None

@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.methods.kernels.interior import Lorentz, System, det, times
+from contactopt.methods.kernels.interior import Lorentz, System, det
 from contactopt.methods.kernels.sparse_blocks import Blocks
 from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
@@ -102,7 +102,7 @@ class Along:
     def relative(self, change: Point) -> Relative:
         """A change over the point, in Nesterov and Todd's scaling."""
         root, scaling = np.sqrt(self.mean), self.system.scaling
-        x, z = times(scaling.M, change.x), times(scaling.M_inverse, change.z)
+        x, z = scaling.scaled(change.x), scaling.unscaled(change.z)
         return x / root, z / root, change.t / self.point.t
 
     def size(self, change: Point) -> float:
@@ -119,8 +119,7 @@ class Along:
         """Of the determinant of the equations by x, z and lambda, but for a constant factor: 1
         where t falls going forward, -1 where it rises.
         """
-        cones, solve = self.system.cones, self.system.solve
-        V = cones.problem.V[cones.kept.ravel()]
+        V, solve = self.system.cones.V, self.system.solve
         plates = np.sign(np.linalg.det(V.T @ solve(V))) if V.shape[1] else 1.0
         return solve.sign() * float(plates)
 

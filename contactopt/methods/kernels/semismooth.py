@@ -11,16 +11,16 @@ Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 
 from __future__ import annotations
 
 import logging
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
-import scipy.linalg as la
 
 from contactopt.errors import BackendError
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import Interface
+from contactopt.methods.kernels.sparse_blocks import assembled, factorised
 from contactopt.methods.method import Iterate
 from contactopt.methods.notes import note
 
@@ -59,12 +59,14 @@ class Equations:
     weight: float = 0.0
 
     def __post_init__(self) -> None:
-        rho = np.broadcast_to(np.asarray(self.rho, dtype=float), (len(self.q),))
-        object.__setattr__(self, "rho", rho)
+        if not isinstance(self.rho, np.ndarray):
+            object.__setattr__(self, "rho", np.full(len(self.q), float(self.rho)))
 
     def displacements(self, r: np.ndarray, lam: np.ndarray) -> np.ndarray:
         """u (k, d)."""
-        u = (self.Q @ r.ravel() + self.V @ lam).reshape(r.shape) + self.q
+        u = (self.Q @ r.ravel()).reshape(r.shape) + self.q
+        if len(lam):
+            u += (self.V @ lam).reshape(r.shape)
         return np.asarray(u + self.weight * (r - self.center) if self.weight else u)
 
     def evaluate(
@@ -75,7 +77,7 @@ class Equations:
         """
         P, D = self.project(r - self.rho[:, None] * self.displacements(r, lam))
         error, balance = P - r, self.V.T @ r.ravel() + self.s
-        return float(np.sqrt(np.sum(error**2) + np.sum(balance**2))), error, balance, D
+        return sqrt(np.vdot(error, error) + balance @ balance), error, balance, D
 
     def step(
         self, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float = RIDGE
@@ -87,46 +89,28 @@ class Equations:
         friction, its rows are those of rho Q.
         """
         k, d = error.shape
-        p = self.V.shape[1]
+        dr = error.ravel().copy()
         # Open contacts: dr = error. The unknowns are the other dr and dlambda, in one square
         # matrix.
-        closed = np.any(D != 0, axis=(1, 2))
-        mask = np.repeat(closed, d)
-        rows, gone = np.flatnonzero(mask), np.flatnonzero(~mask)
-        dr = error.ravel().copy()
-        n = len(rows)
+        kept = np.repeat(D.reshape(k, d * d).any(axis=1), d)
+        rows, gone = np.flatnonzero(kept), np.where(kept, 0.0, dr)
+        n, p = len(rows), len(balance)
         if n + p == 0:
             return dr.reshape(k, d), np.zeros(p)
-        rho = np.repeat(self.rho, d)[rows]
-        matrix = np.zeros((n + p, n + p))
-        matrix[:n, :n] = self.Q if n == k * d else self.Q[np.ix_(rows, rows)]
-        matrix[np.arange(n), np.arange(n)] += self.weight + ridge
-        matrix[:n, n:] = self.V[rows]
-        matrix[:n] *= rho[:, None]  # now rho (Q dr + V dlambda), the rows of a contact that sticks
-        matrix[n:, :n] = self.V[rows].T
-        coupling = np.zeros(n)
-        if np.any(dr[gone]):
-            coupling = rho * (self.Q[np.ix_(rows, gone)] @ dr[gone])
-        # Where D is not I the rows become D (rho (Q dr + V dlambda) - dr) + dr.
-        D = D[closed]
-        bent = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))  # contacts that slip
-        index = (bent[:, None] * d + np.arange(d)).ravel()
-        matrix[index, index] -= 1.0
-        block = matrix[:n] if len(index) == n else matrix[index]  # all slip: no copy
-        matrix[index] = (D[bent] @ block.reshape(len(bent), d, n + p)).reshape(len(index), n + p)
-        matrix[index, index] += 1.0
-        coupling[index] = (D[bent] @ coupling[index].reshape(len(bent), d, 1)).ravel()
-        right = np.concatenate([dr[rows] - coupling, -balance - self.V[gone].T @ dr[gone]])
-        try:
-            with warnings.catch_warnings():
-                # a bad step is seen by its residual
-                warnings.simplefilter("ignore", la.LinAlgWarning)
-                # The transpose of a C array is what LAPACK factorises in place.
-                factors = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
-                x = la.lu_solve(factors, right, trans=1, check_finite=False)
-        except (la.LinAlgError, ValueError):
+        scaled = self.rho[:, None, None] * D
+        matrix = assembled(self.Q, scaled, np.eye(d) - D + (self.weight + ridge) * scaled, kept)
+        right = dr[rows]
+        if gone.any():  # what the open contacts lose moves the others
+            right -= (scaled @ (self.Q @ gone).reshape(k, d, 1)).ravel()[rows]
+        if p:
+            moved = (scaled @ self.V.reshape(k, d, p)).reshape(k * d, p)[rows]
+            matrix = np.block([[matrix, moved], [self.V[rows].T, np.zeros((p, p))]])
+            right = np.concatenate([right, -balance - self.V.T @ gone])
+        factors = factorised(matrix)
+        if factors is None:
             return None
-        if not np.all(np.isfinite(x)):
+        x = factors.apply(right)
+        if not np.isfinite(x).all():
             return None
         dr[rows] = x[:n]
         return dr.reshape(k, d), x[n:]

@@ -10,20 +10,21 @@ factors.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from contactopt.linear.operators import Interface
 from contactopt.methods.constants import FULL, SMALL
 
-PIVOT = 0.01  # a diagonal entry this much smaller than the largest of its column is still a pivot
+# A diagonal entry this much smaller than the largest of its column is still a pivot: other pivots
+# destroy the order of elimination, and the factors fill.
+PIVOT = 1e-4
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,43 @@ class Solver:
         return self.apply(right)
 
 
+def assembled(
+    Q: np.ndarray, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray
+) -> np.ndarray:
+    """Write the rows and columns `kept` (n,), of whole contacts or not, of diag(left) Q +
+    diag(added) as an array of its own; left, added (k, d, d). left None stands for the identity.
+    """
+    k, d = added.shape[:2]
+    used = kept.reshape(k, d).any(axis=1)
+    if not used.all():  # only their contacts, then only their components
+        rows = np.flatnonzero(np.repeat(used, d))
+        Q, added, kept = Q[np.ix_(rows, rows)], added[used], kept[rows]
+        left, k = None if left is None else left[used], len(added)
+    n = k * d
+    A = Q.copy() if left is None else (left @ Q.reshape(k, d, n)).reshape(n, n)
+    own = np.arange(k)
+    A.reshape(k, d, k, d)[own, :, own, :] += added
+    return A if kept.all() else A[np.ix_(kept, kept)]
+
+
+def factorised(A: np.ndarray) -> Solver | None:
+    """The solver with an array A (n, n), which is overwritten; None if A is singular.
+
+    The transpose of an array in rows is what LAPACK factorises in place.
+    """
+    if not len(A):
+        return Solver(lambda right: right, lambda: 1.0)
+    lu, swapped, info = dgetrf(np.ascontiguousarray(A).T, overwrite_a=True)
+    if info:
+        return None
+
+    def sign() -> float:
+        swaps = np.count_nonzero(swapped != np.arange(len(lu)))
+        return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
+
+    return Solver(lambda right: np.asarray(dgetrs(lu, swapped, right, trans=1)[0]), sign)
+
+
 class DenseBlocks:
     """Q (n, n) as an array, blocks of d."""
 
@@ -53,26 +91,7 @@ class DenseBlocks:
 
         left None stands for the identity.
         """
-        k, d, n = len(added), self.d, len(self.Q)
-        A = self.Q.copy() if left is None else (left @ self.Q.reshape(k, d, n)).reshape(n, n)
-        diagonal = np.arange(k)
-        A.reshape(k, d, k, d)[diagonal, :, diagonal, :] += added
-        A = A if kept.all() else A[np.ix_(kept, kept)]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
-            try:
-                factors = la.lu_factor(A, overwrite_a=True, check_finite=False)
-            except (la.LinAlgError, ValueError):
-                return None
-        lu, swapped = factors
-
-        def sign() -> float:
-            swaps = np.count_nonzero(swapped != np.arange(len(lu)))
-            return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
-
-        return Solver(
-            lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign
-        )
+        return factorised(assembled(self.Q, left, added, kept))
 
 
 class SparseBlocks:
@@ -87,22 +106,21 @@ class SparseBlocks:
 
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
-        # Every entry belongs to the block of its row's and its column's contact. Blocks are
-        # numbered row by row, and every diagonal block is there, because something will be added.
-        entries = sp.coo_array(Q)
-        i, j = (index.astype(np.int64) for index in entries.coords)
-        own = np.arange(self.k)
-        keys = np.concatenate([(i // d) * self.k + j // d, own * self.k + own])
+        # Blocks are numbered row by row, and every diagonal block is there, because something will
+        # be added.
+        filled, own = sp.bsr_array(Q, blocksize=(d, d)), np.arange(self.k)
+        rows = np.repeat(own, np.diff(filled.indptr))
+        keys = np.concatenate([rows * self.k + filled.indices, own * self.k + own])
         unique, where = np.unique(keys, return_inverse=True)
         self.rows, self.columns = unique // self.k, unique % self.k
         self.blocks = np.zeros((len(unique), d, d))
-        self.blocks[where[: len(i)], i % d, j % d] = entries.data
-        self.home = where[len(i) :]
-        self.unknown, self.order, self.row, self.column = self._arranged()
+        self.blocks[where[: len(rows)]] = filled.data
+        self.home = where[len(rows) :]
+        self.unknown, self.entries = self._arranged()
 
-    def _arranged(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The unknowns in an order of elimination of least degree, and the entries by compressed
-        columns of that order.
+    def _arranged(self) -> tuple[np.ndarray, sp.csc_array]:
+        """The unknowns in an order of elimination of least degree, and the numbers of the entries
+        of all blocks in compressed columns of that order.
         """
         d, n = self.d, self.d * self.k
         # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that
@@ -120,23 +138,22 @@ class SparseBlocks:
         columns = (self.columns[:, None] * d + local)[:, None, :]
         row = place[np.broadcast_to(rows, self.blocks.shape)].ravel()
         column = place[np.broadcast_to(columns, self.blocks.shape)].ravel()
-        order = np.lexsort((row, column))
-        return np.argsort(place), order, row[order], column[order]
+        numbers = np.arange(self.blocks.size)
+        return np.argsort(place), sp.csr_array((numbers, (row, column)), shape=(n, n)).tocsc()
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
         """As DenseBlocks.factor."""
         blocks = self.blocks.copy() if left is None else left[self.rows] @ self.blocks
         blocks[self.home] += added
         # Take the entries by columns, and leave out the unknowns that are not kept.
-        values, row, column = blocks.ravel()[self.order], self.row, self.column
-        stays = kept[self.unknown]  # in the order of elimination
-        m = int(stays.sum())
-        if m < len(stays):
-            inside = stays[row] & stays[column]
-            new = np.cumsum(stays) - 1
-            values, row, column = values[inside], new[row[inside]], new[column[inside]]
-        ends = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=m))])
-        matrix = sp.csc_array((values, row.astype(np.int32), ends.astype(np.int32)), shape=(m, m))
+        places = self.entries
+        index = self.unknown  # places in the right-hand side, in the order of elimination
+        if not kept.all():
+            stays = np.flatnonzero(kept[index])
+            places = places[:, stays][stays]
+            index = (np.cumsum(kept) - 1)[index[stays]]
+        values = blocks.ravel()[places.data]
+        matrix = sp.csc_array((values, places.indices, places.indptr), shape=places.shape)
         try:
             factors = splu(
                 matrix,
@@ -146,7 +163,6 @@ class SparseBlocks:
             )
         except (RuntimeError, ValueError):
             return None
-        index = (np.cumsum(kept) - 1)[self.unknown[stays]]  # places in the right-hand side
 
         def solve(right: np.ndarray) -> np.ndarray:
             x = np.empty_like(right)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.methods.constants import ENOUGH, MEMORY, SHORTEST, SUBPROBLEM_STEPS
+from contactopt.methods import constants
 from contactopt.methods.kernels.semismooth import Equations
 from contactopt.methods.kernels.sparse_blocks import Blocks, bordered
 from contactopt.methods.method import Iterate
@@ -51,14 +51,14 @@ def block_step(
 
 
 def solve_subproblem(
-    equations: Equations, matrix: Blocks, point: Iterate
+    equations: Equations, matrix: Blocks, point: Iterate, most: int | None = None
 ) -> tuple[Iterate, bool, int]:
     """The last iterate of Newton's method with a line search on the equations of a proximal
-    subproblem, whether it solves the subproblem, and the steps.
+    subproblem, whether it solves the subproblem, and the steps, of which at most so many are taken.
     """
     residual, error, balance, D = equations.evaluate(*point)
-    recent = [residual]
-    for steps in range(1, SUBPROBLEM_STEPS + 1):
+    recent, most = [residual], most or constants.SUBPROBLEM_STEPS
+    for steps in range(1, most + 1):
         check_time()
         change = block_step(equations, matrix, error, balance, D)
         if change is None:
@@ -67,15 +67,15 @@ def solve_subproblem(
         while True:
             trial = point[0] + length * change[0], point[1] + length * change[1]
             residual, error, balance, D = equations.evaluate(*trial)
-            if residual <= max(recent[-MEMORY:]):
+            if residual <= max(recent[-constants.MEMORY :]):
                 break
             length /= 2
-            if length < SHORTEST:
+            if length < constants.SHORTEST:
                 return point, False, steps
         point = trial
         recent.append(residual)
         moved = equations.rho[:, None] * (point[0] - equations.center)
-        goal = ENOUGH * equations.weight * float(np.linalg.norm(moved))
+        goal = constants.ENOUGH * equations.weight * float(np.linalg.norm(moved))
         if residual <= max(DONE * float(np.linalg.norm(point[0])), goal):
             return point, True, steps
-    return point, False, SUBPROBLEM_STEPS
+    return point, False, most

@@ -14,7 +14,7 @@ import numpy as np
 from contactopt.errors import BackendError
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import diagonal
-from contactopt.methods.constants import ACTIVE_SETS, SUCCESS, WEIGHT_FALL, WEIGHT_RISE
+from contactopt.methods import constants
 from contactopt.methods.kernels.krylov import krylov_step
 from contactopt.methods.kernels.semismooth import Equations, Projection
 from contactopt.methods.method import Iterate
@@ -57,11 +57,11 @@ class KrylovSubproblem:
             if residual <= EXACT * size:
                 return point
             left, new = self._active_sets(self._equations(r, multipliers, point[0], weight), *point)
-            if left <= SUCCESS * residual:
-                point, weight = new, weight / WEIGHT_FALL
+            if left <= constants.SUCCESS * residual:
+                point, weight = new, weight / constants.WEIGHT_FALL
                 residual = equations.evaluate(*point)[0]
             else:
-                weight *= WEIGHT_RISE
+                weight *= constants.WEIGHT_RISE
         if residual > USABLE * size:
             kind = "normal" if self.normal else "tangential"
             raise BackendError(f"backend 'pcg' misses the {kind} problem by {residual / size:.1e}")
@@ -80,7 +80,7 @@ class KrylovSubproblem:
     ) -> tuple[float, Iterate]:
         """The best of ACTIVE_SETS Newton iterates, and its residual."""
         best, point, last = np.inf, (r, lam), np.inf
-        for _ in range(ACTIVE_SETS):
+        for _ in range(constants.ACTIVE_SETS):
             check_time()
             residual, error, balance, D = equations.evaluate(r, lam)
             if residual < best:

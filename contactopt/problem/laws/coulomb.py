@@ -11,7 +11,9 @@ import numpy as np
 from contactopt.problem.cones import (
     coulomb_cone,
     coulomb_cone_derivative,
+    disc,
     disc_of_height,
+    lengths,
     split,
     unit,
 )
@@ -58,10 +60,14 @@ class Coulomb(Law):
         D[~closed] = 0.0
         return P, D
 
+    def mapped(self, y: np.ndarray) -> np.ndarray:
+        height = np.maximum(y[:, 0], 0.0)
+        return np.column_stack([height, disc(y[:, 1:], self.mu * height)])
+
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
         n, t = split(y)
-        slides = (n > 0) & (np.linalg.norm(t, axis=1) > self.mu * n)
+        slides = (n > 0) & (lengths(t) > self.mu * n)
         return np.concatenate([np.zeros((len(y), 1)), (slides * n)[:, None] * unit(t)], axis=1)
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
-        return np.asarray(self.mu * np.linalg.norm(u_t, axis=1))
+        return np.asarray(self.mu * lengths(u_t))

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from contactopt.checks import real_array
 from contactopt.errors import InputError
-from contactopt.problem.cones import unit
+from contactopt.problem.cones import lengths, unit
 from contactopt.problem.laws.place import Place
 
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
-# a tangential force sticks if it is below its bound by more than this, relative to the bound
-BELOW = 1e-6
+BELOW = 1e-6  # a tangential force sticks if it is below its bound by a larger share of the bound
 
-# points (k, dim) and the generalised derivative (k, dim, dim)
-Projected = tuple[np.ndarray, np.ndarray]
+Projected = tuple[np.ndarray, np.ndarray]  # points (k, dim), generalised derivatives (k, dim, dim)
 
 
 class Kinks(NamedTuple):
@@ -36,7 +35,6 @@ class Law:
     """What all laws share.
 
     A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
-
     The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one
     number for all contacts. Methods ask a law for these properties, never for its name:
 
@@ -62,11 +60,9 @@ class Law:
                     f"{name} must be a number or one number per contact; got shape {value.shape}."
                 )
             if np.any(value < 0):
-                named = {"mu": "the friction coefficient mu", "limit": "the friction bound"}
-                raise InputError(
-                    f"{named.get(name, name)} must not be negative; its least value is"
-                    f" {value.min():g}."
-                )
+                known = {"mu": "the friction coefficient mu", "limit": "the friction bound"}
+                what, least = known.get(name, name), value.min()
+                raise InputError(f"{what} must not be negative; its least value is {least:g}.")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
@@ -85,7 +81,7 @@ class Law:
         """(k,) least normal force [force]: 0 where a contact may open, -inf where it cannot."""
         return np.zeros(self.contacts)
 
-    @property
+    @cached_property
     def unilateral(self) -> bool:
         """Whether every contact may open."""
         return bool(np.all(self.lowest == 0))
@@ -186,6 +182,10 @@ class Law:
         """
         return self.nearest_derivative(y, y[:, 0])
 
+    def mapped(self, y: np.ndarray) -> np.ndarray:
+        """P(y) (k, dim) of `project` alone."""
+        return self.project(y)[0]
+
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
         """Differentiate `project` by the law's parameter at each contact.
 
@@ -215,7 +215,7 @@ class Law:
         Two masks (k,).
         """
         normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
-        slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound_along(y)
+        slack = lengths(y[:, 1:]) - self.bound_along(y)
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
@@ -263,9 +263,7 @@ class Law:
         return np.zeros(len(u_t))
 
     def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float) -> np.ndarray:
-        """proj_K(r - rho (u + g n)) (k, dim), which is equal to r exactly where r and u obey the
-        law; rho is a step [force / length].
-        """
+        """proj_K(r - rho (u + g n)) (k, dim), equal to r exactly where r and u obey the law."""
         shifted = r - rho * u
         shifted[:, 0] -= rho * self.opening(u[:, 1:])
         return self.nearest(shifted, r[:, 0])
@@ -295,9 +293,7 @@ class Law:
         -------
         (k,) mask.
         """
-        return self.pressed(r) & (
-            np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound_along(r)
-        )
+        return self.pressed(r) & (lengths(r[:, 1:]) < (1 - BELOW) * self.bound_along(r))
 
     def scaled(self, force: float) -> Self:
         """The same law with forces in another unit."""
@@ -361,21 +357,17 @@ class Law:
 
         Parameters
         ----------
-        k : number of contacts
+        k : Number of contacts.
 
         Returns
         -------
-        A law of the same kind, with parameters (k,).
-
-        Raises
-        ------
-        InputError : if a parameter is an array of another length
+        A law of the same kind, with parameters (k,). InputError if one is an array of another
+        length.
         """
         for name in self.parameters:
-            if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
-                raise InputError(
-                    f"{name} must have shape {(k,)}; got {np.shape(getattr(self, name))}."
-                )
+            shape = np.shape(getattr(self, name))
+            if shape not in ((), (k,)):
+                raise InputError(f"{name} must have shape {(k,)}; got {shape}.")
         return self._mapped(lambda parameter: np.broadcast_to(parameter, (k,)))
 
     @classmethod
@@ -401,10 +393,8 @@ class Law:
     @property
     def digest(self) -> bytes:
         """The law's name and parameters as bytes, for a problem's fingerprint."""
-        name = type(self).__name__.encode()
-        return name + b"".join(
-            np.ascontiguousarray(getattr(self, p)).tobytes() for p in self.parameters
-        )
+        values = (np.ascontiguousarray(getattr(self, name)) for name in self.parameters)
+        return type(self).__name__.encode() + b"".join(value.tobytes() for value in values)
 
     def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
         return replace(self, **{name: change(getattr(self, name)) for name in self.parameters})  # type: ignore[type-var]
