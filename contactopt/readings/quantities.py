@@ -34,7 +34,7 @@ from contactopt.readings.edges import stick_reading, width_reading
 from contactopt.readings.peaks import Peak, Reading, pressure_reading
 from contactopt.readings.places import PLACED, place_of, pressure_weights, read_place, stress_seeds
 from contactopt.readings.resultants import views
-from contactopt.readings.slopes import by_normal_forces, of_stick
+from contactopt.readings.slopes import of_pressure, of_stick, of_width
 from contactopt.readings.state import Functional, Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
@@ -122,7 +122,9 @@ def elastic_energy(reduction: Reduction, solution: Solution) -> float:
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
-def _of_pair(read: Reader) -> Callable[[str, str, Scene], Quantity]:
+def _of_pair(
+    read: Reader, slopes: Callable[[State, int], Seeds]
+) -> Callable[[str, str, Scene], Quantity]:
     """A row whose quantity is read from the forces on one pair of surfaces; of the pressure also
     that at one contact, by its number.
     """
@@ -143,7 +145,6 @@ def _of_pair(read: Reader) -> Callable[[str, str, Scene], Quantity]:
                 f" {', '.join(names)}."
             )
         number = names.index(rest) if rest else 0
-        slopes = of_stick if read is stick_reading else partial(by_normal_forces, read)
         return Quantity(name, partial(slopes, pair=number), partial(_read_pair, read, number))
 
     return make
@@ -269,10 +270,10 @@ def _read_energy(reduction: Reduction, solution: Solution) -> Reading:
 
 # kind of a quantity -> what may follow its name, and a function of name, what follows, and scene
 ROWS: dict[str, tuple[str, Callable[[str, str, Scene], Quantity]]] = {
-    "pressure": ("[:PAIR]", _of_pair(pressure_reading)),
-    "width": ("[:PAIR]", _of_pair(width_reading)),
+    "pressure": ("[:PAIR]", _of_pair(pressure_reading, of_pressure)),
+    "width": ("[:PAIR]", _of_pair(width_reading, of_width)),
     "approach": ("", _of_scene(partial(_motion, component=0))),
-    "stick": ("[:PAIR]", _of_pair(stick_reading)),
+    "stick": ("[:PAIR]", _of_pair(stick_reading, of_stick)),
     "energy": ("", _of_scene(_energy, _read_energy)),
     "shift": ("", _of_scene(partial(_motion, component=1))),
     "normal_force": ("[:PAIR]", _pair_force),
