@@ -13,9 +13,10 @@ import numpy as np
 
 from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, named, weak_contacts
-from contactopt.derivatives.linear import Tangent, transposed_product
+from contactopt.derivatives.linear import Tangent, transposed
 from contactopt.errors import InputError
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.semismooth import Equations
 from contactopt.problem import (
     InterfaceProblem,
     Scales,
@@ -100,20 +101,24 @@ class Sensitivity:
         return np.asarray(r - self._rho[:, None] * u)
 
     @cached_property
+    def _equations(self) -> Equations:
+        """Dimensionless."""
+        return coulomb_equations(self._scaled[0])
+
+    @property
     def _rho(self) -> np.ndarray:
         """(k,) [force / length]."""
-        scaled, scales = self._scaled
-        return coulomb_equations(scaled).rho * scales.force / scales.length
+        scales = self._scaled[1]
+        return self._equations.rho * scales.force / scales.length
 
     @cached_property
     def tangent(self) -> Tangent:
         """The matrix M, dimensionless."""
-        scaled, scales = self._scaled
         D = self.problem.law.project(self._point)[1].copy()
         D[~self.problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
         D = self._moves[:, :, None] * D
-        return Tangent(scaled, self._rho * scales.length / scales.force, D)
+        return Tangent(self._scaled[0], self._equations, D)
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:
@@ -233,20 +238,16 @@ class Sensitivity:
         by_lam = _given("multipliers", multipliers, problem.s.shape)
         by_u = _given("displacements", displacements, problem.q.shape)
         if np.any(by_u):
-            by_r = by_r + transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
+            by_r = by_r + np.asarray(transposed(problem.Q) @ by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
-        z, a, b = self.tangent.solve_transposed(
-            (scales.force * by_r).ravel(), scales.multipliers * by_lam
-        )
+        scaled = (scales.force * by_r).ravel(), scales.multipliers * by_lam
+        z, b = self.tangent.solve_transposed(*scaled)
         by_q = by_u - self._moves * z.reshape(by_u.shape) / scales.length
         by_s = -b * scales.multipliers / (scales.force * scales.length)
 
         def by_parameter() -> np.ndarray:
-            P_mu, whole = self._by_parameter, a
-            # friction without a normal force, as in Tresca's law
-            if np.any(P_mu.ravel()[~self.tangent.is_closed]):
-                whole = a + self.tangent.on_open((scales.force * by_r).ravel(), z, b)
-            return np.asarray(np.sum(P_mu * whole.reshape(P_mu.shape), axis=1) / scales.force)
+            a, P_mu = self.tangent.multipliers(scaled[0], z, b), self._by_parameter
+            return np.asarray(np.sum(P_mu * a.reshape(P_mu.shape), axis=1) / scales.force)
 
         return Dual(by_q, by_s, self.solution.reactions, self.solution.multipliers, by_parameter)
 

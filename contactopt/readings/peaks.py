@@ -27,8 +27,8 @@ class Peak:
     place        (dim,) [length];   size  distance of the nodes there [length]
     contacts     (m,) numbers of the contacts from which it was read
     body, elements  where it lies inside a body: the number of the body and the elements around it
-    sources, slopes  (s,) numbers of all contacts that were read, and the derivatives of a pressure by
-                     the normal forces there [1 / area]
+    sources, slopes  (s,) numbers of all contacts that were read, and the derivatives of a pressure
+                     by the normal forces there [1 / area]
     """
 
     value: float
