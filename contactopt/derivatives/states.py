@@ -86,6 +86,12 @@ class Step(State):
         changed = which.put(scene, value + step)
         return changed, changed.parts[number], step
 
+    def _on_contacts(self, which: Parameter) -> tuple[Any, Any]:
+        """What a parameter changes at each contact: the gap, and the law's parameter."""
+        if which.kind == "mu":
+            return 0.0, self.law_change(which)
+        return float(which.kind == "gap"), float(which.kind == "friction")
+
     def _concerned(self, which: Parameter) -> list[int]:
         """The numbers of the bodies that a parameter changes."""
         parts = self.reduction.scene.parts
@@ -98,12 +104,11 @@ class Step(State):
         dU = [0.0 * U for U in self.displaced]
         ds = [np.zeros(len(body.resultants)) for body in bodies]
         for which, amount in direction.items():
-            if which.kind == "gap":
-                du[:, 0] += _one_per_contact(which, amount, len(du))
-            elif which.kind == "friction":
-                dmu += _one_per_contact(which, amount, len(du))
-            elif which.kind == "mu":
-                dmu += amount * self.law_change(which)
+            if which.is_field:
+                amount = _one_per_contact(which, amount, len(du))
+            by_gap, by_law = self._on_contacts(which)
+            du[:, 0] += amount * by_gap
+            dmu += amount * by_law
             for number in self._concerned(which):
                 old = bodies[number]
                 if which.kind in MATERIAL:
@@ -125,13 +130,11 @@ class Step(State):
         """The derivative by one parameter, (k,) where it has one number per contact, from the
         gradient by the data of the problem.
         """
-        if which.kind == "gap":
-            return back.dual.q[:, 0]
-        if which.kind == "friction":
-            return back.dual.mu
-        if which.kind == "mu":
-            return float(back.dual.mu @ self.law_change(which))
-        total = 0.0
+        by_gap, by_law = self._on_contacts(which)
+        each = by_gap * back.dual.q[:, 0] + (by_law * back.dual.mu if np.any(by_law) else 0.0)
+        if which.is_field:
+            return each
+        total = float(np.sum(each))
         for number in self._concerned(which):
             G, W = back.forces[number], back.fields[number]
             if which.kind in MATERIAL:

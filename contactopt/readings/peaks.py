@@ -80,7 +80,8 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
         usable &= radius > ON_PLANE * radius.max(initial=0.0)
     noise = solution.residual * float(np.linalg.norm(solution.reactions))
     found = []
-    for top in _maxima(problem, np.where(usable, pressure, 0.0)):
+    seen = np.where(usable, np.maximum(pressure, 0.0), 0.0)
+    for top in (i for i in maxima(seen, neighbours(problem)) if seen[i] > 0):
         peak = _fitted_top(problem, pressure, usable, top)
         uncertainty = peak.uncertainty + noise / float(problem.areas[top])
         found.append(replace(peak, uncertainty=uncertainty))
@@ -102,13 +103,12 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
     return np.asarray(node[near.reshape(problem.contacts, count)])
 
 
-def _maxima(problem: InterfaceProblem, pressure: np.ndarray) -> np.ndarray:
-    """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them
-    first, MOST_PEAKS at most.
+def maxima(sizes: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Numbers of the places whose size (k,) is that of no neighbour `near` (k, m) exceeded, the
+    largest of them first, MOST_PEAKS at most.
     """
-    largest = pressure[neighbours(problem)].max(axis=1)
-    chosen = np.flatnonzero((pressure > 0) & (pressure >= largest))
-    return chosen[np.argsort(-pressure[chosen], kind="stable")[:MOST_PEAKS]]
+    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
+    return chosen[np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]]
 
 
 def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -207,11 +207,10 @@ def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> np.
     for coefficient, (i, j) in zip(fit, powers):
         H[i, j] += coefficient / 2
         H[j, i] += coefficient / 2
-    at = np.empty((dim, 0))
-    if np.all(np.linalg.eigvalsh(H[1:, 1:]) < 0):
-        at = -np.linalg.solve(H[1:, 1:], H[1:, :1])
-        at = at[:, np.linalg.norm(at, axis=0) <= 0.5]
-    return _terms(at, powers)
+    if np.any(np.linalg.eigvalsh(H[1:, 1:]) >= 0):
+        return np.empty((0, len(powers)))
+    at = -np.linalg.solve(H[1:, 1:], H[1:, :1])
+    return _terms(at[:, np.linalg.norm(at, axis=0) <= 0.5], powers)
 
 
 def at_rim(reduction: Reduction, solution: Solution) -> bool:

@@ -28,8 +28,7 @@ from contactopt.bodies.fields import Region
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
-from contactopt.readings.constants import MOST_PEAKS
-from contactopt.readings.peaks import Peak, Reading
+from contactopt.readings.peaks import Peak, Reading, maxima
 from contactopt.readings.state import Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
@@ -191,7 +190,9 @@ def read_stress(
     stress = recovered.stress(U)
     if place.kind == LARGEST:
         sizes, slopes = von_mises(stress), von_mises_slopes(stress)
-        tops = _tops(recovered.places, sizes)
+        count = min(AROUND[reduction.scene.dim], len(sizes))
+        points = recovered.places.T
+        tops = maxima(sizes, cKDTree(points).query(points, k=count)[1].reshape(-1, count)).tolist()
     else:
         column = STRESSES[reduction.scene.kind].index(place.kind)
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
@@ -214,17 +215,6 @@ def read_stress(
     return StressReading(
         float(sizes[top]), uncertainty, peaks, body=number, map=recovered, slopes=slopes
     )
-
-
-def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
-    """Numbers of the places (dim, m) where a size (m,) is that of no neighbour exceeded, the
-    largest of them first.
-    """
-    count = min(AROUND[len(places)], len(sizes))
-    near = cKDTree(places.T).query(places.T, k=count)[1].reshape(len(sizes), count)
-    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
-    order = np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]
-    return [int(i) for i in chosen[order]]
 
 
 def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tuple[int, StressMap]:
@@ -307,15 +297,11 @@ def read_place(place: Place, reduction: Reduction, solution: Solution) -> Readin
     if len(near) < 3:
         scatter = float(np.abs(pressure - value) @ np.abs(share))
     else:
-        left = _left(points[:, near], pressure)
-        scatter = float(np.sqrt(np.sum(left**2) * np.sum(share**2)))
+        terms = np.vstack([np.ones(len(near)), points[:, near]]).T
+        left = pressure - terms @ np.linalg.lstsq(terms, pressure, rcond=None)[0]
+        scatter = float(np.linalg.norm(left) * np.linalg.norm(share))
     noise = solution.residual * float(np.linalg.norm(r) / areas.min())
     size = float(np.ptp(points[:, near], axis=1).max())
     peak = Peak(value, scatter, points[:, near[0]], size, near)
     return Reading(value, scatter + noise, (peak,), missing)
 
-
-def _left(points: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """What a linear function through values (m,) at points (dim, m) leaves of them."""
-    terms = np.vstack([np.ones(points.shape[1]), points - points.mean(axis=1, keepdims=True)]).T
-    return np.asarray(values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0])

@@ -145,7 +145,9 @@ def _of_pair(
                 f" {', '.join(names)}."
             )
         number = names.index(rest) if rest else 0
-        return Quantity(name, partial(slopes, pair=number), partial(_read_pair, read, number))
+        return Quantity(
+            name, lambda state: slopes(state, number), partial(_read_pair, read, number)
+        )
 
     return make
 
