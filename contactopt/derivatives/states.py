@@ -2,9 +2,8 @@
 
 At fixed contact forces r and multipliers lambda a parameter of the scene moves each body by dU_b,
 the relative displacement by du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter
-by dmu (contactopt.coupling.reduction). A change dA of a stiffness acts like the load -dA U: dU = -C
-dA U, so that neither dC nor dQ is ever formed. What follows is the derivative of the interface
-problem by q, s and mu (contactopt.derivatives.interface).
+by dmu. A change dA of a stiffness acts like the load -dA U: dU = -C dA U, so that neither dC nor dQ
+is ever formed. What follows is contactopt.derivatives.interface.
 
 The adjoint takes the gradient (q*, s*, mu*) by these data back to the bodies. With G_b = B_b' q*
 and W_b = C_b G_b + motions_b s* the derivative by a constant of a material is -W_b' dA_b U_b, and
@@ -94,8 +93,7 @@ class Step(State):
 
     def _concerned(self, which: Parameter) -> list[int]:
         """The numbers of the bodies that a parameter changes."""
-        parts = self.reduction.scene.parts
-        return [number for number, part in enumerate(parts) if which.concerns(part)]
+        return [i for i, part in enumerate(self.reduction.scene.parts) if which.concerns(part)]
 
     def explicit(self, direction: Direction, base: Reduction) -> Explicit:
         """What a direction changes at fixed forces and multipliers."""
@@ -289,12 +287,13 @@ def solved_chain(
     base: Reduction | None = None,
     starts: Sequence[Solution] | None = None,
     Q: str = "auto",
+    gap: np.ndarray | float = 0.0,
 ) -> Chain:
     """Solve the states of a load path, without their energies, to the certificate `tol`.
 
-    A path of one scene is one state. `base` is a reduction of the same bodies, which is then only
-    loaded anew; `starts` has a solution for every state to start from. InputError where a state has
-    no solution or is not solved.
+    `base` is a reduction of the same bodies, which is then only loaded anew; `starts` has a
+    solution for every state to start from; `gap` (k,) is added to the initial gap. InputError where
+    a state has no solution or is not solved.
     """
     steps: list[Step] = []
     slipped: Any = 0.0
@@ -302,6 +301,7 @@ def solved_chain(
         base = reduce_bodies(scene, Q=Q) if base is None else base.loaded(scene)
         q = base.problem.q.copy()
         q[:, 1:] -= slipped
+        q[:, 0] += gap
         problem = replace(base.problem, q=q)
         start = starts[number] if starts is not None else steps[-1].solution if steps else None
         solution = solve(problem, tol=tol, start=start)
