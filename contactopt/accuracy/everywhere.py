@@ -121,10 +121,6 @@ class Everywhere:
         """The values of the main sequence, doubled elements without splits."""
         return [value for (_, splits), value in sorted(self.values.items()) if splits == 0]
 
-    @property
-    def finest(self) -> int:
-        return max(elements for elements, _ in self.values)
-
     def solve(self) -> Solved:
         """Solve the next mesh."""
         elements, splits = self.jobs[0]
@@ -177,18 +173,13 @@ class Everywhere:
         is too coarse to know, and `rivals` are local maxima that may be the largest.
         """
         if not self.jobs:
-            n, s = self.finest, self.splits + 1
+            n, s = max(elements for elements, _ in self.values), self.splits + 1
             fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
-            many = len(self.meshes) > 2 and self.halved
-            if (
-                many
-                and (not self.changes or (fine and not len(contacts)))
-                and 2**s * self.first <= n
-            ):
+            many = len(self.meshes) > 2 and self.halved and 2**s * self.first <= n
+            if many and (not self.changes or (fine and not len(contacts))):
                 jobs = [(n, i) for i in range(1, s + 1)]
                 self.jobs = [job for job in jobs if job not in self.values]
-            if not self.jobs:
-                self.jobs = [(2 * n, 0)]
+            self.jobs = self.jobs or [(2 * n, 0)]
         return self._unknowns(*self.jobs[0])
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:

@@ -133,8 +133,7 @@ class Locally:
         )
         if not self.shapes.doubtful:
             return 0.0, sentence
-        solved = self._solved([otherwise(scene, self.shapes) for scene in before])
-        if not solved.solution.solved:
+        other = self._solved([otherwise(scene, self.shapes) for scene in before])
+        if not other.solution.solved:
             return np.inf, sentence
-        other = self.quantity.read(solved.reduction, solved.solution).value
-        return abs(other - value), sentence
+        return abs(self.quantity.read(other.reduction, other.solution).value - value), sentence

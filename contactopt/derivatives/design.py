@@ -29,7 +29,7 @@ import numpy as np
 from contactopt.checks import check_number, real_array
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.derivatives.constants import FIRST_RADIUS, GOOD, GROW, SHRINK, TAKEN
-from contactopt.derivatives.states import Step, solved_chain
+from contactopt.derivatives.states import Chain, Step, solved_chain
 from contactopt.errors import InputError
 from contactopt.linear.operators import diagonal
 from contactopt.problem import Solution
@@ -119,9 +119,8 @@ class _States:
             q[:, 0] = shape
             columns.append(step.sensitivity.forward(q=q).reactions[:, 0])
         for one in self.which:
-            explicit = step.explicit({one: 1.0}, step.reduction)
-            moved = step.sensitivity.forward(q=explicit.u, mu=explicit.mu, s=explicit.s)
-            columns.append(moved.reactions[:, 0])
+            (moved,) = Chain((step,)).forward({one: 1.0})
+            columns.append(moved.change.reactions[:, 0])
         return np.stack(columns, axis=1)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.checks import check_number, real_array
-from contactopt.derivatives.kinks import Onesided, Weak, named, weak_contacts
+from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
 from contactopt.derivatives.linear import Tangent, transposed
 from contactopt.errors import InputError
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
@@ -139,14 +139,9 @@ class Sensitivity:
     @property
     def sentence(self) -> str:
         """What is known of the derivative, for people."""
-        if self.differentiable:
-            return "the solution has a gradient here: no contact is weakly active"
-        names = named([f"{weak.contact} ({weak.edge})" for weak in self.weak])
-        return (
-            f"the solution has no gradient here, only one-sided derivatives: {len(self.weak)} of"
-            f" {self.problem.contacts} contacts are weakly active, within {self.distance:g} of the"
-            f" largest force of a kink: {names}"
-        )
+        near = f", within {self.distance:g} of the largest force of a kink"
+        names = [f"{weak.contact} ({weak.edge})" for weak in self.weak]
+        return of_kinks("solution", names, near)
 
     @cached_property
     def _moves(self) -> np.ndarray:
@@ -165,22 +160,10 @@ class Sensitivity:
         """The change of the solution along one direction of the data; where contacts are weakly
         active, the one-sided one.
 
-        Parameters
-        ----------
-        q : (k, dim) change of q [length]
-        mu : (k,) or one number, change of the law's parameter
-        s : (p,) change of the resultants [force]
-        Q : (k dim, k dim) change of Q: an array, a sparse matrix, or an operator with products
-        V : (k dim, p) change of V
-
-        Returns
-        -------
-        Change : of reactions, multipliers and displacements
-
-        Raises
-        ------
-        InputError : on changes of the wrong shape, and where the solution has no derivative because
-            it is not unique
+        The data are q (k, dim) [length], the law's parameter mu, (k,) or one number, the resultants
+        s (p,) [force], Q (k dim, k dim), an array, a sparse matrix or an operator with products,
+        and V (k dim, p). InputError on changes of the wrong shape, and where the solution has no
+        derivative because it is not unique.
         """
         problem, r, lam = self.problem, self.solution.reactions, self.solution.multipliers
         du = _given("q", q, problem.q.shape).copy()
@@ -222,16 +205,8 @@ class Sensitivity:
 
         Where contacts are weakly active (`differentiable` is False) it is the gradient of the piece
         at which the solver ended, an element of the generalised derivative and no gradient of f.
-
-        Parameters
-        ----------
-        reactions : (k, dim) df/dr
-        multipliers : (p,) df/dlambda
-        displacements : (k, dim) df/du, of u = Q r + V lambda + q
-
-        Raises
-        ------
-        InputError : as forward()
+        `reactions` (k, dim) are df/dr, `multipliers` (p,) df/dlambda, and `displacements` (k, dim)
+        df/du of u = Q r + V lambda + q. InputError as forward().
         """
         problem, (_, scales) = self.problem, self._scaled
         by_r = _given("reactions", reactions, problem.q.shape)
