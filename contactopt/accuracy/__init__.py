@@ -26,16 +26,14 @@ exactly so for a linear problem and a linear J. The unknown stresses s are repla
 ones, averages at the vertices. The signed sum estimates the error of J; the absolute values say
 where to refine. Two terms are added.
 
-The force at a contact is a mean of the pressure nearby. For a J that reads pressure, the error of
-the pressure at contact i is half of p_i less the mean of the piecewise linear p around i
-(indicators.pressure_errors), times dJ/dp_i. Without it a contact that is smaller than an element
-would seem exact, since then equilibrium alone says what the one closed contact carries.
+The force at a contact is a mean of the pressure nearby. For a J that reads pressure the error of
+that mean (indicators.pressure_errors) is added. Without it a contact that is smaller than an
+element would seem exact, since then equilibrium alone says what the one closed contact carries.
 
 A stress at a place is recovered by a fit to the stresses of the elements near it
-(contactopt.bodies.stress_recovery). For a stress s* = R D U the adjoint load is D' R' dJ/ds*. The
-stresses scatter about the fit, and the estimated error is at least two standard errors of the fit.
-For a largest stress this covers the places where it could be larger by as much; these are refined
-too.
+(contactopt.bodies.stress_recovery). The stresses scatter about the fit, and the estimated error is
+at least two standard errors of the fit. For a largest stress this covers the places where it could
+be larger by as much; these are refined too.
 
 The estimated error is also at least what the last refinement changed. What is not estimated: the
 linearisation of a J that is not linear, what recovery does not see where the solution is not

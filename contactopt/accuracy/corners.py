@@ -44,40 +44,33 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
     """
     if not levels[-1].place:
         return ""
-    peak = reading.peaks[0]
-    place = ", ".join(f"{x:.4g}" for x in levels[-1].place)
-    what = "pressure" if peak.body < 0 else "stress"
-    if what == "pressure" and _grows(levels, AT_EDGE) and _at_rim(solved, peak):
-        return (
-            "the largest pressure is at the edge of the contact surface, a corner, where no mesh"
-            " bounds it"
-        )
-    if what == "stress" and len(levels) > TRIED and _rises(levels) and _in_corner(solved, peak):
-        return (
-            f"the largest stress is at the re-entrant corner near ({place}), where it is infinite;"
-            " no mesh bounds it"
-        )
-    if _grows(levels, GROWTHS):
-        return (
-            f"the largest {what}, at ({place}), grows with every refinement like an infinite one;"
-            " no mesh bounds it"
-        )
-    return ""
+    values, pressure = _kept(levels), reading.peaks[0].body < 0
+    rises = len(levels) > TRIED and len(values) > 1 and values[0] > RISE * values[-1]
+    place = "(" + ", ".join(f"{x:.4g}" for x in levels[-1].place) + ")"
+    what = f"the largest {'pressure' if pressure else 'stress'}"
+    if pressure and _grows(values, AT_EDGE) and _singular(solved, reading.peaks[0]):
+        where = "is at the edge of the contact surface, a corner, where"
+    elif not pressure and rises and _singular(solved, reading.peaks[0]):
+        where = f"is at the re-entrant corner near {place}, where it is infinite;"
+    elif _grows(values, GROWTHS):
+        what, where = f"{what}, at {place},", "grows with every refinement like an infinite one;"
+    else:
+        return ""
+    return f"{what} {where} no mesh bounds it"
 
 
-def _in_corner(solved: Solved, peak: Peak) -> bool:
-    """Whether a peak of the stress lies at a re-entrant corner of its body."""
+def _singular(solved: Solved, peak: Peak) -> bool:
+    """Whether a peak of the stress lies at a re-entrant corner of its body, or one of the pressure
+    at the edge of the contact surface of its pair.
+    """
+    if peak.body < 0:
+        pairs, first = solved.reduction.problem.pairs, peak.contacts[0]
+        number = next(i for i, pair in enumerate(pairs) if pair.start <= first < pair.stop)
+        return at_rim(*views(solved.reduction, solved.solution)[number])
     read = solved.reduction.bodies[peak.body].stress_map(Region())
     assert read is not None  # the stress was read from its elements
     mesh = straight(read.mesh)
     return re_entrant(mesh, int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0))))
-
-
-def _at_rim(solved: Solved, peak: Peak) -> bool:
-    """Whether a peak of the pressure lies at the edge of the contact surface of its pair."""
-    pairs = solved.reduction.problem.pairs
-    number = next(i for i, pair in enumerate(pairs) if pair.start <= peak.contacts[0] < pair.stop)
-    return at_rim(*views(solved.reduction, solved.solution)[number])
 
 
 def re_entrant(mesh: Any, vertex: int) -> bool:
@@ -125,17 +118,9 @@ def _kept(levels: Sequence[Level]) -> list[float]:
     return [level.value for level in kept]
 
 
-def _rises(levels: Sequence[Level]) -> bool:
-    """Whether smaller elements there have made the value larger, by a tenth at least."""
-    kept = _kept(levels)
-    return len(kept) > 1 and kept[0] > RISE * kept[-1]
-
-
-def _grows(levels: Sequence[Level], count: int) -> bool:
-    """Whether the value at the place where it is largest grows steadily as the elements there
-    become smaller.
-    """
-    growths = -np.diff(_kept(levels)[: count + 1])
+def _grows(values: Sequence[float], count: int) -> bool:
+    """Whether the last values of _kept() grow steadily as the elements there become smaller."""
+    growths = -np.diff(values[: count + 1])
     if len(growths) < count or np.any(growths <= 0):
         return False
     ratios = growths[:-1] / growths[1:]

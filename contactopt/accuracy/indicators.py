@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contactopt.accuracy.marking import spread
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.interface import sensitivity
 from contactopt.derivatives.states import Duals
@@ -74,8 +75,7 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     solution.
     """
     state = State(solved.reduction, solved.solution)
-    bodies, displaced = solved.reduction.bodies, state.displaced
-    found = None
+    bodies, displaced, found = solved.reduction.bodies, state.displaced, None
     if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
         try:
             seeds = quantity.slopes(state)
@@ -110,9 +110,7 @@ def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, .
     """
     reduction, problem = solved.reduction, solved.reduction.problem
     added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
-    normal = np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel()
-    parts = zip(reduction.bodies, reduction.maps)
-    shares = [body.on_elements(np.asarray(abs(B).T @ normal)) for body, B in parts]
+    shares = spread(reduction, np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))))
     total = sum(share.sum() for share in shares)
     factor = added.sum() / total if total != 0 else 0.0
     return tuple(factor * share for share in shares)

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from contactopt.accuracy.estimate import Judged
-from contactopt.accuracy.everywhere import best_order, mesh_error, stuck
+from contactopt.accuracy.everywhere import SAFETY, best_order, mesh_error, stuck
 from contactopt.accuracy.indicators import ElementErrors, element_errors
 from contactopt.accuracy.marking import (
     at_contacts,
     check_refinable,
     divisible,
     finer,
-    joined,
     otherwise,
     plateau,
     unknowns,
@@ -71,7 +70,7 @@ class Locally:
         self.values.append(reading.value)
         if self.whole:
             mesh, order = mesh_error(self.values, self.best)
-            return Judged(abs(mesh), mesh, order=order)
+            return Judged(SAFETY * abs(mesh), mesh, order=order)
         self.errors = element_errors(solved, self.quantity, reading.value)
         # of two refinements, since what one changes may be small by chance
         change = float(np.max(np.abs(np.diff(self.values[-3:])), initial=0.0))
@@ -110,16 +109,15 @@ class Locally:
             if rivals:
                 pressure = nodal_pressure(reduction.problem, self.last.solution)
                 near.append(plateau(reduction, pressure, rivals))
-            marks = [
+            marks = zip(
                 self.errors.marked(SHARE),
                 at_contacts(reduction, np.concatenate(near).astype(int)),
-            ]
-            for peak in chosen:
-                if peak.body >= 0:
-                    none = np.empty(0, dtype=int)
-                    bodies = range(len(reduction.bodies))
-                    marks.append(tuple(peak.elements if i == peak.body else none for i in bodies))
-            marked = joined(*marks)
+            )
+            inside = [(peak.body, peak.elements) for peak in chosen]
+            marked = tuple(
+                np.unique(np.concatenate([*own, *(found for body, found in inside if body == i)]))
+                for i, own in enumerate(marks)
+            )
         self.states = [finer(scene, marked, self.shapes) for scene in self.states]
         return float(unknowns(self.states[-1]))
 
@@ -135,8 +133,7 @@ class Locally:
         )
         if not self.shapes.doubtful:
             return 0.0, sentence
-        solved = self._solved([otherwise(scene, self.shapes) for scene in before])
-        if not solved.solution.solved:
+        other = self._solved([otherwise(scene, self.shapes) for scene in before])
+        if not other.solution.solved:
             return np.inf, sentence
-        other = self.quantity.read(solved.reduction, solved.solution).value
-        return abs(other - value), sentence
+        return abs(self.quantity.read(other.reduction, other.solution).value - value), sentence

@@ -129,15 +129,15 @@ class _Loop:
         """Solve and judge one mesh; one sentence if the search ends there."""
         states = list(self.search.states)
         solved = self.search.solve()
-        if not solved.solution.solved:
-            dofs, why = solved.reduction.dofs, solved.solution.message
-            sentence = f"the mesh of {dofs} unknowns was not solved: {why}"
-            if not self.levels:
-                raise InputError(
-                    f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
-                )
-            return sentence
-        reading = self.quantity.read(solved.reduction, solved.solution)
+        reduction, solution = solved.reduction, solved.solution
+        if not solution.solved:
+            sentence = f"the mesh of {reduction.dofs} unknowns was not solved: {solution.message}"
+            if self.levels:
+                return sentence
+            raise InputError(
+                f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
+            )
+        reading = self.quantity.read(reduction, solution)
         facts = self.search.facts(solved)
         judged = self.search.judge(solved, reading)
         self.solved, self.reading, self.judged, self.states = solved, reading, judged, states
@@ -146,12 +146,12 @@ class _Loop:
         self.unresolved = self._unresolved()
         size = max(judged.size, reading.uncertainty, excess)
         scale = abs(reading.value) or 1.0
-        error = max(size / scale, solved.solution.residual, ROUNDING)
+        error = max(size / scale, solution.residual, ROUNDING)
         top = reading.peaks[0] if reading.peaks and reading.peaks[0].size else None
         self.levels.append(
             Level(
-                solved.reduction.dofs,
-                solved.reduction.problem.contacts,
+                reduction.dofs,
+                reduction.problem.contacts,
                 reading.value,
                 reading.uncertainty,
                 error if np.isfinite(error) else None,
@@ -177,11 +177,10 @@ class _Loop:
         known = not vain and not self.reading.missing and not len(self.unresolved)
         enough = error is not None and error <= self.accuracy
         self.reached = known and self.search.ready and enough
-        if vain or self.reached:
-            return vain or f"the estimated error of the {self.quantity.name} is below the target"
-        if len(self.levels) >= MOST_LEVELS:
-            return f"{MOST_LEVELS} meshes did not reach the target"
-        return ""
+        if self.reached:
+            return f"the estimated error of the {self.quantity.name} is below the target"
+        late = len(self.levels) >= MOST_LEVELS
+        return vain or (f"{MOST_LEVELS} meshes did not reach the target" if late else "")
 
     def _rivals(self) -> tuple[list[Peak], float]:
         """The local maxima that may be the largest, and by how much they may exceed the value.
@@ -222,9 +221,9 @@ class _Loop:
         """Numbers of contacts around which the mesh is too coarse to know anything."""
         assert self.solved is not None
         reduction, solution = self.solved.reduction, self.solved.solution
-        problem = reduction.problem
-        touching = problem.law.pressed(solution.reactions)
-        apart = problem.displacements(solution.reactions, solution.multipliers)[:, 0]
+        problem, r = reduction.problem, solution.reactions
+        touching = problem.law.pressed(r)
+        apart = problem.displacements(r, solution.multipliers)[:, 0]
         few = [own for _, own in coarse(reduction, solution)]
         return np.concatenate([overlooked(reduction, touching, apart), *few]).astype(int)
 
@@ -238,24 +237,18 @@ class _Loop:
         spent = time.perf_counter() - self.began
         return self.limits.refusal(unknowns, self.search.usual, spent + last, held)
 
-    def _geometry(self) -> tuple[float, str]:
-        """The error that the shape of guessed boundaries makes [unit of the quantity], and a
-        sentence on it.
-        """
-        if self.vain or self.reading.missing:
-            return 0.0, ""
-        try:
-            return self.search.geometry(self.reading.value, self.states)
-        except InputError as error:
-            log.info("the other shape of guessed boundaries was not solved: %s", error)
-            return 0.0, ""
-
     def _end(self, message: str) -> tuple[Solved, Estimate]:
         """The best answer with all that is known of it."""
         assert self.solved is not None
         value, judged = self.reading.value, self.judged
         last, scale = self.levels[-1], abs(self.reading.value) or 1.0
-        geometry, sentence = self._geometry()
+        # the error that the shape of guessed boundaries makes [unit of the quantity]
+        geometry, sentence = 0.0, ""
+        if not self.vain and not self.reading.missing:
+            try:
+                geometry, sentence = self.search.geometry(value, self.states)
+            except InputError as failure:
+                log.info("the other shape of guessed boundaries was not solved: %s", failure)
         known = last.error is not None and not self.vain and np.isfinite(geometry)
         error = last.error + geometry / scale if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy

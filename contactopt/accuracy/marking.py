@@ -103,15 +103,11 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
         for name, chords in shapes.guessed.get(part.name, {}).items():
             nodes = np.unique(part.mesh.facets[:, facets_of(part.mesh, name)])
             points[:, nodes] = flatter(points[:, nodes], chords)
-            curves[name] = partial(_flattened, curves[name], chords)
+            curves[name] = partial(lambda own, ends, x: flatter(own(x), ends), curves[name], chords)
         mesh = replace(part.mesh, doflocs=points)
         return mesh if scene.degree == 1 else bent(mesh, curves)
 
     return _with_meshes(scene, moved)
-
-
-def _flattened(curve: Curve, chords: Chords, points: np.ndarray) -> np.ndarray:
-    return flatter(curve(points), chords)
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
@@ -127,21 +123,16 @@ def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -
         marked = balanced(scene, marked)
         if not any(len(elements) for elements in marked):
             break
-        scene = _divided(scene, marked, shapes)
-        marked = tuple(np.empty(0, dtype=int) for _ in scene.parts)
+        chosen = {part.name: own for part, own in zip(scene.parts, marked) if len(own)}
+        scene = scene.with_parts(partial(_divided, chosen=chosen, shapes=shapes))
+        marked = tuple(own[:0] for own in marked)
     return scene
 
 
-def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Scene:
-    numbers = iter(marked)
-
-    def divided(part: Any) -> Any:
-        elements = next(numbers)
-        if not len(elements):
-            return part
-        return replace(part, mesh=divide(part.mesh, elements, shapes.of(part)))
-
-    return scene.with_parts(divided)
+def _divided(part: Any, chosen: Mapping[str, np.ndarray], shapes: Shapes) -> Any:
+    if part.name not in chosen:
+        return part
+    return replace(part, mesh=divide(part.mesh, chosen[part.name], shapes.of(part)))
 
 
 def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
@@ -204,10 +195,15 @@ def at_contacts(reduction: Reduction, contacts: np.ndarray) -> tuple[np.ndarray,
     """For each body the elements at the nodes of some contacts."""
     weights = np.zeros(reduction.problem.q.shape)
     weights[contacts] = 1.0
-    made = (np.asarray(abs(B).T @ weights.ravel()) for B in reduction.maps)
-    return tuple(
-        np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made)
-    )
+    return tuple(np.flatnonzero(own) for own in spread(reduction, weights))
+
+
+def spread(reduction: Reduction, weights: np.ndarray) -> list[np.ndarray]:
+    """What the elements (elements,) of each body share of weights (k, dim) of the contacts whose
+    nodes they hold.
+    """
+    parts = zip(reduction.bodies, reduction.maps)
+    return [body.on_elements(np.asarray(abs(B).T @ weights.ravel())) for body, B in parts]
 
 
 def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
@@ -217,18 +213,12 @@ def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -
     Where many peaks come close to the largest one, the pressure is nearly even: its surface is then
     divided as one, since facets of different lengths would make peaks of their own.
     """
-    found = [np.empty(0, dtype=int)]
+    least = np.full(len(pressure), np.inf)
     for pair in reduction.problem.pairs:
         named = [one for one in peaks if len(one.contacts)]
         own = [one.value for one in named if pair.start <= one.contacts[0] < pair.stop]
-        if own:
-            found.append(np.flatnonzero(pressure[pair.contacts] >= min(own)) + pair.start)
-    return np.concatenate(found)
-
-
-def joined(*marks: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """For each body all elements of several marks."""
-    return tuple(np.unique(np.concatenate(own)).astype(int) for own in zip(*marks))
+        least[pair.contacts] = min(own, default=np.inf)
+    return np.flatnonzero(pressure >= least)
 
 
 def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:

@@ -58,20 +58,24 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
     return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises(full))
 
 
-def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
+def nodal_stress(
+    body: Assembly, U: np.ndarray, everywhere: bool = True, stress: np.ndarray | None = None
+) -> np.ndarray:
     """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their
     volumes.
 
     An element counts with its mean stress where the displacement is linear, with its stress at the
     node where it is quadratic; at planes of symmetry its mirror image counts as well, so that no
     shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta. Not
-    `everywhere` asks for the vertices of the mesh alone.
+    `everywhere` asks for the vertices of the mesh alone. `stress` is what stress_in() gives at the
+    body's own basis, if it is known.
     """
     basis, mesh = body.basis, body.basis.mesh
     volume = basis.dx.sum(axis=1)
     shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
     if body.degree == 1:
-        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
+        stress = stress_in(body, basis, U) if stress is None else stress
+        element = np.sum(stress * basis.dx, axis=3) / volume
         values = np.repeat(element[..., None], len(mesh.t), axis=3)
     else:
         places = shape.doflocs.T
@@ -111,12 +115,13 @@ def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple
     )
 
     def missing(field: np.ndarray) -> np.ndarray:
-        nodal = nodal_stress(body, field, everywhere=False)
+        stress = stress_in(body, basis, field)
+        nodal = nodal_stress(body, field, False, stress)
         smooth = sum(
             nodal[:, :, own][..., None] * np.asarray(shape[0])
             for own, shape in zip(mesh.t, vertices.basis)
         )
-        return np.asarray(smooth - stress_in(body, basis, field))
+        return np.asarray(smooth - stress)
 
     E, nu = body.material.E, body.material.nu
     measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))

@@ -14,7 +14,8 @@ Differentiating both equations gives one linear system,
     M (dr, dlambda) = (P_mu dmu - D rho du,  -ds - dV' r),       M = [[I - D + D rho Q,  D rho V],
                                              [V', 0]].
 
-M is the matrix of Newton's last step. Its factors, or one Krylov solve, serve
+M is the matrix of Newton's last step, and its transpose is solved as another such matrix is
+(contactopt.derivatives.linear).
 
     forward   dr and dlambda for given changes of the data: J v, one solve for each direction v;
     adjoint   for a function f(r, lambda): solve M' (a, b) = (df/dr, df/dlambda) once. With z = D'

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,10 +29,9 @@ import numpy as np
 from contactopt.checks import check_number, real_array
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.derivatives.constants import FIRST_RADIUS, GOOD, GROW, SHRINK, TAKEN
-from contactopt.derivatives.states import Step
+from contactopt.derivatives.states import Chain, Step, solved_chain
 from contactopt.errors import InputError
 from contactopt.linear.operators import diagonal
-from contactopt.methods.driver import solve
 from contactopt.problem import Solution
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.parameters import MATERIAL, Parameter, parameters, put_all
@@ -57,12 +56,6 @@ class Visit:
     radius: float
     taken: bool
     weak: int
-
-    @classmethod
-    def of(cls, step: Step, radius: float, taken: bool) -> Visit:
-        """The visit of a solved state."""
-        certificate, weak = step.solution.residual, step.sensitivity.weak
-        return cls(_peak(step), certificate, radius, taken, len(weak))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,19 +106,11 @@ class _States:
 
     def step(self, x: np.ndarray, start: Solution | None) -> Step:
         """The solved state; InputError if it has no certified solution."""
-        m = self.shapes.shape[1]
-        reduction = self.base
-        if self.which:
-            scene = put_all(self.scene, dict(zip(self.which, x[m:])))
-            moving = any(one.kind in MATERIAL for one in self.which)
-            reduction = reduce_bodies(scene, Q=self.Q) if moving else self.base.loaded(scene)
-        q = reduction.problem.q.copy()
-        q[:, 0] += self.shapes @ x[:m]
-        problem = replace(reduction.problem, q=q)
-        solution = solve(problem, tol=self.tol, start=start)
-        if not solution.solved:
-            raise InputError(f"a state of the design was not solved: {solution.message}.")
-        return Step(replace(reduction, problem=problem), solution)
+        m, starts = self.shapes.shape[1], None if start is None else [start]
+        scene = put_all(self.scene, dict(zip(self.which, x[m:])))
+        base = None if any(one.kind in MATERIAL for one in self.which) else self.base
+        gap = self.shapes @ x[:m]
+        return solved_chain([scene], self.tol, base, starts, self.Q, gap).steps[0]
 
     def slopes(self, step: Step) -> np.ndarray:
         """Derivatives (k, variables) of the normal forces."""
@@ -134,9 +119,8 @@ class _States:
             q[:, 0] = shape
             columns.append(step.sensitivity.forward(q=q).reactions[:, 0])
         for one in self.which:
-            explicit = step.explicit({one: 1.0}, step.reduction)
-            moved = step.sensitivity.forward(q=explicit.u, mu=explicit.mu, s=explicit.s)
-            columns.append(moved.reactions[:, 0])
+            (moved,) = Chain((step,)).forward({one: 1.0})
+            columns.append(moved.change.reactions[:, 0])
         return np.stack(columns, axis=1)
 
 
@@ -201,8 +185,8 @@ def _improved(
     steps: int,
 ) -> Design:
     """Steps of convex programs from x until none is promised."""
-    now, radius, visits, message = states.step(x, None), FIRST_RADIUS, [], "the steps ran out"
-    visits.append(Visit.of(now, radius, True))
+    now, radius, message = states.step(x, None), FIRST_RADIUS, "the steps ran out"
+    visits = [_visit(now, radius, True)]
     slopes = states.slopes(now)
     areas = np.maximum(now.problem.areas, 1e-300)[:, None]
     steepest = np.abs(slopes / areas).max(axis=0, initial=0.0)
@@ -222,7 +206,7 @@ def _improved(
             continue
         gain = (_peak(now) - _peak(trial)) / promised
         taken = gain >= TAKEN
-        visits.append(Visit.of(trial, radius, taken))
+        visits.append(_visit(trial, radius, taken))
         radius *= SHRINK if not taken else GROW if gain >= GOOD else 1.0
         if taken:
             now, x = trial, x + d
@@ -251,22 +235,19 @@ def _program(
     limits: tuple[np.ndarray, np.ndarray],
     constraints: Rules | None,
 ) -> tuple[np.ndarray, float]:
-    """The step (variables,) of the convex program, and the gain that it promises [stress].
-
-    The program is written in units of the reach of each variable and of the largest pressure.
+    """The step (variables,) of the convex program, written in units of the reach of each variable
+    and of the largest pressure, and the gain that it promises [stress].
     """
     import cvxpy as cp
 
-    loaded = now.problem.areas > 0
-    peak = _peak(now)
+    loaded, peak = now.problem.areas > 0, _peak(now)
     p = _pressure(now)[loaded] / peak
     J = slopes[loaded] / now.problem.areas[loaded, None] / peak * reach
     d, t = cp.Variable(len(x)), cp.Variable()
     rules = [p + J @ d <= t, cp.abs(d) <= 1.0]
     for bound, sign in zip(limits, (-1.0, 1.0)):
         kept = np.flatnonzero(np.isfinite(bound))
-        if len(kept):
-            rules.append(sign * cp.multiply(reach[kept], d[kept]) <= sign * (bound - x)[kept])
+        rules.append(sign * cp.multiply(reach[kept], d[kept]) <= sign * (bound - x)[kept])
     if constraints is not None:
         whole = cp.Variable(len(x))
         rules += [whole == x + cp.multiply(reach, d), *constraints(whole)]
@@ -281,6 +262,11 @@ def _program(
         )
     step = np.clip(d.value, -1.0, 1.0)
     return reach * step, peak * float(p.max() - (p + J @ step).max())
+
+
+def _visit(step: Step, radius: float, taken: bool) -> Visit:
+    weak = len(step.sensitivity.weak)
+    return Visit(_peak(step), step.solution.residual, radius, taken, weak)
 
 
 def _pressure(step: Step) -> np.ndarray:
@@ -306,9 +292,7 @@ def _bounds(
     which: tuple[Parameter, ...],
     m: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    given = dict(bounds) if isinstance(bounds, Mapping) else {"profile": bounds}
-    if bounds is None:
-        given = {}
+    given = {"profile": bounds} if isinstance(bounds, tuple) else dict(bounds or {})
     pairs = [given.get("profile", (-np.inf, np.inf))] * m
     for one in which:
         if one.name not in given:

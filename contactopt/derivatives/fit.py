@@ -115,8 +115,9 @@ class _Model:
     ):
         self.scenes, self.which, self.data, self.sigma = scenes, which, data, sigma
         self.Q, self.tol = solving
-        finite = {name: np.flatnonzero(np.isfinite(own)).tolist() for name, own in data.items()}
-        self.measured = [(name, n) for name, own in finite.items() for n in own]
+        self.measured = [
+            (name, int(n)) for name, own in data.items() for n in np.flatnonzero(np.isfinite(own))
+        ]
         self.noise = np.array([sigma[name] for name, _ in self.measured])
         self.wanted = np.array([data[name][n] for name, n in self.measured])
         self.last: tuple[np.ndarray, Chain] | None = None
@@ -156,12 +157,12 @@ class _Model:
         """(data, p) slopes."""
         chain = self.chain(values)
         seeds = [seeds_of(name, chain.steps[n]) for name, n in self.measured]
-        columns = []
-        for one in self.which:
-            moved = list(chain.forward({one: 1.0}))
-            pairs = zip(seeds, self.measured)
-            columns.append([along(own, moved[n], {one: 1.0}) for own, (_, n) in pairs])
-        return np.array(columns).T / self.noise[:, None]
+        moves = [({one: 1.0}, list(chain.forward({one: 1.0}))) for one in self.which]
+        rows = [
+            [along(own, moved[n], way) for way, moved in moves]
+            for own, (_, n) in zip(seeds, self.measured)
+        ]
+        return np.array(rows) / self.noise[:, None]
 
 
 def fit(
@@ -322,18 +323,16 @@ def _data(data: Mapping[str, Any], states: int) -> dict[str, np.ndarray]:
     """quantity -> (states,); InputError for anything else."""
     if not isinstance(data, Mapping) or not data:
         raise InputError("the data must be a mapping from names of quantities to measured values.")
-    out = {}
-    for name, values in data.items():
-        try:
-            array = np.atleast_1d(np.asarray(values, dtype=float))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"the data of '{name}' must be numbers.") from error
+    try:
+        out = {name: np.atleast_1d(np.asarray(own, dtype=float)) for name, own in data.items()}
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the data must be numbers: {error}.") from error
+    for name, array in out.items():
         if array.shape != (states,):
             raise InputError(
                 f"the data of '{name}' must have one value per state, shape ({states},); got"
                 f" {array.shape}."
             )
-        out[name] = array
     return out
 
 
@@ -359,10 +358,8 @@ def _noise(
     """quantity -> standard deviation, up to a common factor where it is to be estimated."""
     if noise is None:
         known = {name: values[np.isfinite(values)] for name, values in data.items()}
-        return {
-            name: float(np.linalg.norm(v)) / max(len(v), 1) ** 0.5 or 1.0
-            for name, v in known.items()
-        }
+        sizes = {name: float(np.linalg.norm(own)) for name, own in known.items()}
+        return {name: sizes[name] / max(len(own), 1) ** 0.5 or 1.0 for name, own in known.items()}
     given = dict(noise) if isinstance(noise, Mapping) else dict.fromkeys(data, noise)
     for name in data:
         if name not in given:

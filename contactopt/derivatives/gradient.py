@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from contactopt.derivatives.kinks import Weak, named
+from contactopt.derivatives.kinks import Weak, of_kinks
 from contactopt.derivatives.states import Chain, along, chain_of
 from contactopt.errors import InputError
 from contactopt.readings.quantities import seeds_of
@@ -37,13 +37,8 @@ class Gradient:
     @property
     def sentence(self) -> str:
         """What the derivatives are, for people."""
-        if self.differentiable:
-            return "the quantity has a gradient here: no contact is weakly active"
         names = [f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak]
-        return (
-            f"the quantity has no gradient here, only one-sided derivatives: {len(names)} weakly"
-            f" active contacts, {named(names)}"
-        )
+        return of_kinks("quantity", names)
 
     def onesided(self, direction: dict[str, Any]) -> float:
         """The derivative along a direction, name of a parameter -> amount, one-sided where contacts

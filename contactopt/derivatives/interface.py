@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from contactopt.checks import check_number, real_array
-from contactopt.derivatives.kinks import Onesided, Weak, named, weak_contacts
-from contactopt.derivatives.linear import Tangent, transposed_product
+from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
+from contactopt.derivatives.linear import Tangent, transposed
 from contactopt.errors import InputError
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.semismooth import Equations
 from contactopt.problem import (
     InterfaceProblem,
     Scales,
@@ -100,20 +101,24 @@ class Sensitivity:
         return np.asarray(r - self._rho[:, None] * u)
 
     @cached_property
+    def _equations(self) -> Equations:
+        """Dimensionless."""
+        return coulomb_equations(self._scaled[0])
+
+    @property
     def _rho(self) -> np.ndarray:
         """(k,) [force / length]."""
-        scaled, scales = self._scaled
-        return coulomb_equations(scaled).rho * scales.force / scales.length
+        scales = self._scaled[1]
+        return self._equations.rho * scales.force / scales.length
 
     @cached_property
     def tangent(self) -> Tangent:
         """The matrix M, dimensionless."""
-        scaled, scales = self._scaled
         D = self.problem.law.project(self._point)[1].copy()
         D[~self.problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
         D = self._moves[:, :, None] * D
-        return Tangent(scaled, self._rho * scales.length / scales.force, D)
+        return Tangent(self._scaled[0], self._equations, D)
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:
@@ -134,14 +139,9 @@ class Sensitivity:
     @property
     def sentence(self) -> str:
         """What is known of the derivative, for people."""
-        if self.differentiable:
-            return "the solution has a gradient here: no contact is weakly active"
-        names = named([f"{weak.contact} ({weak.edge})" for weak in self.weak])
-        return (
-            f"the solution has no gradient here, only one-sided derivatives: {len(self.weak)} of"
-            f" {self.problem.contacts} contacts are weakly active, within {self.distance:g} of the"
-            f" largest force of a kink: {names}"
-        )
+        near = f", within {self.distance:g} of the largest force of a kink"
+        names = [f"{weak.contact} ({weak.edge})" for weak in self.weak]
+        return of_kinks("solution", names, near)
 
     @cached_property
     def _moves(self) -> np.ndarray:
@@ -160,22 +160,10 @@ class Sensitivity:
         """The change of the solution along one direction of the data; where contacts are weakly
         active, the one-sided one.
 
-        Parameters
-        ----------
-        q : (k, dim) change of q [length]
-        mu : (k,) or one number, change of the law's parameter
-        s : (p,) change of the resultants [force]
-        Q : (k dim, k dim) change of Q: an array, a sparse matrix, or an operator with products
-        V : (k dim, p) change of V
-
-        Returns
-        -------
-        Change : of reactions, multipliers and displacements
-
-        Raises
-        ------
-        InputError : on changes of the wrong shape, and where the solution has no derivative because
-            it is not unique
+        The data are q (k, dim) [length], the law's parameter mu, (k,) or one number, the resultants
+        s (p,) [force], Q (k dim, k dim), an array, a sparse matrix or an operator with products,
+        and V (k dim, p). InputError on changes of the wrong shape, and where the solution has no
+        derivative because it is not unique.
         """
         problem, r, lam = self.problem, self.solution.reactions, self.solution.multipliers
         du = _given("q", q, problem.q.shape).copy()
@@ -217,36 +205,24 @@ class Sensitivity:
 
         Where contacts are weakly active (`differentiable` is False) it is the gradient of the piece
         at which the solver ended, an element of the generalised derivative and no gradient of f.
-
-        Parameters
-        ----------
-        reactions : (k, dim) df/dr
-        multipliers : (p,) df/dlambda
-        displacements : (k, dim) df/du, of u = Q r + V lambda + q
-
-        Raises
-        ------
-        InputError : as forward()
+        `reactions` (k, dim) are df/dr, `multipliers` (p,) df/dlambda, and `displacements` (k, dim)
+        df/du of u = Q r + V lambda + q. InputError as forward().
         """
         problem, (_, scales) = self.problem, self._scaled
         by_r = _given("reactions", reactions, problem.q.shape)
         by_lam = _given("multipliers", multipliers, problem.s.shape)
         by_u = _given("displacements", displacements, problem.q.shape)
         if np.any(by_u):
-            by_r = by_r + transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
+            by_r = by_r + np.asarray(transposed(problem.Q) @ by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
-        z, a, b = self.tangent.solve_transposed(
-            (scales.force * by_r).ravel(), scales.multipliers * by_lam
-        )
+        scaled = (scales.force * by_r).ravel(), scales.multipliers * by_lam
+        z, b = self.tangent.solve_transposed(*scaled)
         by_q = by_u - self._moves * z.reshape(by_u.shape) / scales.length
         by_s = -b * scales.multipliers / (scales.force * scales.length)
 
         def by_parameter() -> np.ndarray:
-            P_mu, whole = self._by_parameter, a
-            # friction without a normal force, as in Tresca's law
-            if np.any(P_mu.ravel()[~self.tangent.is_closed]):
-                whole = a + self.tangent.on_open((scales.force * by_r).ravel(), z, b)
-            return np.asarray(np.sum(P_mu * whole.reshape(P_mu.shape), axis=1) / scales.force)
+            a, P_mu = self.tangent.multipliers(scaled[0], z, b), self._by_parameter
+            return np.asarray(np.sum(P_mu * a.reshape(P_mu.shape), axis=1) / scales.force)
 
         return Dual(by_q, by_s, self.solution.reactions, self.solution.multipliers, by_parameter)
 

@@ -50,18 +50,20 @@ def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
     [force] of a kink of the law's map, with the names of the kinks.
     """
     kinks = law.kinks(y, distance)
-    names = {
-        (True, False): "open / closed",
-        (False, True): "stick / slip",
-        (True, True): "apex: open / closed, stick / slip",
-    }
-    both = zip(kinks.normal.tolist(), kinks.tangential.tolist())
-    return tuple(Weak(i, names[which]) for i, which in enumerate(both) if any(which))
+    names = "", "open / closed", "stick / slip", "apex: open / closed, stick / slip"
+    edges = (kinks.normal + 2 * kinks.tangential).tolist()
+    return tuple(Weak(i, names[edge]) for i, edge in enumerate(edges) if edge)
 
 
-def named(names: list[str]) -> str:
-    """The first five of several, in words."""
-    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+def of_kinks(what: str, names: list[str], near: str = "") -> str:
+    """What is known of the derivatives of something with these weakly active contacts, in words."""
+    if not names:
+        return f"the {what} has a gradient here: no contact is weakly active"
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return (
+        f"the {what} has no gradient here, only one-sided derivatives: {len(names)} contacts are"
+        f" weakly active{near}: {', '.join(names[:5])}{more}"
+    )
 
 
 class Onesided:

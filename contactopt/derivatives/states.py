@@ -2,9 +2,8 @@
 
 At fixed contact forces r and multipliers lambda a parameter of the scene moves each body by dU_b,
 the relative displacement by du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter
-by dmu (contactopt.coupling.reduction). A change dA of a stiffness acts like the load -dA U: dU = -C
-dA U, so that neither dC nor dQ is ever formed. What follows is the derivative of the interface
-problem by q, s and mu (contactopt.derivatives.interface).
+by dmu. A change dA of a stiffness acts like the load -dA U: dU = -C dA U, so that neither dC nor dQ
+is ever formed. What follows is contactopt.derivatives.interface.
 
 The adjoint takes the gradient (q*, s*, mu*) by these data back to the bodies. With G_b = B_b' q*
 and W_b = C_b G_b + motions_b s* the derivative by a constant of a material is -W_b' dA_b U_b, and
@@ -86,10 +85,15 @@ class Step(State):
         changed = which.put(scene, value + step)
         return changed, changed.parts[number], step
 
+    def _on_contacts(self, which: Parameter) -> tuple[Any, Any]:
+        """What a parameter changes at each contact: the gap, and the law's parameter."""
+        if which.kind == "mu":
+            return 0.0, self.law_change(which)
+        return float(which.kind == "gap"), float(which.kind == "friction")
+
     def _concerned(self, which: Parameter) -> list[int]:
         """The numbers of the bodies that a parameter changes."""
-        parts = self.reduction.scene.parts
-        return [number for number, part in enumerate(parts) if which.concerns(part)]
+        return [i for i, part in enumerate(self.reduction.scene.parts) if which.concerns(part)]
 
     def explicit(self, direction: Direction, base: Reduction) -> Explicit:
         """What a direction changes at fixed forces and multipliers."""
@@ -98,12 +102,11 @@ class Step(State):
         dU = [0.0 * U for U in self.displaced]
         ds = [np.zeros(len(body.resultants)) for body in bodies]
         for which, amount in direction.items():
-            if which.kind == "gap":
-                du[:, 0] += _one_per_contact(which, amount, len(du))
-            elif which.kind == "friction":
-                dmu += _one_per_contact(which, amount, len(du))
-            elif which.kind == "mu":
-                dmu += amount * self.law_change(which)
+            if which.is_field:
+                amount = _one_per_contact(which, amount, len(du))
+            by_gap, by_law = self._on_contacts(which)
+            du[:, 0] += amount * by_gap
+            dmu += amount * by_law
             for number in self._concerned(which):
                 old = bodies[number]
                 if which.kind in MATERIAL:
@@ -125,13 +128,11 @@ class Step(State):
         """The derivative by one parameter, (k,) where it has one number per contact, from the
         gradient by the data of the problem.
         """
-        if which.kind == "gap":
-            return back.dual.q[:, 0]
-        if which.kind == "friction":
-            return back.dual.mu
-        if which.kind == "mu":
-            return float(back.dual.mu @ self.law_change(which))
-        total = 0.0
+        by_gap, by_law = self._on_contacts(which)
+        each = by_gap * back.dual.q[:, 0] + (by_law * back.dual.mu if np.any(by_law) else 0.0)
+        if which.is_field:
+            return each
+        total = float(np.sum(each))
         for number in self._concerned(which):
             G, W = back.forces[number], back.fields[number]
             if which.kind in MATERIAL:
@@ -286,12 +287,13 @@ def solved_chain(
     base: Reduction | None = None,
     starts: Sequence[Solution] | None = None,
     Q: str = "auto",
+    gap: np.ndarray | float = 0.0,
 ) -> Chain:
     """Solve the states of a load path, without their energies, to the certificate `tol`.
 
-    A path of one scene is one state. `base` is a reduction of the same bodies, which is then only
-    loaded anew; `starts` has a solution for every state to start from. InputError where a state has
-    no solution or is not solved.
+    `base` is a reduction of the same bodies, which is then only loaded anew; `starts` has a
+    solution for every state to start from; `gap` (k,) is added to the initial gap. InputError where
+    a state has no solution or is not solved.
     """
     steps: list[Step] = []
     slipped: Any = 0.0
@@ -299,6 +301,7 @@ def solved_chain(
         base = reduce_bodies(scene, Q=Q) if base is None else base.loaded(scene)
         q = base.problem.q.copy()
         q[:, 1:] -= slipped
+        q[:, 0] += gap
         problem = replace(base.problem, q=q)
         start = starts[number] if starts is not None else steps[-1].solution if steps else None
         solution = solve(problem, tol=tol, start=start)

@@ -64,7 +64,7 @@ class End:
         """
         depth = self.distance[self.inside].max() - self.distance
         square = self._zero(self.distance**2, value[self.contact] ** 2, self.inside, depth, window)
-        return None if square is None or square <= 0 else float(np.sqrt(square))
+        return float(np.sqrt(square)) if square and square > 0 else None
 
     def outer(self, value: np.ndarray, window: Window) -> float | None:
         """Where value^(2/3), a line in the distance through values (k,) outside, is zero [length];
@@ -128,7 +128,8 @@ class Patch:
             found = self._read(1.0, 0.0, read)
             if found is None:
                 return None
-            return Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
+            step = self.step(self.contact, self.place, last)
+            return Ends(-found[0], found[0], self.copies, found[1], step)
         for _ in range(ROUNDS):
             centre = (first + last) / 2
             left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
@@ -138,10 +139,8 @@ class Patch:
             uncertainty = (left[1] + right[1]) / 2
             if max(abs(first - before[0]), abs(last - before[1])) <= CENTRE * (last - first):
                 break
-        return Ends(first, last, self.copies, uncertainty, self._step_at(last))
-
-    def _step_at(self, edge: float) -> float:
-        return self.step(self.contact, self.place, edge)
+        step = self.step(self.contact, self.place, last)
+        return Ends(first, last, self.copies, uncertainty, step)
 
     def _read(
         self, sign: float, centre: float, read: Callable[[End], tuple[float, float] | None]
@@ -210,13 +209,12 @@ def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
 
 def _longest_run(mask: np.ndarray) -> int:
     """Index in the middle of the longest run of true values around a closed line."""
-    n = len(mask)
-    length, best, middle = 0, 0, 0
-    for i, value in enumerate(np.concatenate([mask, mask])):
-        length = length + 1 if value else 0
-        if best < length <= n:
-            best, middle = length, (i - length // 2) % n
-    return middle
+    n, twice = len(mask), np.concatenate([mask, mask])
+    # the length of the run that ends at each place, n at most
+    places = np.arange(2 * n)
+    length = places - np.maximum.accumulate(np.where(twice, -1, places))
+    last = int(np.argmax(np.minimum(length, n)))
+    return int(last - length[last] // 2) % n
 
 
 def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> Patch | None:

@@ -7,7 +7,7 @@ Every reading says how uncertain it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -27,6 +27,8 @@ class Peak:
     place        (dim,) [length];   size  distance of the nodes there [length]
     contacts     (m,) numbers of the contacts from which it was read
     body, elements  where it lies inside a body: the number of the body and the elements around it
+    sources, slopes  (s,) numbers of all contacts that were read, and the derivatives of a pressure
+                     by the normal forces there [1 / area]
     """
 
     value: float
@@ -36,6 +38,8 @@ class Peak:
     contacts: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
     body: int = -1
     elements: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    sources: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +80,11 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
         usable &= radius > ON_PLANE * radius.max(initial=0.0)
     noise = solution.residual * float(np.linalg.norm(solution.reactions))
     found = []
-    for top in _maxima(problem, np.where(usable, pressure, 0.0)):
-        value, uncertainty, near, size = _fitted_top(problem, pressure, usable, top)
-        uncertainty += noise / float(problem.areas[top])
-        found.append(Peak(value, uncertainty, problem.coordinates[:, top], size, near))
+    seen = np.where(usable, np.maximum(pressure, 0.0), 0.0)
+    for top in (i for i in maxima(seen, neighbours(problem)) if seen[i] > 0):
+        peak = _fitted_top(problem, pressure, usable, top)
+        uncertainty = peak.uncertainty + noise / float(problem.areas[top])
+        found.append(replace(peak, uncertainty=uncertainty))
     found.sort(key=lambda peak: -peak.value)
     return Reading(found[0].value, found[0].uncertainty, tuple(found))
 
@@ -98,13 +103,12 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
     return np.asarray(node[near.reshape(problem.contacts, count)])
 
 
-def _maxima(problem: InterfaceProblem, pressure: np.ndarray) -> np.ndarray:
-    """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them
-    first, MOST_PEAKS at most.
+def maxima(sizes: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Numbers of the places whose size (k,) is that of no neighbour `near` (k, m) exceeded, the
+    largest of them first, MOST_PEAKS at most.
     """
-    largest = pressure[neighbours(problem)].max(axis=1)
-    chosen = np.flatnonzero((pressure > 0) & (pressure >= largest))
-    return chosen[np.argsort(-pressure[chosen], kind="stable")[:MOST_PEAKS]]
+    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
+    return chosen[np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]]
 
 
 def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -121,9 +125,8 @@ def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 
 def _fitted_top(
     problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
-) -> tuple[float, float, np.ndarray, float]:
-    """Value and uncertainty of the pressure near a node, the contacts next to it, and their
-    distance.
+) -> Peak:
+    """The peak of the pressure near a node.
 
     Beside an axis the value is that of the widest fit that agrees with all narrower ones within
     their uncertainties (after Lepski): the nodes next to the axis are poor, and those farther away
@@ -132,67 +135,82 @@ def _fitted_top(
     count, widest = FITTED[problem.dim], 0
     if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
         widest = len(_surroundings(problem)[1])
-    value, doubt, near, size = _fit_to(count, problem, pressure, usable, top)
-    best, found = (value, value), list[tuple[float, float]]()
-    while np.isfinite(doubt) and all(abs(value - v) <= doubt + around for v, around in found):
-        best = value, doubt
+    first = made = _fit_to(count, problem, pressure, usable, top)
+    best, found = replace(made, uncertainty=made.value), list[Peak]()
+    while np.isfinite(made.uncertainty) and all(
+        abs(made.value - one.value) <= made.uncertainty + one.uncertainty for one in found
+    ):
+        best = made
         found.append(best)
         count *= 2
         if count > widest:
             break
-        value, doubt = _fit_to(count, problem, pressure, usable, top)[:2]
-    return *best, near, size
+        made = _fit_to(count, problem, pressure, usable, top)
+    return replace(best, contacts=first.contacts, size=first.size)
 
 
 def _fit_to(
     count: int, problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
-) -> tuple[float, float, np.ndarray, float]:
+) -> Peak:
     """As _fitted_top, from a quadratic fit to the square of the pressure at `count` contacts.
 
-    The uncertainty is infinite where these are too few, or not all pressed.
+    The uncertainty is infinite where these are too few, or not all pressed. With the fit linear in
+    the squares, and with a place where its slope is zero or which is a node, the derivative of the
+    value v by a square is half the weight that it has in v^2 over v.
     """
     places, node = _surroundings(problem)
     dim, offset = len(places), places - problem.chart.places[:, [top]]
     distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
     near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
-    own, nodal = np.unique(node[near]), float(pressure[top])
-    pressed, areas = pressure[node[near]], problem.areas[node[near]]
+    nodal, pressed, areas = float(pressure[top]), pressure[node[near]], problem.areas[node[near]]
     reach = float(distance[near].max(initial=0.0))
     size = reach / max(len(near) / 2, 1) ** (1 / dim) or float(problem.areas[top] ** (1 / dim))
     # with a first coordinate of 1
     powers = list(combinations_with_replacement(range(dim + 1), 2))
+    place, own = problem.coordinates[:, top], np.unique(node[near])
+    alone = Peak(nodal, np.inf, place, size, own, sources=np.array([top]))
+    alone = replace(alone, slopes=1 / problem.areas[alone.sources])
     if len(near) <= len(powers) or not np.all(pressed > 0):
-        return nodal, np.inf, own, size  # too few contacts to know
-    terms = np.concatenate([np.ones((1, len(near))), offset[:, near] / reach])
-    terms = np.array([terms[i] * terms[j] for i, j in powers]).T
+        return alone  # too few contacts to know
+    terms = _terms(offset[:, near] / reach, powers)
     square, root = pressed**2, np.sqrt(areas / areas.mean())
-    fit = np.linalg.lstsq(terms * root[:, None], square * root, rcond=None)[0]
+    weights = np.linalg.pinv(terms * root[:, None]) * root
+    fit = weights @ square
     left = float(np.linalg.norm((terms @ fit - square) * root))
     scatter = left / (len(near) - len(powers)) ** 0.5
-    value = nodal
-    if not _outermost(offset[:, near]):
-        inner = terms[distance[near] <= reach / 2]
-        value = max(float((inner @ fit).max()), 0.0) ** 0.5
-        value = max(value, _stationary(fit, powers, dim))
     at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
     # rings at an axis bear little
     at_top *= min(1.0, float(np.sqrt(problem.areas[top] / areas.mean())))
-    return value, max(scatter, at_top) / (2 * value or 1.0), own, size
+    doubt = max(scatter, at_top) / 2
+    if _outermost(offset[:, near]):
+        return replace(alone, uncertainty=doubt / (nodal or 1.0))
+    inner = np.concatenate([terms[distance[near] <= reach / 2], _stationary(fit, powers, dim)])
+    highest = inner[np.argmax(inner @ fit)]
+    value = max(float(highest @ fit), 0.0) ** 0.5
+    slopes = (highest @ weights) * pressed / areas / (value or np.inf)
+    return replace(
+        alone, value=value, uncertainty=doubt / (value or 1.0), sources=node[near], slopes=slopes
+    )
 
 
-def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> float:
-    """The root of a quadratic polynomial at its top, if it has one within half the fitted nodes,
-    else 0; powers as in _fit_to().
+def _terms(offsets: np.ndarray, powers: list[tuple[int, int]]) -> np.ndarray:
+    """The terms (m, powers) of a quadratic polynomial at m offsets (dim, m)."""
+    terms = np.concatenate([np.ones((1, offsets.shape[1])), offsets])
+    return np.array([terms[i] * terms[j] for i, j in powers]).T
+
+
+def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> np.ndarray:
+    """The terms (1, powers) of a quadratic polynomial at its top, if it has one within half the
+    fitted nodes, else (0, powers); powers as in _fit_to().
     """
     H = np.zeros((dim + 1, dim + 1))
     for coefficient, (i, j) in zip(fit, powers):
         H[i, j] += coefficient / 2
         H[j, i] += coefficient / 2
     if np.any(np.linalg.eigvalsh(H[1:, 1:]) >= 0):
-        return 0.0
-    at = -np.linalg.solve(H[1:, 1:], H[1:, 0])
-    top = float(H[0, 0] + H[0, 1:] @ at)
-    return top**0.5 if np.linalg.norm(at) <= 0.5 and top > 0 else 0.0
+        return np.empty((0, len(powers)))
+    at = -np.linalg.solve(H[1:, 1:], H[1:, :1])
+    return _terms(at[:, np.linalg.norm(at, axis=0) <= 0.5], powers)
 
 
 def at_rim(reduction: Reduction, solution: Solution) -> bool:

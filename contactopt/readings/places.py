@@ -18,7 +18,7 @@ slopes, the derivatives by what it was read from.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,9 +28,8 @@ from contactopt.bodies.fields import Region
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
-from contactopt.readings.constants import MOST_PEAKS
-from contactopt.readings.peaks import Peak, Reading
-from contactopt.readings.state import Seeds, State
+from contactopt.readings.peaks import Peak, Reading, maxima
+from contactopt.readings.state import Functional, Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
 
@@ -191,7 +190,9 @@ def read_stress(
     stress = recovered.stress(U)
     if place.kind == LARGEST:
         sizes, slopes = von_mises(stress), von_mises_slopes(stress)
-        tops = _tops(recovered.places, sizes)
+        count = min(AROUND[reduction.scene.dim], len(sizes))
+        points = recovered.places.T
+        tops = maxima(sizes, cKDTree(points).query(points, k=count)[1].reshape(-1, count)).tolist()
     else:
         column = STRESSES[reduction.scene.kind].index(place.kind)
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
@@ -203,28 +204,15 @@ def read_stress(
     slopes[np.arange(len(slopes)) != top] = 0.0
     uncertainty = float(above.max())
 
-    def peak(i: int, doubt: float, vertices: np.ndarray) -> Peak:
-        place, elements = recovered.places[:, i], recovered.elements(vertices)
-        return Peak(
-            float(sizes[i]), doubt, place, recovered.size(i), body=number, elements=elements
-        )
+    def peak(i: int, doubt: float, vertices: Any) -> Peak:
+        made = Peak(float(sizes[i]), doubt, recovered.places[:, i], recovered.size(i), body=number)
+        return replace(made, elements=recovered.elements(np.asarray(vertices)))
 
-    others = [peak(i, float(scatter[i]), np.array([i])) for i in tops if i != top]
+    others = [peak(i, float(scatter[i]), [i]) for i in tops if i != top]
     peaks = (peak(top, uncertainty, np.flatnonzero(doubtful)), *others)
     return StressReading(
         float(sizes[top]), uncertainty, peaks, body=number, map=recovered, slopes=slopes
     )
-
-
-def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
-    """Numbers of the places (dim, m) where a size (m,) is that of no neighbour exceeded, the
-    largest of them first.
-    """
-    count = min(AROUND[len(places)], len(sizes))
-    near = cKDTree(places.T).query(places.T, k=count)[1].reshape(len(sizes), count)
-    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
-    order = np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]
-    return [int(i) for i in chosen[order]]
 
 
 def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tuple[int, StressMap]:
@@ -240,13 +228,15 @@ def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tup
     return number, recovered
 
 
-def stress_seeds(place: Place, state: State) -> Seeds:
-    """The slopes of a stress inside a body: a function of its displacement U, which follows the
-    contact forces by its compliance.
+def place_seeds(place: Place, state: State) -> Seeds:
+    """The slopes of a quantity at a place. A stress inside a body is a function of its displacement
+    U, which follows the contact forces by its compliance.
 
     A largest stress has the derivative of the stress at the place where it is largest. The
     multipliers do not enter, since the free motions that they stand for strain nothing.
     """
+    if place.kind == "pressure":
+        return Functional(pressure_weights(place, state.reduction))(state)
     found = read_stress(place, state.reduction, state.displaced)
     number = found.body
     own = found.map.transposed(found.slopes)
@@ -296,26 +286,19 @@ def read_place(place: Place, reduction: Reduction, solution: Solution) -> Readin
     weights, problem, r = pressure_weights(place, reduction), reduction.problem, solution.reactions
     near = np.flatnonzero(weights[:, 0])
     value, areas = float(np.sum(weights * r)), problem.areas[near]
-    missing = ""
-    if not problem.law.pressed(r)[near].any():
-        apart = problem.displacements(r, solution.multipliers)[near, 0].min()
-        missing = (
-            f"there is no contact at ({_words(place.region)}): the surfaces are {apart:.3g} apart"
-            " there"
-        )
+    apart = problem.displacements(r, solution.multipliers)[near, 0].min()
+    missing = (
+        f"there is no contact at ({_words(place.region)}): the surfaces are {apart:.3g} apart there"
+        if not problem.law.pressed(r)[near].any()
+        else ""
+    )
     pressure, share, points = r[near, 0] / areas, weights[near, 0] * areas, problem.coordinates
-    if len(near) < 3:
-        scatter = float(np.abs(pressure - value) @ np.abs(share))
-    else:
-        left = _left(points[:, near], pressure)
-        scatter = float(np.sqrt(np.sum(left**2) * np.sum(share**2)))
+    scatter = float(np.abs(pressure - value) @ np.abs(share))
+    if len(near) > 2:
+        terms = np.vstack([np.ones(len(near)), points[:, near]]).T
+        left = pressure - terms @ np.linalg.lstsq(terms, pressure, rcond=None)[0]
+        scatter = float(np.linalg.norm(left) * np.linalg.norm(share))
     noise = solution.residual * float(np.linalg.norm(r) / areas.min())
     size = float(np.ptp(points[:, near], axis=1).max())
     peak = Peak(value, scatter, points[:, near[0]], size, near)
     return Reading(value, scatter + noise, (peak,), missing)
-
-
-def _left(points: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """What a linear function through values (m,) at points (dim, m) leaves of them."""
-    terms = np.vstack([np.ones(points.shape[1]), points - points.mean(axis=1, keepdims=True)]).T
-    return np.asarray(values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0])

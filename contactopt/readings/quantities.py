@@ -32,9 +32,9 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.readings.edges import stick_reading, width_reading
 from contactopt.readings.peaks import Peak, Reading, pressure_reading
-from contactopt.readings.places import PLACED, place_of, pressure_weights, read_place, stress_seeds
+from contactopt.readings.places import PLACED, place_of, place_seeds, read_place
 from contactopt.readings.resultants import views
-from contactopt.readings.slopes import by_normal_forces, of_stick
+from contactopt.readings.slopes import of_pressure, of_stick, of_width
 from contactopt.readings.state import Functional, Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
@@ -77,7 +77,7 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
         raise InputError(f"a quantity is given by its name; got {name!r}.")
     place = place_of(name, scene)
     if place is not None:
-        return Quantity(name, partial(_at_place, place), partial(read_place, place))
+        return Quantity(name, partial(place_seeds, place), partial(read_place, place))
     kind, _, rest = name.partition(":")
     form, make = ROWS.get(kind, (None, None))
     if make is None:
@@ -122,7 +122,9 @@ def elastic_energy(reduction: Reduction, solution: Solution) -> float:
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
-def _of_pair(read: Reader) -> Callable[[str, str, Scene], Quantity]:
+def _of_pair(
+    read: Reader, slopes: Callable[[State, int], Seeds]
+) -> Callable[[str, str, Scene], Quantity]:
     """A row whose quantity is read from the forces on one pair of surfaces; of the pressure also
     that at one contact, by its number.
     """
@@ -143,18 +145,17 @@ def _of_pair(read: Reader) -> Callable[[str, str, Scene], Quantity]:
                 f" {', '.join(names)}."
             )
         number = names.index(rest) if rest else 0
-        slopes = of_stick if read is stick_reading else partial(by_normal_forces, read)
-        return Quantity(name, partial(slopes, pair=number), partial(_read_pair, read, number))
+        return Quantity(
+            name, lambda state: slopes(state, number), partial(_read_pair, read, number)
+        )
 
     return make
 
 
 def _read_pair(read: Reader, number: int, reduction: Reduction, solution: Solution) -> Reading:
     """A reading of one pair of surfaces, with contacts numbered as in the whole scene."""
-    first, found = (
-        reduction.problem.pairs[number].start,
-        read(*views(reduction, solution)[number]),
-    )
+    first = reduction.problem.pairs[number].start
+    found = read(*views(reduction, solution)[number])
     peaks = tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks)
     return replace(found, peaks=peaks)
 
@@ -208,12 +209,6 @@ def _contacts(state: State, name: str) -> slice:
     return next(pair.contacts for pair in state.problem.pairs if pair.name == name)
 
 
-def _at_place(place: Any, state: State) -> Seeds:
-    if place.kind == "pressure":
-        return Functional(pressure_weights(place, state.reduction))(state)
-    return stress_seeds(place, state)
-
-
 def _motion(state: State, component: int) -> Seeds:
     problem, lam = state.problem, state.solution.multipliers
     near = approach(problem, state.solution)
@@ -263,17 +258,13 @@ def _energy(state: State) -> Seeds:
     return Seeds(value, by_r, bodies=tuple(by_U), explicit=explicit)
 
 
-def _read_energy(reduction: Reduction, solution: Solution) -> Reading:
-    return Reading(elastic_energy(reduction, solution))
-
-
 # kind of a quantity -> what may follow its name, and a function of name, what follows, and scene
 ROWS: dict[str, tuple[str, Callable[[str, str, Scene], Quantity]]] = {
-    "pressure": ("[:PAIR]", _of_pair(pressure_reading)),
-    "width": ("[:PAIR]", _of_pair(width_reading)),
+    "pressure": ("[:PAIR]", _of_pair(pressure_reading, of_pressure)),
+    "width": ("[:PAIR]", _of_pair(width_reading, of_width)),
     "approach": ("", _of_scene(partial(_motion, component=0))),
-    "stick": ("[:PAIR]", _of_pair(stick_reading)),
-    "energy": ("", _of_scene(_energy, _read_energy)),
+    "stick": ("[:PAIR]", _of_pair(stick_reading, of_stick)),
+    "energy": ("", _of_scene(_energy, lambda *solved: Reading(elastic_energy(*solved)))),
     "shift": ("", _of_scene(partial(_motion, component=1))),
     "normal_force": ("[:PAIR]", _pair_force),
     "shear_force": ("[:PAIR]", _pair_force),

@@ -18,12 +18,10 @@ COVERED = 0.99  # a contact with less than this share of its faces lies where th
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Full sentences on zones of contact that are smaller than the mesh can show, or reach the
-    other surface's rim; none if every zone is resolved, and for solutions that are not certified.
-
-    A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across
-    its half-width is told. A surface that touches as a whole has no such zone. Contacts at the rim
-    of the other surface are told, since only a part of their faces bears the force.
+    """Full sentences on zones of contact that end by themselves and are smaller than the mesh can
+    show, a disc or strip of FEWEST elements across its half-width, and on contacts at the other
+    surface's rim, where only a part of their faces bears the force; none for solutions that are not
+    certified.
     """
     if not solution.solved:
         return ()

@@ -1,8 +1,8 @@
 """Slopes of what is read from many forces: the pressure, and the half-widths of contact and stick.
 
-They are formulas over several forces. Their derivative by the force at each closed contact is a
-central difference of the reading, which solves nothing; what the parameters do to the forces is
-exact.
+They are formulas over several forces. The fit that reads the pressure has exact derivatives. Those
+of a half-width by the force at each closed contact are central differences of the reading, which
+solve nothing; what the parameters do to the forces is exact.
 """
 
 from __future__ import annotations
@@ -13,12 +13,10 @@ from functools import partial
 
 import numpy as np
 
-from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
-from contactopt.problem import Solution
 from contactopt.problem.laws.law import Law
-from contactopt.readings.edges import contact_edge, stick_edge
-from contactopt.readings.peaks import Reading
+from contactopt.readings.edges import contact_edge, stick_edge, width_reading
+from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.resultants import views
 from contactopt.readings.state import Seeds, State
 from contactopt.scenes.parameters import Parameter
@@ -27,10 +25,17 @@ STEP = 1e-5  # of a reading's central differences, over the force at the contact
 MOST = 3000  # contacts at which a reading is differentiated
 
 
-def by_normal_forces(
-    read: Callable[[Reduction, Solution], Reading], state: State, pair: int
-) -> Seeds:
-    """A quantity that reads the normal forces of one pair, at closed contacts."""
+def of_pressure(state: State, pair: int) -> Seeds:
+    """The largest pressure of one pair, which its reading differentiates."""
+    reduction, solution = views(state.reduction, state.solution)[pair]
+    reading, by_r = pressure_reading(reduction, solution), np.zeros(solution.reactions.shape)
+    for peak in reading.peaks[:1]:
+        np.add.at(by_r[:, 0], peak.sources, peak.slopes)
+    return Seeds(reading.value, _on_all(state, pair, by_r))
+
+
+def of_width(state: State, pair: int) -> Seeds:
+    """The half-width of contact of one pair, which reads the normal forces at closed contacts."""
     reduction, solution = views(state.reduction, state.solution)[pair]
     r = solution.reactions
     by_r = np.zeros(r.shape)
@@ -38,11 +43,11 @@ def by_normal_forces(
     def at(i: int, h: float) -> float:
         there = r.copy()
         there[i, 0] += h
-        return read(reduction, replace(solution, reactions=there)).value
+        return width_reading(reduction, replace(solution, reactions=there)).value
 
     for i in _few(reduction.problem.law.pressed(r)):
         by_r[i, 0] = _central(partial(at, i), STEP * float(np.abs(r[i]).max()))
-    return Seeds(read(reduction, solution).value, _on_all(state, pair, by_r))
+    return Seeds(width_reading(reduction, solution).value, _on_all(state, pair, by_r))
 
 
 def of_stick(state: State, pair: int) -> Seeds:
@@ -117,7 +122,7 @@ def _few(closed: np.ndarray) -> np.ndarray:
     contacts = np.flatnonzero(closed)
     if len(contacts) > MOST:
         raise InputError(
-            "pressure and half-widths can be differentiated at"
+            "half-widths can be differentiated at"
             f" {MOST} closed contacts at most; got {len(contacts)}."
         )
     return contacts

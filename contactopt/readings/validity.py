@@ -33,20 +33,16 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(k,) longest edge of the cells around each contact [length]; infinite without any."""
-    size = np.zeros(points.shape[1])
-    for own, other in zip(cells, np.roll(cells, 1, axis=0)):
-        length = np.linalg.norm(points[:, own] - points[:, other], axis=0)
-        np.maximum.at(size, own, length)
-        np.maximum.at(size, other, length)
+    size, others = np.zeros(points.shape[1]), np.roll(cells, 1, axis=0)
+    length = np.linalg.norm(points[:, cells] - points[:, others], axis=0)
+    for ends in (cells, others):
+        np.maximum.at(size, ends, length)
     return np.where(size > 0, size, np.inf)
 
 
 def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], list[str]]:
-    """Measure how far an answer goes beyond what is assumed.
-
-    Returned are the table `bodies` of a summary, with the imbalance, strain and rotation of every
-    body, and that of the pairs, with slip and closure over the size of the facets and the misfit;
-    and one sentence for every value beyond its bound.
+    """Measure how far an answer goes beyond what is assumed: the tables `bodies` and `pairs` of a
+    summary, by the keys of BOUNDS, and one sentence for every value beyond its bound.
     """
     displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
     bodies: dict[str, dict[str, float]] = {}
@@ -77,11 +73,9 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         close = status.stick[own] if reduction.problem.law.dilatant else touching
         missed = np.abs(moved[own, 0])[close].max(initial=0.0)
         misfit = float(missed / max(scale[own].max(initial=0.0), 1e-300))
-        largest = pairs[pair.name] = {
-            "slip": float(slip[touching].max(initial=0.0)),
-            "closure": float(closure[touching].max(initial=0.0)),
-            "misfit": misfit,
-        }
+        moves = {"slip": slip, "closure": closure}
+        largest = {key: float(of[touching].max(initial=0.0)) for key, of in moves.items()}
+        pairs[pair.name] = largest | {"misfit": misfit}
         for key in ("slip", "closure"):
             remarks += _beyond(key, f"pair '{pair.name}'", largest[key])
         if solution.solved and misfit > BOUNDS["misfit"]:

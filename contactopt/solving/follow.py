@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sized
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult, State
 from contactopt.solving.solve_scene import Options, Solved, solve_loaded, solve_scene
 
+Forces = list[tuple[np.ndarray, np.ndarray]]
 KEPT = 500_000  # displacement unknowns of all bodies, up to which every state of a path keeps them
 
 
@@ -58,13 +58,13 @@ def follow(
     total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
-    mechanics: _Mechanics | None = None
+    bodies: Forces | None = None
     for scene in scenes:
         if solved is None:
             solved = solve_scene(scene, elements, zone, options)
         else:
             solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
-        state, mechanics = _state(solved, states[-1] if states else None, mechanics)
+        state, bodies = _state(solved, states[-1] if states else None, bodies)
         states.append(state)
         steps = count(state.solution.iterations, "iteration")
         options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
@@ -75,47 +75,35 @@ def follow(
     return PathResult(tuple(states), solved.reduction)
 
 
-@dataclass(frozen=True, eq=False)
-class _Mechanics:
-    """What energies are made of: contact forces r and displacements u, both (k, dim), and of each
-    body the displacements U and the external forces F.
+def _state(solved: Solved, before: State | None, last: Forces | None) -> tuple[State, Forces]:
+    """What is kept of a state, given the one before it, and the state of the bodies: their
+    displacements U and the external forces F on them.
     """
-
-    r: np.ndarray
-    u: np.ndarray
-    U: list[np.ndarray]
-    F: list[np.ndarray]
-
-
-def _state(
-    solved: Solved, before: State | None, last: _Mechanics | None
-) -> tuple[State, _Mechanics]:
-    """What is kept of a state, given the one before it, and the state of the bodies."""
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
     gap, earlier = np.zeros(r.shape), np.zeros(r.shape)
     gap[:, 0] = reduction.gap
     if before is not None:
         earlier[:, 1:] = before.displacements[:, 1:]
-    U = list(reduction.displaced(solution))
-    F = [body.external_forces(own) for body, own in zip(reduction.bodies, U)]
-    now = _Mechanics(r, problem.displacements(r, solution.multipliers) + earlier, U, F)
-    if last is None:  # the unloaded bodies
-        last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
+    slip = problem.displacements(r, solution.multipliers)
+    U = reduction.displaced(solution)
+    now = [(own, body.external_forces(own)) for body, own in zip(reduction.bodies, U)]
+    # before the first state are the unloaded bodies
+    u0, r0 = (gap, 0.0) if before is None else (before.displacements, before.solution.reactions)
     moved = problem.displacements(0 * r, solution.multipliers) + earlier - gap
-    steps = zip(now.F, last.F, now.U, last.U)
+    steps = zip(now, last or [(0 * own, 0 * force) for own, force in now])
     here = all(isinstance(own, np.ndarray) for own in U) and sum(own.size for own in U) <= KEPT
     state = State(
         reduction.scene,
         solution,
         problem.q,
         problem.s,
-        now.u,
-        (now.u - earlier)[:, 1:],
+        slip + earlier,
+        slip[:, 1:],
         np.average(moved, axis=0, weights=problem.areas),
         elastic=sum(body.energy(own) for body, own in zip(reduction.bodies, U)),
-        external=sum(float((F + F0) @ (U - U0)) for F, F0, U, U0 in steps) / 2,
-        contact=-float(np.sum((now.r + last.r) * (now.u - last.u))) / 2,
-        bodies=tuple(U) if here else (),
+        external=sum(float((F + F0) @ (own - U0)) for (own, F), (U0, F0) in steps) / 2,
+        contact=-float(np.sum((r + r0) * (slip + earlier - u0))) / 2,
+        bodies=U if here else (),
     )
     return state, now

@@ -35,28 +35,16 @@ class Limits:
         check_number("max_memory", self.memory, low=0.0)
 
     def refusal(self, unknowns: float, usual: int, seconds: float, memory: float) -> str:
-        """Say in a sentence which bound the next mesh would pass; nothing if it passes none.
-
-        Parameters
-        ----------
-        unknowns, usual : Unknowns that it would have, and the bound on them where none was given.
-        seconds, memory : What the search would have taken at its end [s], and hold [bytes].
-
-        Returns
-        -------
-        The sentence, or an empty text.
+        """Say in a sentence which bound the next mesh would pass, with so many unknowns, at a time
+        [s] and with a memory [bytes] of the whole search; nothing if it passes none. `usual` bounds
+        the unknowns where no bound was given.
         """
         most = usual if self.unknowns is None else self.unknowns
+        takes = ""
         if unknowns > most:
-            return f"to go on would take up to {unknowns:,.0f} unknowns, more than {most:,}"
-        if seconds > self.seconds:
-            return (
-                f"to go on would take about {seconds:.2g} s in all, more than the time limit of"
-                f" {self.seconds:g} s"
-            )
-        if memory > self.memory * GIGABYTE:
-            return (
-                f"to go on would take about {memory / GIGABYTE:.2g} GB of memory, more than"
-                f" {self.memory:g} GB"
-            )
-        return ""
+            takes = f"up to {unknowns:,.0f} unknowns, more than {most:,}"
+        elif seconds > self.seconds:
+            takes = f"about {seconds:.2g} s in all, more than the time limit of {self.seconds:g} s"
+        elif memory > self.memory * GIGABYTE:
+            takes = f"about {memory / GIGABYTE:.2g} GB of memory, more than {self.memory:g} GB"
+        return takes and f"to go on would take {takes}"

@@ -164,10 +164,6 @@ class PathResult:
         Parameters
         ----------
         out : The folder, which is made if it does not exist.
-
-        Raises
-        ------
-        InputError : Where the files cannot be written.
         """
         problem = self.reduction.problem
         forces = [state.solution.reactions for state in self.states]
@@ -190,18 +186,18 @@ class PathResult:
 
 
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
-    r = state.solution.reactions
-    status, stick = contact_status(problem, r), np.nan
-    single = len(problem.pairs) == 1
-    if single:
+    r, edges = state.solution.reactions, (np.nan, np.nan)
+    status = contact_status(problem, r)
+    if len(problem.pairs) == 1:
         stick = stick_edge(state.scene, problem, r, state.slip)[0]
+        edges = contact_edge(state.scene, problem, r), stick
     return {
         "normal_force": float(r[:, 0].sum()),
         "shear_force": -float(r[:, 1].sum()),
         "approach": -float(state.apart[0]),
         "shift": float(state.apart[1]),
-        "contact_half_width": contact_edge(state.scene, problem, r) if single else np.nan,
-        "stick_half_width": stick,
+        "contact_half_width": edges[0],
+        "stick_half_width": edges[1],
         "contact_nodes": int(status.touching.sum()),
         "stick_nodes": int(status.stick.sum()),
         "slip_nodes": int(status.slip.sum()),

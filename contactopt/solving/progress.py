@@ -24,9 +24,8 @@ def progress_lines(
     for each outer iteration of a solve that ends at the residual tol.
 
     It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the
-    V-cycles where the method works on the bodies themselves, the time, the largest memory of the
-    process so far, and the time that is left if the residual goes on falling as it fell in the last
-    iteration.
+    V-cycles, the time, the largest memory of the process so far, and the time that is left if the
+    residual goes on falling as it fell in the last iteration.
     """
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
@@ -66,12 +65,7 @@ def _peak_memory() -> float:
 
 
 def resident_memory() -> float:
-    """Read how much memory this process takes now.
-
-    Returns
-    -------
-    Bytes; 0 where the system does not tell.
-    """
+    """Read how much memory this process takes now, in bytes; 0 where the system does not tell."""
     try:
         return float(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
     except OSError:

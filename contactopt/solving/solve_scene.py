@@ -1,9 +1,7 @@
 """The one place that solves a scene: reduce it to its interface, find a start, solve.
 
-Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with
-a scene. solve_loaded() goes on with the same bodies under other loads. contactopt.solving.zone
-remeshes to the contact zone, contactopt.solving.follow follows a load path, and contactopt.accuracy
-refines meshes around both.
+Whatever solves scenes is a loop around the two functions of this module: the contact zone and load
+paths (contactopt.solving), and refinement (contactopt.accuracy).
 """
 
 from __future__ import annotations
@@ -92,26 +90,17 @@ def solve_scene(
     options: Options | None = None,
     start: Solved | None = None,
 ) -> Solved:
-    """Reduce a scene on one mesh and solve it.
+    """Reduce a scene on one mesh and solve it. The solution says itself whether it is certified.
 
     Parameters
     ----------
     scene : What to solve.
     elements : Number across the contact half-width; the scene's own number by default.
-    zone : Half-width of contact that the mesh resolves [length]; the scene's first guess by
-        default.
+    zone : Half-width of contact that the mesh resolves [length]; by default the scene's.
     options : How to solve it.
     start : The same scene solved on another mesh, to start from. Without one, where Newton's steps
         take products with Q, the scene is first solved on a coarser mesh, if its bodies can make
         one.
-
-    Returns
-    -------
-    The reduction and its solution. The solution says itself whether it is certified.
-
-    Raises
-    ------
-    InputError : On a scene that cannot be modelled, or options that do not fit.
     """
     options = options or Options()
     if not isinstance(scene, Scene):

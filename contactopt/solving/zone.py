@@ -24,10 +24,9 @@ def solve_zone(
 ) -> Solved:
     """Solve a scene; where it has a contact zone, remesh until its edge is a node of the mesh.
 
-    Each round solves on meshes with a node at the edge of the present zone, starting from the round
-    before, and reads the new edge from the reactions. The loop ends when two zones agree to AGREE
-    of an element, when a solve fails, or after LOOPS rounds. A scene without a zone, or with
-    several pairs of surfaces, is solved once.
+    Each round starts from the one before, and reads the new edge from the reactions. The loop ends
+    when two zones agree to AGREE of an element, when a solve fails, or after LOOPS rounds. A scene
+    without a zone, or with several pairs of surfaces, is solved once.
 
     Parameters
     ----------

@@ -101,24 +101,29 @@ class Coupled:
         """The residual that belongs to a right side."""
         return norm(self.weights * right)
 
-    def step(self, at: State, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
-        """The state after Newton's step, or None if its linear system could not be solved."""
-        form, V = self.form, self.equations.V
-        inverse = linearised.rough(self.P)
-        model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
+    def product(self, linearised: Linearised, x: Stacked) -> Stacked:
+        """The left sides of Newton's step for changes of X, r and the multipliers."""
+        X, r, multipliers = _parted(x)
+        V, moved = self.equations.V, self.form.moved(X, r)
+        forces = self.form.stiffness(X) - self.form.pulled(r)
+        return _joined(forces, linearised.rows(r, moved + V @ multipliers), V.T @ r)
 
-        def product(x: Stacked) -> Stacked:
-            X, r, multipliers = _parted(x)
-            forces = form.stiffness(X) - form.pulled(r)
-            moved = form.moved(X, r) + V @ multipliers
-            return _joined(forces, linearised.rows(r, moved), V.T @ r)
+    def change(self, right: Stacked, linearised: Linearised, rtol: float) -> Stacked:
+        """The changes that Newton's step makes for a right side, to a relative accuracy."""
+        form, inverse = self.form, linearised.rough(self.P)
+        model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
 
         def precondition(x: Stacked) -> Stacked:
             forces, error, balance = _parted(x)
             r, multipliers = linearised.solve(model, inverse, error, -balance, SCHUR_STEP)
             return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
-        change = flexible_gmres(product, precondition, right, self.weights, rtol)
+        product = partial(self.product, linearised)
+        return flexible_gmres(product, precondition, right, self.weights, rtol)
+
+    def step(self, at: State, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
+        """The state after Newton's step, or None if its linear system could not be solved."""
+        change = self.change(right, linearised, rtol)
         if not np.isfinite(norm(change)):
             return None
         X, r, multipliers = _parted(change)
