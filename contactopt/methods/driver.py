@@ -137,6 +137,7 @@ class _Limits:
 def _run(
     problem: InterfaceProblem, method: Method, limits: _Limits, start: Solution | None
 ) -> Solution:
+    begin = time.perf_counter()
     if problem.contacts == 0:
         return _without_contacts(problem, method, limits.tol)
     _check_equilibrium(problem)
@@ -153,9 +154,12 @@ def _run(
     recorder = _Recorder(problem, scales, limits)
     first = None if start is None else _dimensionless_start(start, problem, scales)
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
+    if not recorder.history:
+        recorder.certify([])
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
+    checks = time.perf_counter() - begin - recorder.clock - recorder.certified
     if proof is not None:
         message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
@@ -166,7 +170,7 @@ def _run(
         len(recorder.history),
         repr(method),
         tuple(recorder.history),
-        {"solve": recorder.clock, "certificate": recorder.certified},
+        {"solve": recorder.clock, "certificate": recorder.certified, "checks": checks},
         message or status.sentence,
         proof=proof,
         displacements=recorder.displacements,
@@ -282,12 +286,18 @@ class _Recorder:
         self.problem, self.scales, self.limits = problem, scales, limits
         self.reactions, self.multipliers = at_rest(problem)
         self.displacements: Stacked | None = None
-        self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
+        self.residual = np.inf
         self.history: list[dict[str, float]] = []
         self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
         self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
+
+    def certify(self, known: Sequence[Moved]) -> None:
+        """Judge the present iterate."""
+        begin = time.perf_counter()
+        self.residual = self._certificate(known)
+        self.certified += time.perf_counter() - begin
 
     def _certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by Q r from the method where it is known.
@@ -318,9 +328,7 @@ class _Recorder:
             # The same forces solve the problem with u = V lambda = 0, and rounding has no length to
             # be small beside.
             self.multipliers = np.zeros(len(lam))
-        begin = time.perf_counter()
-        self.residual = self._certificate(known)
-        self.certified += time.perf_counter() - begin
+        self.certify(known)
         change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])
         same = [_relative(state, old) < SAME for old in reversed(self.recent)]

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.chart import ON_PLANE
 from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
+from contactopt.readings.patches import least
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,12 @@ def _maxima(problem: InterfaceProblem, pressure: np.ndarray) -> np.ndarray:
     """Numbers of the contacts whose pressure is that of no neighbour exceeded, the largest of them
     first, MOST_PEAKS at most.
     """
-    largest = pressure[neighbours(problem)].max(axis=1)
+    grid, count = problem.chart.grid, NEIGHBOURS[problem.dim]
+    if grid is None:
+        largest = pressure[neighbours(problem)].max(axis=1)
+    else:
+        side = round(count ** (1 / len(grid)))
+        largest = maximum_filter(pressure.reshape(grid), side, mode="nearest").ravel()
     chosen = np.flatnonzero((pressure > 0) & (pressure >= largest))
     return chosen[np.argsort(-pressure[chosen], kind="stable")[:MOST_PEAKS]]
 
@@ -154,7 +161,7 @@ def _fit_to(
     places, node = _surroundings(problem)
     dim, offset = len(places), places - problem.chart.places[:, [top]]
     distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
-    near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
+    near = least(distance, min(count, int(usable[node].sum())))
     own, nodal = np.unique(node[near]), float(pressure[top])
     pressed, areas = pressure[node[near]], problem.areas[node[near]]
     reach = float(distance[near].max(initial=0.0))
@@ -202,7 +209,7 @@ def at_rim(reduction: Reduction, solution: Solution) -> bool:
     problem = reduction.problem
     top = int(np.argmax(nodal_pressure(problem, solution)))
     offsets = _surroundings(problem)[0] - problem.chart.places[:, [top]]
-    return _outermost(offsets[:, np.argsort(np.linalg.norm(offsets, axis=0), kind="stable")[:9]])
+    return _outermost(offsets[:, least(np.linalg.norm(offsets, axis=0), 9)])
 
 
 def _outermost(offsets: np.ndarray) -> bool:

@@ -295,9 +295,11 @@ class Law:
         -------
         (k,) mask.
         """
-        return self.pressed(r) & (
-            np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound_along(r)
-        )
+        stick = self.pressed(r) & self.rough
+        some = np.flatnonzero(stick)
+        bound = self.select(some).bound_along(r[some])
+        stick[some] = np.linalg.norm(r[some, 1:], axis=1) < (1 - BELOW) * bound
+        return stick
 
     def scaled(self, force: float) -> Self:
         """The same law with forces in another unit."""
