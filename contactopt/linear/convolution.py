@@ -222,8 +222,12 @@ class Kernel:
                 out[place] = backward(total, self.padded, self.grid)
         return out
 
-    def entries(self) -> np.ndarray:
+    def entries(self, contacts: np.ndarray | None = None) -> np.ndarray:
         """Write the operator as an array.
+
+        Parameters
+        ----------
+        contacts : The numbers (k,) of the contacts whose entries are wanted; by default all.
 
         Returns
         -------
@@ -233,9 +237,10 @@ class Kernel:
         ------
         InputError : If it would be too large.
         """
-        k, dim = int(np.prod(self.grid)), self.dim
+        numbers = np.arange(np.prod(self.grid)) if contacts is None else contacts
+        k, dim = len(numbers), self.dim
         check_dense(k * dim)
-        places = np.indices(self.grid).reshape(len(self.grid), k)
+        places = np.array(np.unravel_index(numbers, self.grid))
         apart = places[:, :, None] - places[:, None, :]
         Q = np.zeros((k, dim, k, dim))
         for (a, b), symbol in self.symbols.items():

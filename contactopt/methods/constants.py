@@ -97,6 +97,12 @@ COARSE_TRIES = 80  # iterates of the default method on the coarsest grid, where 
 CLOSER = 0.1  # residual of a given start that is taken, over that of the coarse grids' answer
 LEAST_SYMBOL = 1e-3  # value of the symbol that is inverted, over its median
 LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product
+SLOW = 0.1  # residual of a Newton step over the one before, above which few contacts are to blame
+MOST_LOCAL = 600  # contacts that are solved by themselves, at most
+FEW_OF_ALL = 0.02  # and the share of the closed ones that they may be
+LOCAL_SHARE = 0.9  # of the squared residual, which must be theirs
+AROUND = 2  # rings of contacts around them that are solved with them
+LOCAL_TRIES = 60  # iterates of the default method on them
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where shifts of slipping contacts begin to grow, how much
 
 # Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).
