@@ -90,7 +90,7 @@ GIVEN_BALANCE = 1e-3  # accuracy of the equilibrium under forces to start from
 # Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels, .level_steps).
 COARSEST = 12  # contacts along a side of a grid that is not halved
 NESTED_LOOSEST, NESTED_TIGHTEST = 0.1, 1e-4  # accuracy of the first steps, and of the last ones
-COARSE_ENOUGH = 3e-2  # residual at which a coarse grid has done its work, over the forces
+COARSE_ENOUGH = 3e-3  # residual at which a coarse grid has done its work, over the forces
 COARSEST_ENOUGH = 1e-4  # that of the coarsest grid, from which the others must not be led astray
 COARSE_STEPS = 30  # Newton steps on a coarse grid
 COARSE_TRIES = 80  # iterates of the default method on the coarsest grid, where Newton's steps fail
