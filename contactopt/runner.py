@@ -138,6 +138,7 @@ def run(
     limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
     form = options.Q if options.preconditioner is None else "implicit"
     how = Options(form, options.solver, method, options.tol, note=note)
+    prepared = time.perf_counter() - start
     try:
         known = None
         if options.simplest:
@@ -149,6 +150,7 @@ def run(
         else:
             solved, estimate = known, None
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
+        result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note)
     except MemoryError as error:
         raise InputError(_too_large(states[-1], str(error))) from error

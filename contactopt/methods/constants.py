@@ -103,6 +103,7 @@ FEW_OF_ALL = 0.02  # and the share of the closed ones that they may be
 LOCAL_SHARE = 0.9  # of the squared residual, which must be theirs
 AROUND = 2  # rings of contacts around them that are solved with them
 LOCAL_TRIES = 60  # iterates of the default method on them
+LOCAL_ENOUGH = 1e-3  # residual at which they are solved, over the one that they began with
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where shifts of slipping contacts begin to grow, how much
 
 # Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).

@@ -15,12 +15,17 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from contactopt.methods import find_method
-from contactopt.methods.constants import AROUND, FEW_OF_ALL, LOCAL_SHARE, LOCAL_TRIES, MOST_LOCAL
+from contactopt.methods.constants import (
+    AROUND,
+    FEW_OF_ALL,
+    LOCAL_ENOUGH,
+    LOCAL_SHARE,
+    LOCAL_TRIES,
+    MOST_LOCAL,
+)
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.problem import InterfaceProblem
-
-LOCAL_ENOUGH = 1e-3  # residual of the local problem, over the one that it began with
 
 
 def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evaluation]:

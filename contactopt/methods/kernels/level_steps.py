@@ -64,7 +64,7 @@ def _symmetric(
     (c, m), act = (len(known), len(at.closed)), _act(level, at)
     # W holds the columns of the balance; N is the rough inverse, normal and tangential components
     # by themselves.
-    W = level.V[:, at.closed].reshape(c * m, -1)
+    W = level.V[:, at.closed].reshape(c * m, len(balance))
 
     def near(x: np.ndarray) -> np.ndarray:
         parts = x.reshape(c, m)
