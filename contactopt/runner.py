@@ -21,7 +21,6 @@ from contactopt.files.writing import check_folder, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.outcome import Outcome
-from contactopt.readings.edges import contact_edge, stick_width
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.quantities import approach
 from contactopt.readings.resolution import remarks
@@ -49,6 +48,7 @@ PATH_KEYS = (
     "stick_half_width",
     "friction_work",
 )
+WIDTHS = "contact_half_width", "stick_half_width"
 # option -> field of Limits
 BOUNDS = {"max_unknowns": "unknowns", "time_limit": "seconds", "max_memory": "memory"}
 
@@ -138,6 +138,7 @@ def run(
     limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
     form = options.Q if options.preconditioner is None else "implicit"
     how = Options(form, options.solver, method, options.tol, note=note)
+    prepared = time.perf_counter() - start
     try:
         known = None
         if options.simplest:
@@ -149,6 +150,7 @@ def run(
         else:
             solved, estimate = known, None
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
+        result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note)
     except MemoryError as error:
         raise InputError(_too_large(states[-1], str(error))) from error
@@ -266,7 +268,8 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
     seconds = dict(solution.seconds)
     with _clock(seconds, "recover"):
         fields = recover(reduction, solution)
-    summary = _summary(solved, names)
+    with _clock(seconds, "readings"):
+        summary = _summary(solved, names)
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
@@ -287,7 +290,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     reduction, solution = solved.reduction, solved.solution
     problem = reduction.problem
     found = tables(reduction, solution)
-    single = len(problem.pairs) == 1
+    single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
@@ -307,10 +310,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": contact_edge(reduction.scene, problem, solution.reactions)
-        if single
-        else None,
-        "stick_half_width": stick_width(reduction, solution)[0] if single else None,
+        **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",

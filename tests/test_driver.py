@@ -224,7 +224,10 @@ def test_the_default_says_when_it_changes_its_method():
 
 def test_seconds_are_those_of_the_method_and_of_the_certificate(punch):
     solution = solve(punch)
-    assert set(solution.seconds) == {"solve", "certificate"} and min(solution.seconds.values()) > 0
+    assert (
+        set(solution.seconds) == {"solve", "certificate", "checks"}
+        and min(solution.seconds.values()) > 0
+    )
     assert solution.seconds["solve"] == solution.history[-1]["seconds"]
 
 

@@ -24,7 +24,10 @@ from contactopt.bodies.influence import half_plane_influence, half_space_influen
 from contactopt.bodies.subsurface import boussinesq_cerruti, flamant
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.linear.convolution import Convolution
+from contactopt.methods.kernels import elimination
+from contactopt.methods.kernels.levels import Level
 from contactopt.methods.nested import Nested
+from contactopt.problem import dimensionless
 from contactopt.readings.half_space_readings import (
     contact_stiffness,
     pressure_distribution,
@@ -32,6 +35,7 @@ from contactopt.readings.half_space_readings import (
     surface_contact,
     surface_maps,
 )
+from contactopt.readings.peaks import largest_around, maxima
 from contactopt.scenes.rough_surfaces import self_affine
 
 STEEL, SOFT = Material(5.0, 0.3), Material(2.0, 0.45)
@@ -665,3 +669,45 @@ def test_stresses_are_refused_where_they_mean_nothing():
         subsurface_stress(alone, contactopt.solve(alone.problem), [0.1])
     with pytest.raises(InputError, match="no half-space named"):
         subsurface_stress(alone, contactopt.solve(alone.problem), [1.0], "other")
+
+
+def test_a_few_contacts_are_solved_by_themselves(monkeypatch):
+    """Wrong forces at three contacts are put right, and all far from them keep theirs."""
+    problem, _ = dimensionless(contactopt.reduce(ball(64, shear=0.6)))
+    level = Level.of_problem(problem)
+    solution = contactopt.solve(problem, Nested(), tol=1e-10)
+    r, lam = solution.reactions.T.copy(), solution.multipliers
+    monkeypatch.setattr(elimination, "FEW_OF_ALL", 0.5)
+    at = level.evaluate(r, lam)
+    k = int(np.argmax(r[0]))
+    wrong = r.copy()
+    wrong[1:, k : k + 3] *= -1.0
+    before = level.evaluate(wrong, lam)
+    (found, _), after = elimination.eliminated(level, (wrong, lam), before)
+    assert after.residual < 1e-2 * before.residual
+    assert 3 <= np.count_nonzero(np.any(found != wrong, axis=0)) <= len(before.closed) / 2
+    np.testing.assert_allclose(found, r, atol=1e-2 * np.abs(r).max())
+    assert elimination.eliminated(level, (r, lam), at)[1].residual <= at.residual
+
+
+def test_entries_of_some_contacts_are_those_of_all():
+    kernel = contactopt.reduce(ball(12, m=8)).Q.kernel
+    some = np.array([3, 40, 41, 95])
+    rows = (3 * some[:, None] + np.arange(3)).ravel()
+    np.testing.assert_allclose(kernel.entries(some), kernel.entries()[np.ix_(rows, rows)], atol=0)
+
+
+def test_local_maxima_on_a_grid_are_those_among_the_nearest_contacts():
+    problem = contactopt.reduce(ball(15))
+    pressure = np.random.default_rng(0).random(problem.contacts)
+    around = np.pad(pressure.reshape(15, 15), 1)
+    window = [around[i : i + 15, j : j + 15] for i in range(3) for j in range(3)]
+    tops = np.flatnonzero(pressure >= np.max(window, axis=0).ravel())
+    best = tops[np.argsort(-pressure[tops])][:8]
+    np.testing.assert_array_equal(maxima(pressure, largest_around(problem, pressure)), best)
+
+
+def test_the_phases_of_a_run_sum_to_its_total(tmp_path):
+    seconds = dict(contactopt.run(ball(60), out=tmp_path, figures=()).summary["seconds"])
+    total = seconds.pop("total")
+    assert 0.9 * total < sum(seconds.values()) <= total

@@ -130,7 +130,8 @@ class HalfSpaceBody(AssembledBody, Body):
         middle = flat - (flat.max(axis=1) + flat.min(axis=1))[:, None] / 2
         areas, held = np.full(k, self.cell), np.zeros((dim, k), dtype=bool)
         own = self.name, points, normals, areas, sp.identity(k, format="csr"), places, traces, held
-        return Surface(*own, self._cells(), chart=Chart(middle, (False,) * (dim - 1)))
+        chart = Chart(middle, (False,) * (dim - 1), grid=self.grid)
+        return Surface(*own, self._cells(), chart=chart)
 
     def _height(self, flat: np.ndarray) -> np.ndarray:
         height = self.part.height

@@ -93,22 +93,22 @@ class Kernel:
         -------
         The kernel.
         """
-        from scipy.fft import rfftn
+        from scipy.fft import dct, dst
 
         padded, symbols = embedding(grid), {}
         for (a, b), part in coefficients.items():
-            odd, whole = _odd_axes(a, b, len(grid)), part
-            for axis, size in enumerate(padded):
-                mirrored = np.flip(np.delete(whole, [0, size // 2], axis), axis)
+            odd, symbol = _odd_axes(a, b, len(grid)), part
+            for axis in range(len(grid)):
                 if odd[axis]:
-                    middle = np.moveaxis(whole, axis, 0).copy()
-                    middle[[0, -1]] = 0.0
-                    whole, mirrored = np.moveaxis(middle, 0, axis), -mirrored
-                whole = np.concatenate([whole, mirrored], axis)
-            transform = rfftn(whole)
-            symbols[a, b] = np.ascontiguousarray(
-                transform.imag if sum(odd) == 1 else transform.real
-            )
+                    inner = np.take(symbol, range(1, symbol.shape[axis] - 1), axis)
+                    ends = [(int(i == axis),) * 2 for i in range(len(grid))]
+                    symbol = np.pad(-dst(inner, 1, axis=axis), ends)
+                else:
+                    symbol = dct(symbol, 1, axis=axis)
+            if len(grid) == 2:  # the frequencies beyond the middle
+                mirrored = symbol[-2:0:-1]
+                symbol = np.concatenate([symbol, -mirrored if odd[0] else mirrored])
+            symbols[a, b] = -symbol if all(odd) and len(grid) == 2 else symbol
         return cls(grid, padded, symbols)
 
     @property
@@ -222,8 +222,12 @@ class Kernel:
                 out[place] = backward(total, self.padded, self.grid)
         return out
 
-    def entries(self) -> np.ndarray:
+    def entries(self, contacts: np.ndarray | None = None) -> np.ndarray:
         """Write the operator as an array.
+
+        Parameters
+        ----------
+        contacts : The numbers (k,) of the contacts whose entries are wanted; by default all.
 
         Returns
         -------
@@ -233,9 +237,10 @@ class Kernel:
         ------
         InputError : If it would be too large.
         """
-        k, dim = int(np.prod(self.grid)), self.dim
+        numbers = np.arange(np.prod(self.grid)) if contacts is None else contacts
+        k, dim = len(numbers), self.dim
         check_dense(k * dim)
-        places = np.indices(self.grid).reshape(len(self.grid), k)
+        places = np.array(np.unravel_index(numbers, self.grid))
         apart = places[:, :, None] - places[:, None, :]
         Q = np.zeros((k, dim, k, dim))
         for (a, b), symbol in self.symbols.items():

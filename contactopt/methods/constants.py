@@ -92,13 +92,20 @@ GIVEN_BALANCE = 1e-3  # accuracy of the equilibrium under forces to start from
 # Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels, .level_steps).
 COARSEST = 12  # contacts along a side of a grid that is not halved
 NESTED_LOOSEST, NESTED_TIGHTEST = 0.1, 1e-4  # accuracy of the first steps, and of the last ones
-COARSE_ENOUGH = 3e-2  # residual at which a coarse grid has done its work, over the forces
+COARSE_ENOUGH = 3e-3  # residual at which a coarse grid has done its work, over the forces
 COARSEST_ENOUGH = 1e-4  # that of the coarsest grid, from which the others must not be led astray
 COARSE_STEPS = 30  # Newton steps on a coarse grid
 COARSE_TRIES = 80  # iterates of the default method on the coarsest grid, where Newton's steps fail
 CLOSER = 0.1  # residual of a given start that is taken, over that of the coarse grids' answer
 LEAST_SYMBOL = 1e-3  # value of the symbol that is inverted, over its median
 LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product
+SLOW = 0.1  # residual of a Newton step over the one before, above which few contacts are to blame
+MOST_LOCAL = 600  # contacts that are solved by themselves, at most
+FEW_OF_ALL = 0.02  # and the share of the closed ones that they may be
+LOCAL_SHARE = 0.9  # of the squared residual, which must be theirs
+AROUND = 2  # rings of contacts around them that are solved with them
+LOCAL_TRIES = 60  # iterates of the default method on them
+LOCAL_ENOUGH = 1e-3  # residual at which they are solved, over the one that they began with
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where shifts of slipping contacts begin to grow, how much
 
 # Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).

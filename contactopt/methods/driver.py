@@ -138,6 +138,7 @@ class _Limits:
 def _run(
     problem: InterfaceProblem, method: Method, limits: _Limits, start: Solution | None
 ) -> Solution:
+    begin = time.perf_counter()
     if problem.contacts == 0:
         return _without_contacts(problem, method, limits.tol)
     _check_equilibrium(problem)
@@ -156,10 +157,11 @@ def _run(
     recorder = _Recorder(problem, scales, limits, first or at_rest(scaled))
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
     if not recorder.history:
-        recorder.residual = recorder.certificate([])
+        recorder.certify([])
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
+    checks = time.perf_counter() - begin - recorder.clock - recorder.certified
     if proof is not None:
         message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
@@ -170,7 +172,7 @@ def _run(
         len(recorder.history),
         repr(method),
         tuple(recorder.history),
-        {"solve": recorder.clock, "certificate": recorder.certified},
+        {"solve": recorder.clock, "certificate": recorder.certified, "checks": checks},
         message or status.sentence,
         proof=proof,
         displacements=recorder.displacements,
@@ -294,7 +296,13 @@ class _Recorder:
         self.repeated = 0
         self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
 
-    def certificate(self, known: Sequence[Moved]) -> float:
+    def certify(self, known: Sequence[Moved]) -> None:
+        """Judge the present iterate."""
+        begin = time.perf_counter()
+        self.residual = self._certificate(known)
+        self.certified += time.perf_counter() - begin
+
+    def _certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by Q r from the method where it is known.
 
         Where products cost iterations it is computed to a digit as long as it is far from the
@@ -323,9 +331,7 @@ class _Recorder:
             # The same forces solve the problem with u = V lambda = 0, and rounding has no length to
             # be small beside.
             self.multipliers = np.zeros(len(lam))
-        begin = time.perf_counter()
-        self.residual = self.certificate(known)
-        self.certified += time.perf_counter() - begin
+        self.certify(known)
         change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])
         now = state, float(np.linalg.norm(state))

@@ -26,6 +26,7 @@ from contactopt.errors import InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.methods import constants, find_method
 from contactopt.methods.kernels.alart_curnier import forcing
+from contactopt.methods.kernels.elimination import eliminated
 from contactopt.methods.kernels.level_steps import step
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.methods.method import Iterate, Method
@@ -83,6 +84,8 @@ class Nested(Method):
                 or at.residual > 0.5 * last
             ):
                 yield (_whole(problem, point[0] + at.error), point[1]), at.residual
+            if at.residual > constants.SLOW * last:
+                point, at = eliminated(finest, point, at)
             change, count = step(finest, at, _worth(at.residual, last))
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
@@ -154,6 +157,8 @@ def _solve_level(
     for _ in range(constants.COARSE_STEPS):
         if at.residual <= enough * float(np.linalg.norm(point[0])):
             break
+        if at.residual > constants.SLOW * last:
+            point, at = eliminated(level, point, at)
         change, _ = step(level, at, _worth(at.residual, last))
         last = at.residual
         point = point[0] + change[0], point[1] + change[1]

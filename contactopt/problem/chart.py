@@ -28,6 +28,8 @@ class Chart:
     period    length of a contact line that is closed [length]; None where it has ends, and in 3D
     cells     (v, c) contacts at the corners of the lines, triangles or quadrilaterals that cover
               the surface; None where they are not known
+    grid      numbers of contacts along each direction, where they are known to stand on a regular
+              grid in the order of C arrays of that shape
     Raises InputError on shapes that do not fit and on numbers that are not finite.
     """
 
@@ -35,6 +37,7 @@ class Chart:
     mirrored: tuple[bool, ...]
     period: float | None = None
     cells: np.ndarray | None = None
+    grid: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         places = np.array(self.places, dtype=float)

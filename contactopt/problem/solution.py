@@ -49,8 +49,9 @@ class Solution:
     history      one mapping per outer iteration: residual, change (of the tangential force),
                  seconds and, where Q is an operator, products, the method's products with Q so far
     seconds      phase -> seconds of wall time. "solve": of the method; "certificate": of judging
-                 its iterates. Who adds a phase of their own names it: recovery, the coarse meshes
-                 before this one, the phases of a reduction
+                 its iterates; "checks": of input, scaling and proofs. Who adds a phase of their
+                 own names it: recovery, the coarse meshes before this one, the phases of a
+                 reduction
     notes        sentences about what the solve did otherwise than expected: a fallback, a stage
                  that failed
     proof        status `infeasible`: the ray that proves that there is no solution

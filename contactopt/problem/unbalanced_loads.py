@@ -95,7 +95,15 @@ def _along(rows: sp.csr_array, dim: int) -> list[Any]:
 
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
-    """Whether forces in polygons inside the cones are found that balance the loads."""
+    """Whether forces in polygons inside the cones are found that balance the loads: those of least
+    size, if they are in the cones already, as under a flat surface, or else by a search.
+    """
+    even = problem.V @ np.linalg.lstsq(problem.V.T @ problem.V, -s, rcond=None)[0]
+    r = even.reshape(problem.q.shape)
+    held = np.all(np.linalg.norm(r[:, 1:], axis=1) <= problem.mu * r[:, 0])
+    left = np.linalg.norm(problem.V.T @ even + s)
+    if held and left <= BALANCED * np.linalg.norm(s):
+        return True
     V = sp.csr_array(problem.V)
     normal, mu = V[:: problem.dim], sp.diags_array(problem.mu)
     edges = (

@@ -26,7 +26,7 @@ from scipy.spatial import KDTree
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.contact_status import contact_status
+from contactopt.problem.contact_status import ContactStatus, contact_status
 from contactopt.readings.constants import INNER, NEAR, OUTER, SMOOTH, WITHIN
 from contactopt.readings.patches import End, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
@@ -88,9 +88,14 @@ def contact_zone(
 
 
 def stick_edge(
-    scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None
-) -> tuple[float, float]:
+    scene: Scene,
+    problem: InterfaceProblem,
+    reactions: np.ndarray,
+    slip: np.ndarray | None = None,
+    zone: Read | None = None,
+) -> Read:
     """Read the half-width of the stick zone of one pair of surfaces, and its uncertainty [length].
+    `zone` is that of contact, where it is known already.
 
     The slack of the friction bound counts towards the direction in which the nearest slipping node
     slips. Where contact ends at a corner, the pressure is singular: the slack relative to its bound
@@ -101,14 +106,14 @@ def stick_edge(
     small steps of a load path.
     """
     status = contact_status(problem, reactions)
-    contact, uncertain = contact_zone(scene, problem, reactions)
     if not status.stick.any():  # or on less than what belongs to one contact
         least = problem.areas[problem.law.rough & status.touching]
         return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
+    contact, uncertain = zone or contact_zone(scene, problem, reactions)
     if not status.slip.any():
         return contact, uncertain
     bound, r_t = problem.law.bound_along(reactions), reactions[:, 1:]
-    slack = bound - np.sum(r_t * _directions(problem, r_t, status.slip), axis=1)
+    slack = bound - np.sum(r_t * _directions(problem, r_t, status), axis=1)
     relative = slack / np.where(bound > 0, bound, 1.0)
     distance = None if slip is None else np.linalg.norm(slip, axis=1)
 
@@ -185,10 +190,14 @@ def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray) -> floa
     return float(last * np.sqrt(beyond.min())) if len(beyond) else None
 
 
-def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray) -> np.ndarray:
-    """Unit vectors (k, dim - 1) of friction at the slipping node nearest to each node."""
-    x = problem.coordinates.T
-    nearest = r_t[np.flatnonzero(slipping)[KDTree(x[slipping]).query(x)[1]]]
+def _directions(problem: InterfaceProblem, r_t: np.ndarray, status: ContactStatus) -> np.ndarray:
+    """Unit vectors (k, dim - 1) of friction at the slipping node nearest to each sticking one, and
+    at the slipping ones themselves. At open ones, which bear no friction, they are zero.
+    """
+    x, slipping = problem.coordinates.T, status.slip
+    nearest = np.where(slipping[:, None], r_t, 0.0)
+    found = KDTree(x[slipping]).query(x[status.stick])[1]
+    nearest[status.stick] = r_t[slipping][found]
     return np.asarray(nearest / np.maximum(np.linalg.norm(nearest, axis=1), 1e-300)[:, None])
 
 
@@ -210,13 +219,15 @@ def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]
     return (Peak(0.0, 0.0, problem.coordinates[:, edge[0]], 0.0, edge),) if len(edge) else ()
 
 
-def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
+def stick_width(reduction: Reduction, solution: Solution, zone: Read) -> Read:
     """Half-width of the stick zone of a reduction with one pair of surfaces, and its uncertainty
-    [length].
+    [length], beside that of its contact zone.
     """
     problem, r = reduction.problem, solution.reactions
+    if not problem.law.sticking(r).any():
+        return stick_edge(reduction.scene, problem, r)
     slip = problem.displacements(r, solution.multipliers)[:, 1:]
-    return stick_edge(reduction.scene, problem, r, slip)
+    return stick_edge(reduction.scene, problem, r, slip, zone)
 
 
 def stick_reading(reduction: Reduction, solution: Solution) -> Reading:
@@ -224,7 +235,7 @@ def stick_reading(reduction: Reduction, solution: Solution) -> Reading:
     edge = width_reading(reduction, solution)
     if edge.missing:
         return replace(edge, value=0.0)
-    stick, uncertainty = stick_width(reduction, solution)
+    stick, uncertainty = stick_width(reduction, solution, (edge.value, edge.uncertainty))
     status = contact_status(reduction.problem, solution.reactions)
     ratio, own = stick / edge.value, uncertainty / edge.value
     if status.slip.any() and status.stick.any():

@@ -11,10 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.chart import ON_PLANE
+from contactopt.problem.chart import ON_PLANE, Chart
 from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
@@ -106,7 +105,7 @@ class Patch:
     centred   whether the centre is at the place 0 for sure: on a plane of symmetry, or that of a
               disc
     copies    how many images of the patch make the whole zone
-    points    (dim - 1, k) places of all contacts, from which the distance of neighbours is taken
+    chart     of all contacts, from which the distance of neighbours is taken
     """
 
     contact: np.ndarray
@@ -114,7 +113,7 @@ class Patch:
     inside: np.ndarray
     centred: bool
     copies: int
-    points: np.ndarray
+    chart: Chart
 
     def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
         """The ends of the patch from the readings of each; None where one of them cannot be read.
@@ -161,8 +160,30 @@ class Patch:
 
     def step(self, contact: np.ndarray, distance: np.ndarray, edge: float) -> float:
         """Distance between neighbouring contacts next to an edge at that distance [length]."""
-        near = contact[np.argsort(np.abs(distance - edge), kind="stable")[:5]]
-        return float(np.median(KDTree(self.points.T).query(self.points.T[near], k=2)[0][:, 1]))
+        points, grid = self.chart.places, self.chart.grid
+        if grid is not None:
+            return float(np.min(np.ptp(points, axis=1) / (np.array(grid) - 1)))
+        near = contact[least(np.abs(distance - edge), 5)]
+        squares = [np.sum((points - points[:, [i]]) ** 2, axis=0) for i in near]
+        return float(np.sqrt(np.median([np.partition(apart, 1)[1] for apart in squares])))
+
+
+def least(values: np.ndarray, count: int) -> np.ndarray:
+    """Find the least of many values without sorting all of them.
+
+    Parameters
+    ----------
+    values : (k,) numbers.
+    count : How many are wanted.
+
+    Returns
+    -------
+    (count,) their places in `values`, the least first, and the first ones of equal values.
+    """
+    if count < len(values):
+        some = np.flatnonzero(values <= np.partition(values, count - 1)[count - 1])
+        return np.asarray(some[np.argsort(values[some], kind="stable")[:count]])
+    return np.argsort(values, kind="stable")
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
@@ -189,7 +210,7 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
         part = slice(stops[i - 1] + 1 if i else 0, last)
         reaches = chart.mirrored[0] and _reaches_origin(place, place[starts[i] : stops[i] + 1])
         copies = 1 if reaches or not chart.mirrored[0] else 2
-        found.append(Patch(order[part], place[part], within[part], reaches, copies, chart.places))
+        found.append(Patch(order[part], place[part], within[part], reaches, copies, chart))
     return found
 
 
@@ -223,7 +244,7 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
     centre = (x[:, inside] @ weights[inside]) / weights[inside].sum()
     centre = np.where(problem.chart.mirrored, 0.0, centre)
     distance = np.linalg.norm(x - centre[:, None], axis=0)
-    disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, x)
+    disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, problem.chart)
     step = disc.step(disc.contact, distance, float(distance[inside].max()))
     apart = abs(distance[~inside].min() - distance[inside].max())
     return disc if apart <= ROUNDNESS * step else None

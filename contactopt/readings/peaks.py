@@ -11,12 +11,14 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.chart import ON_PLANE
 from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
+from contactopt.readings.patches import least
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     noise = solution.residual * float(np.linalg.norm(solution.reactions))
     found = []
     seen = np.where(usable, np.maximum(pressure, 0.0), 0.0)
-    for top in (i for i in maxima(seen, neighbours(problem)) if seen[i] > 0):
+    for top in (i for i in maxima(seen, largest_around(problem, seen)) if seen[i] > 0):
         peak = _fitted_top(problem, pressure, usable, top)
         uncertainty = peak.uncertainty + noise / float(problem.areas[top])
         found.append(replace(peak, uncertainty=uncertainty))
@@ -103,12 +105,21 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
     return np.asarray(node[near.reshape(problem.contacts, count)])
 
 
-def maxima(sizes: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Numbers of the places whose size (k,) is that of no neighbour `near` (k, m) exceeded, the
-    largest of them first, MOST_PEAKS at most.
+def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
+    """Numbers of the places whose size (k,) is the largest one (k,) around them, those of the
+    largest size first, MOST_PEAKS at most.
     """
-    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
+    chosen = np.flatnonzero(sizes >= largest)
     return chosen[np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]]
+
+
+def largest_around(problem: InterfaceProblem, sizes: np.ndarray) -> np.ndarray:
+    """The largest size (k,) of each contact and its neighbours."""
+    grid = problem.chart.grid
+    if grid is None:
+        return np.asarray(sizes[neighbours(problem)].max(axis=1))
+    side = round(NEIGHBOURS[problem.dim] ** (1 / len(grid)))
+    return np.asarray(maximum_filter(sizes.reshape(grid), side, mode="nearest").ravel())
 
 
 def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -161,7 +172,7 @@ def _fit_to(
     places, node = _surroundings(problem)
     dim, offset = len(places), places - problem.chart.places[:, [top]]
     distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
-    near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
+    near = least(distance, min(count, int(usable[node].sum())))
     nodal, pressed, areas = float(pressure[top]), pressure[node[near]], problem.areas[node[near]]
     reach = float(distance[near].max(initial=0.0))
     size = reach / max(len(near) / 2, 1) ** (1 / dim) or float(problem.areas[top] ** (1 / dim))
@@ -220,7 +231,7 @@ def at_rim(reduction: Reduction, solution: Solution) -> bool:
     problem = reduction.problem
     top = int(np.argmax(nodal_pressure(problem, solution)))
     offsets = _surroundings(problem)[0] - problem.chart.places[:, [top]]
-    return _outermost(offsets[:, np.argsort(np.linalg.norm(offsets, axis=0), kind="stable")[:9]])
+    return _outermost(offsets[:, least(np.linalg.norm(offsets, axis=0), 9)])
 
 
 def _outermost(offsets: np.ndarray) -> bool:

@@ -192,7 +192,8 @@ def read_stress(
         sizes, slopes = von_mises(stress), von_mises_slopes(stress)
         count = min(AROUND[reduction.scene.dim], len(sizes))
         points = recovered.places.T
-        tops = maxima(sizes, cKDTree(points).query(points, k=count)[1].reshape(-1, count)).tolist()
+        near = cKDTree(points).query(points, k=count)[1].reshape(-1, count)
+        tops = maxima(sizes, sizes[near].max(axis=1)).tolist()
     else:
         column = STRESSES[reduction.scene.kind].index(place.kind)
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []

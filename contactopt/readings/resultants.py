@@ -12,7 +12,7 @@ import numpy as np
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status
-from contactopt.readings.edges import contact_edge, stick_width
+from contactopt.readings.edges import contact_zone, stick_width
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.scene import COMPONENTS
 
@@ -134,12 +134,12 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
         views(reduction, solution), pair_resultants(reduction, solution).items()
     ):
         problem, r = view.problem, own.reactions
-        status = contact_status(problem, r)
+        status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
         pairs[name] = found.table | {
             "normal_force": float(r[:, 0].sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
-            "contact_half_width": contact_edge(view.scene, problem, r),
-            "stick_half_width": stick_width(view, own)[0],
+            "contact_half_width": zone[0],
+            "stick_half_width": stick_width(view, own, zone)[0],
             "coupling": view.coupling.kind,
             "carrier": view.coupling.carrier,
             "contacts": problem.contacts,

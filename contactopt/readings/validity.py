@@ -65,7 +65,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     status, pairs = contact_status(reduction.problem, solution.reactions), {}
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):
         own, touching = pair.contacts, status.touching[pair.contacts]
-        size = _sizes(made.cells, made.positions)
+        size = _sizes(made.cells[:, touching[made.cells].any(axis=0)], made.positions)
         extent = float(np.ptp(made.positions, axis=1).max(initial=0.0))
         slip = np.linalg.norm(moved[own, 1:], axis=1) / size
         closure = np.where(made.gap > SHARE * extent, made.gap / size, 0.0)

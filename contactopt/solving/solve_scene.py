@@ -68,8 +68,8 @@ class Solved:
 
     `solution.seconds` holds the wall time [s] of each phase, summed over all that led to this
     solution: `assemble`, `factorise` and `compliance` of the bodies, `load` of further states of a
-    path, `solve` of the interface problem by the method, and `coarse` for everything that was done
-    on coarser meshes.
+    path, `checks` of the interface problem, `solve` of it by the method, `certificate` of the
+    answer, and `coarse` for everything that was done on coarser meshes.
 
     zones  half-widths of the contact zone [length]: for which the first mesh was made, and read
            from each solution; none if the scene has no zone

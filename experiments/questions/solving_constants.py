@@ -62,8 +62,13 @@ USERS = {
     "COARSEST LEAST_SYMBOL LEAST_DETERMINANT": ("kernels.levels", "nested", ("half-spaces",)),
     "FIRST_SHIFT SHIFT_RATIO": ("kernels.level_steps", "nested", ("half-spaces",)),
     "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS COARSE_TRIES "
-    "CLOSER": (
+    "CLOSER SLOW": (
         "nested",
+        "nested",
+        ("half-spaces",),
+    ),
+    "MOST_LOCAL FEW_OF_ALL LOCAL_SHARE AROUND LOCAL_TRIES LOCAL_ENOUGH": (
+        "kernels.elimination",
         "nested",
         ("half-spaces",),
     ),

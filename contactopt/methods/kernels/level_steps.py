@@ -32,39 +32,39 @@ def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
     """
     known = at.error.copy()
     known[:, at.closed] = 0.0
-    moved = np.zeros((len(known), len(at.closed)))
-    if np.any(known):
-        moved = level.product(known, single=True)[:, at.closed]
     balance = -at.balance - np.einsum("ckp,ck->p", level.V, known)
     identity = np.array_equal(at.D, np.broadcast_to(np.eye(len(known)), at.D.shape))
     solve = _symmetric if identity else _unsymmetric
-    dr, lam, count = solve(level, at, moved, balance, rtol)
+    dr, lam, count = solve(level, at, known, balance, rtol)
     known[:, at.closed] = dr
     return (known, lam), count
 
 
-def _act(level: Level, at: Evaluation) -> Act:
-    """Products with Q on the closed contacts, (c, m) -> (c, m), in single precision."""
+def _act(level: Level, at: Evaluation) -> Callable[..., np.ndarray]:
+    """Products with Q on the closed contacts, (c, m) -> (c, m), in single precision, where all
+    others have no force or a given one.
+    """
 
-    def act(x: np.ndarray) -> np.ndarray:
-        full = np.zeros(at.error.shape, np.float32)
+    def act(x: np.ndarray, others: np.ndarray | None = None) -> np.ndarray:
+        full = np.zeros(at.error.shape, np.float32) if others is None else others.astype(np.float32)
         full[:, at.closed] = x
+        if others is not None and not np.any(full):
+            return np.zeros(x.shape)
         return level.product(full, single=True)[:, at.closed]
 
     return act
 
 
 def _symmetric(
-    level: Level, at: Evaluation, moved: np.ndarray, balance: np.ndarray, rtol: float
+    level: Level, at: Evaluation, known: np.ndarray, balance: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by
     projected PCG.
     """
-    (c, m), act = moved.shape, _act(level, at)
+    (c, m), act = (len(known), len(at.closed)), _act(level, at)
     # W holds the columns of the balance; N is the rough inverse, normal and tangential components
     # by themselves.
-    right = (at.error[:, at.closed] / level.rho - moved).ravel()
-    W = level.V[:, at.closed].reshape(c * m, -1)
+    W = level.V[:, at.closed].reshape(c * m, len(balance))
 
     def near(x: np.ndarray) -> np.ndarray:
         parts = x.reshape(c, m)
@@ -77,7 +77,7 @@ def _symmetric(
     # The start meets the balance W'x; all corrections keep it.
     border = Border(near, W, W)
     x = border.Y @ (border.K @ balance)
-    residual = right - (act(x.reshape(c, m)).ravel() if np.any(x) else 0.0)
+    residual = (at.error[:, at.closed] / level.rho - act(x.reshape(c, m), known)).ravel()
     # Conjugate gradients among the x that meet the balance, until residual' N residual has fallen
     # enough.
     z = border.off(near(residual))
@@ -99,14 +99,16 @@ def _symmetric(
 
 
 def _unsymmetric(
-    level: Level, at: Evaluation, moved: np.ndarray, balance: np.ndarray, rtol: float
+    level: Level, at: Evaluation, known: np.ndarray, balance: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """(I - D) dr + D rho (Q dr + V dlambda) = error - D rho Q known, V' dr = balance, by GMRES."""
-    (c, m), act, V = moved.shape, _act(level, at), level.V[:, at.closed]
+    (c, m), act, V = (len(known), len(at.closed)), _act(level, at), level.V[:, at.closed]
     p, n = len(balance), c * m
 
+    D = np.ascontiguousarray(at.D.transpose(1, 2, 0))
+
     def rows(dr: np.ndarray, w: np.ndarray) -> np.ndarray:
-        return np.asarray(dr - np.einsum("kab,bk->ak", at.D, dr - level.rho * w))
+        return np.asarray(dr - np.einsum("abk,bk->ak", D, dr - level.rho * w))
 
     def system(x: np.ndarray) -> np.ndarray:
         x = x.ravel()
@@ -117,7 +119,9 @@ def _unsymmetric(
     DrhoV = level.rho * np.einsum("kab,bkp->akp", at.D, V).reshape(n, p)
     border = Border(_rough_inverse(level, at), DrhoV, V.reshape(n, p))
     iterations: list[float] = []
-    right = np.concatenate([(at.error[:, at.closed] - rows(0 * moved, moved)).ravel(), balance])
+    none = np.zeros((c, m))
+    shift = rows(none, act(none, known))
+    right = np.concatenate([(at.error[:, at.closed] - shift).ravel(), balance])
     x, _ = gmres(
         LinearOperator((n + p, n + p), matvec=system, dtype=float),
         right,
@@ -153,12 +157,13 @@ def _rough_inverse(level: Level, at: Evaluation) -> Act:
     shifts, shares = _shift_shares((1 - values) / values, rho * level.largest)
 
     def turned(weights: np.ndarray) -> np.ndarray:
-        return np.einsum("kab,kb,kcb->kac", vectors, weights, vectors)
+        matrices = np.einsum("kab,kb,kcb->ack", vectors, weights, vectors)
+        return np.ascontiguousarray(matrices, np.float32)
 
     parts_of = [
         (
             turned(np.sqrt(share)),
-            turned(np.sqrt(share) / values),
+            turned(np.sqrt(share) / values / rho),
             level.inverse_symbols(tangential, shift / rho),
         )
         for shift, share in zip(shifts, shares)
@@ -171,11 +176,11 @@ def _rough_inverse(level: Level, at: Evaluation) -> Act:
         normal = level.rough_solve(parts[:1] * pressed / rho, at.closed, (0,), level.inverse)
         out[:1] = np.where(pressed, normal, parts[:1])
         right = parts[1:] + np.einsum("ka,k->ak", D[:, 1:, 0], out[0] - parts[0])
-        out[1:] = np.einsum("kab,bk->ak", free, right)
+        out[1:] = np.einsum("abk,bk->ak", free, right)
         for back, forth, symbols in parts_of:
-            force = np.einsum("kab,bk->ak", forth, right) / rho
+            force = np.einsum("abk,bk->ak", forth, right)
             inner = level.rough_solve(force, at.closed, tangential, symbols)
-            out[1:] += np.einsum("kab,bk->ak", back, inner)
+            out[1:] += np.einsum("abk,bk->ak", back, inner)
         return out.ravel()
 
     return apply

@@ -57,9 +57,10 @@ without friction they grow by more than 30 % from 64 x 64 to 1024 x 1024 points.
 these grids a wave has four points only. A likely cause of the growth is that the inverse of the
 symbol is cut off at the edges of the contacts.
 
-The next two tables have at most 64 waves along a side, without friction and with it. Friction on
-1024 x 1024 points of this surface was not measured to its end, because the residual of its Newton
-steps fell slowly.
+The next two tables have at most 64 waves along a side, without friction and with it. Newton's steps
+with friction went round in circles on 1024 x 1024 points of this surface, where the contacts of one
+summit turned their slip about. They end since these contacts are solved by themselves
+(`contactopt.methods.kernels.elimination`).
 
 {rough}
 

@@ -1,0 +1,87 @@
+"""Newton's steps go round in circles where a few contacts of one summit turn their slip about. They
+are solved by themselves, with the forces of all others held, and leave Newton's method a problem
+without them.
+
+Sources: Lanzkron, Rose, Wilkes (1996), An analysis of approximate nonlinear elimination, SIAM J.
+Sci. Comput. 17, 538-559; Hwang, Su, Cai (2015), A parallel adaptive nonlinear elimination
+preconditioned inexact Newton method for transonic full potential equation.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from contactopt.methods import find_method
+from contactopt.methods.constants import (
+    AROUND,
+    FEW_OF_ALL,
+    LOCAL_ENOUGH,
+    LOCAL_SHARE,
+    LOCAL_TRIES,
+    MOST_LOCAL,
+)
+from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.levels import Evaluation, Level, Point
+from contactopt.problem import InterfaceProblem
+
+
+def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evaluation]:
+    """Solve the contacts that make most of the residual by themselves, where they are few.
+
+    Parameters
+    ----------
+    level, point, at : The problem on one grid, a point, and its errors.
+
+    Returns
+    -------
+    The point with other forces on these contacts, and its errors; the same point where the errors
+    are spread over many contacts, or do not fall.
+    """
+    some = _worst(level, at)
+    if not len(some) or len(level.components) < level.kernel.dim:
+        return point, at
+    (r, lam), Q = point, level.kernel.entries(some)
+    moved = (level.product(r) + level.V @ lam + level.q)[:, some].T
+    begin = np.ascontiguousarray(r[:, some].T)
+    q = moved - (Q @ begin.ravel()).reshape(begin.shape)
+    found = _solution(InterfaceProblem(Q, q, level.law.select(some)), begin)
+    other = r.copy()
+    other[:, some] = found.T
+    new = level.evaluate(other, lam)
+    return ((other, lam), new) if new.residual < at.residual else (point, at)
+
+
+def _worst(level: Level, at: Evaluation) -> np.ndarray:
+    """Numbers of the contacts with most of the error and of those around them; none where these are
+    many.
+    """
+    size = np.sum(at.error**2, axis=0)
+    most = min(MOST_LOCAL, int(FEW_OF_ALL * len(at.closed)))
+    if not most:
+        return np.zeros(0, dtype=int)
+    largest = np.argpartition(-size, most - 1)[:most]
+    largest = largest[np.argsort(-size[largest])]
+    count = int(np.searchsorted(np.cumsum(size[largest]), LOCAL_SHARE * size.sum())) + 1
+    if count > most:
+        return largest[:0]
+    marked = np.zeros(len(size), dtype=bool)
+    marked[largest[:count]] = True
+    wide = binary_dilation(marked.reshape(level.kernel.grid), iterations=AROUND).ravel()
+    return np.flatnonzero(wide if np.count_nonzero(wide) <= most else marked)
+
+
+def _solution(problem: InterfaceProblem, begin: np.ndarray) -> np.ndarray:
+    """The best forces (m, dim) that the default method finds."""
+    evaluate = coulomb_equations(problem).evaluate
+    best, none = begin, np.zeros(0)
+    least = first = evaluate(best, none)[0]
+    for r, *_ in islice(find_method("auto").iterate(problem, (begin, none)), LOCAL_TRIES):
+        residual = evaluate(r, none)[0]
+        if residual < least:
+            best, least = r, residual
+        if least <= LOCAL_ENOUGH * first:
+            break
+    return best
