@@ -131,10 +131,6 @@ def stick_ratio(mu: float, beta: float, axisymmetric: bool = False) -> float:
     Returns
     -------
     c / a [-].
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
     """
     check_number("the friction coefficient mu", mu, low=0.0, closed=True)
     check_beta(beta)

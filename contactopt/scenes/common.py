@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.scene import Part, Rigid, Scene
@@ -67,10 +68,11 @@ def check_choice(name: str, value: object, *valid: object) -> None:
 
 def check_shear(shear: float, mu: float, force: float) -> None:
     """Raise InputError where friction cannot hold a shear force."""
+    check_number("shear", shear)
     if shear != 0 and abs(shear) >= mu * force:
         raise InputError(
-            f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies slide"
-            " off."
+            f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies"
+            " slide off."
         )
 
 
