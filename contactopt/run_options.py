@@ -144,16 +144,8 @@ IN_FILES = tuple(name for name, one in OPTIONS.items() if one.metadata["in_file"
 def choose(
     keywords: Mapping[str, Any], in_file: Mapping[str, Any]
 ) -> tuple[RunOptions, dict[str, Any]]:
-    """Divide keywords into the options of a run and all others.
-
-    Parameters
-    ----------
-    keywords : those of contactopt.run; an option that is None was not given
-    in_file : the options of the scene file, which count where keywords do not give them
-
-    Returns
-    -------
-    RunOptions, dict : the options, and the other keywords
+    """Divide the keywords of contactopt.run into the options of a run, and all others. An option
+    that is None was not given; then that of the scene file counts.
     """
     given = {name: value for name in OPTIONS if (value := keywords.get(name)) is not None}
     others = {name: value for name, value in keywords.items() if name not in OPTIONS}
@@ -161,15 +153,8 @@ def choose(
 
 
 def explained(only: str = "") -> str:
-    """Explain the options as the lines of a docstring.
-
-    Parameters
-    ----------
-    only : what is added to those that a scene file may hold
-
-    Returns
-    -------
-    str : a line `name : what it is` for each, wrapped
+    """Explain the options as the lines of a docstring. `only` is added to those that a scene file
+    may hold.
     """
     return "\n".join(
         textwrap.fill(
@@ -184,14 +169,6 @@ def explained(only: str = "") -> str:
 def takes_options(function: F) -> F:
     """Write the options into the signature of a function that takes them as keywords, and into its
     docstring, instead of the line OPTIONS.
-
-    Parameters
-    ----------
-    function : the function, whose last parameter takes all keywords
-
-    Returns
-    -------
-    Callable : the same function
     """
     signature = inspect.signature(function, eval_str=False)
     *own, keywords = signature.parameters.values()

@@ -157,19 +157,8 @@ def run(
 
 
 def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
-    """The scene that a name or a scene file stands for, of a load path its last state.
-
-    Parameters
-    ----------
-    scene, changes : as for run()
-
-    Returns
-    -------
-    Scene
-
-    Raises
-    ------
-    InputError : for an unknown name, a file with a mistake, or changes that do not fit
+    """The scene that a name or a scene file stands for, with changes as for run(); of a load path
+    its last state.
     """
     return _states(scene, _scene_file(scene), changes)[-1]
 
@@ -217,8 +206,8 @@ def _check_output(out: str | Path | None, options: RunOptions) -> None:
 
 
 def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...], Solved | None]:
-    """The scene after all exact simplifications, and its solution, which proved them on its first
-    mesh.
+    """The scene after all exact simplifications, and its solution on its first mesh, which proved
+    them.
     """
     if len(states) > 1:
         raise InputError(
@@ -281,7 +270,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
 
 
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
-    """What is known of the answer on one mesh at one state: half-widths and pressure are the
+    """What is known of the answer on one mesh at one state. Half-widths and pressure are the
     quantities that accuracy bounds.
     """
     reduction, solution = solved.reduction, solved.solution

@@ -95,7 +95,8 @@ def press_fit(
 
     Returns
     -------
-    Reference : uniform pressure, half of the length of the circle and peak
+    Reference : uniform pressure, half of the length of the circle and peak. Raises InputError if
+        the radii do not grow from bore to radius to outside
     """
     check_positive(interference=interference, radius=radius, outside=outside)
     check_number("bore", bore, low=0.0, closed=True)

@@ -69,7 +69,7 @@ def corner(
 
     Returns
     -------
-    Exponent, oscillation, and ratio of the tractions.
+    Exponent, oscillation, and ratio of the tractions. Raises InputError for two rigid bodies.
     """
     if upper is None and lower is None:
         raise InputError("both bodies are rigid; at least one must be elastic.")

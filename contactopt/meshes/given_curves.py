@@ -50,13 +50,8 @@ class Curve:
 
 
 def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
-    """Check that the nodes of a boundary lie on its curve.
-
-    Parameters
-    ----------
-    curve, mesh, boundary : The curve of a boundary, a scikit-fem mesh, and the boundary's name.
-        InputError where the nodes of many facets are further from the curve than OFF of the facet,
-        or those of one than FAR.
+    """Raise InputError unless the nodes of a boundary lie on its curve: where those of many facets
+    are further from it than OFF of the facet, or those of one than FAR.
     """
     corners = mesh.facets[:, mesh.boundaries[boundary]]
     places = mesh.p[:, corners]

@@ -49,13 +49,9 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     Returns
     -------
     Triangles, quadrilaterals, tetrahedra or hexahedra, curved where the file holds elements of
-    second order. Its boundaries are the groups of facets on its surface, and the groups of nodes
-    that hold all corners of such facets.
-
-    Raises
-    ------
-    InputError : If the file cannot be read, if there is no such group, or if the mesh has a fault
-        that cannot be repaired.
+        second order. Its boundaries are the groups of facets on its surface, and the groups of
+        nodes that hold all corners of such facets. InputError if the file cannot be read, if there
+        is no such group, or if the mesh has a fault that cannot be repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
     path = Path(path)
@@ -88,17 +84,11 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
 def name_boundaries(
     mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[float, float]]]
 ) -> skfem.Mesh:
-    """Add boundaries to a mesh that are named by where they are.
+    """Add boundaries to a mesh, named by where they are: name -> {axis: (least, largest
+    coordinate)}.
 
-    Parameters
-    ----------
-    mesh : Any mesh.
-    places : Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners
-        all lie within these limits, to a millionth of the size of the body.
-
-    Returns
-    -------
-    The mesh with these boundaries beside its own. InputError if no facet lies there.
+    They are the facets of the surface whose corners all lie within these limits, to a millionth of
+    the size of the body. InputError if no facet lies there.
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:, mesh.facets[:, facets]]
