@@ -47,8 +47,8 @@ class RunOptions:
     preconditioner: str | None = _option(
         str,
         "NAME",
-        "an approximate inverse of Q, of methods that take products with Q; it implies the implicit"
-        " form",
+        "an approximate inverse of Q, of methods that take"
+        " products with Q; it implies the implicit form",
     )
     Q: str = _option(
         str, "FORM", "Q as an array (explicit), or known by its products only (implicit)", "auto"
@@ -101,8 +101,8 @@ class RunOptions:
     html: bool = _option(
         bool,
         "",
-        "also write view.html, the result as a page to explore (needs: pip install"
-        " 'contactopt[view]')",
+        "also write view.html, the result as a page to"
+        " explore (needs: pip install 'contactopt[view]')",
         False,
         in_file=False,
     )
@@ -110,8 +110,8 @@ class RunOptions:
     def __post_init__(self) -> None:
         if self.preconditioner is not None and self.Q == "explicit":
             raise InputError(
-                "a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop"
-                " one of them."
+                "a preconditioner serves products with Q, but Q"
+                " = 'explicit' was asked for; drop one of them."
             )
         if (self.accuracy is None) != (self.quantity is None):
             raise InputError(TOGETHER)

@@ -105,8 +105,8 @@ def run(
 
     Parameters
     ----------
-    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one
-        (PATHS); a scene file, whose name ends in .toml; or a Scene
+    scene : a name of contactopt.scenes.SCENES, which is solved along its load path if it has one; a
+        scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     note : receives progress messages
     team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
@@ -124,8 +124,7 @@ def run(
 
     Raises
     ------
-    InputError : on input that cannot be used, with a sentence that says what to do; nothing is left
-        half-written
+    InputError : with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
     file = _scene_file(scene)
@@ -139,15 +138,13 @@ def run(
     form = options.Q if options.preconditioner is None else "implicit"
     how = Options(form, options.solver, method, options.tol, note=note)
     try:
-        known = None
+        solved, estimate = None, None
         if options.simplest:
-            states, known = _simplest(states, how)
+            states, solved = _simplest(states, how)
         if team is not None:
             states = _dealt(states, team, note)
-        if known is None or team is not None or options.accuracy is not None:
+        if solved is None or team is not None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
-        else:
-            solved, estimate = known, None
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
         return _written(result, out, options, start, note)
     except MemoryError as error:
@@ -317,9 +314,9 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
-        f"the largest pressure at a node is {largest:.4g}, what its neighbours let expect is"
-        f" {peak.value:.4g}, give or take {peak.uncertainty:.2g}: refine the meshes there, or ask"
-        " for an accuracy."
+        f"the largest pressure at a node is {largest:.4g}, what its"
+        f" neighbours let expect is {peak.value:.4g}, give or take"
+        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
     ]
 
 

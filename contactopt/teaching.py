@@ -87,8 +87,8 @@ class Slider:
             for number, (value, frame) in enumerate(zip(self.values, self.frames))
         )
         shown = (
-            "[...box.querySelectorAll('img')].forEach((i, k) => i.style.display = k == this.value ?"
-            " 'block' : 'none')"
+            "[...box.querySelectorAll('img')].forEach((i, k) =>"
+            " i.style.display = k == this.value ? 'block' : 'none')"
         )
         return (
             f'<div class="slider" style="max-width: 40em"><label>{escape(self.label)}<br><input'

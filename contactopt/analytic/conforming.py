@@ -102,8 +102,8 @@ def press_fit(
     check_number("bore", bore, low=0.0, closed=True)
     if not bore < radius < outside:
         raise InputError(
-            f"the radii must grow from bore to radius to outside; got {bore:g}, {radius:g},"
-            f" {outside:g}."
+            "the radii must grow from bore to radius to"
+            f" outside; got {bore:g}, {radius:g}, {outside:g}."
         )
 
     def plane(material: Material) -> tuple[float, float]:

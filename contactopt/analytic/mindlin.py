@@ -204,7 +204,7 @@ def _limit(mu: float, force: float) -> float:
 def _share(load: float, limit: float) -> float:
     if not load <= limit * (1 + 1e-12):
         raise InputError(
-            f"the tangential load {load:g} exceeds mu times the normal load, {limit:g}: the bodies"
-            " slide."
+            f"the tangential load {load:g} exceeds mu times"
+            f" the normal load, {limit:g}: the bodies slide."
         )
     return min(load / limit, 1.0)

@@ -22,19 +22,8 @@ PIXELS = 800  # of the longer side of the picture of solids, more than it takes 
 def deformed(
     scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None
 ) -> Any:
-    """Draw the deformed bodies coloured by von Mises stress, mirrored to the whole section (paper,
-    figures 1 and 2).
-
-    Parameters
-    ----------
-    scene : The scene.
-    problem : Its interface problem.
-    fields : Displacements and stresses of its bodies.
-    ax : Axes to draw on; by default new ones.
-
-    Returns
-    -------
-    The axes.
+    """Draw the deformed bodies, with these displacements and stresses, coloured by von Mises stress
+    and mirrored to the whole section (paper, figures 1 and 2).
     """
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     largest = max(float(np.abs(f.displacement).max()) for f in fields)

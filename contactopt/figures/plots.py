@@ -219,19 +219,11 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Draw pressure above tangential traction, with the map of stick and slip in 3D.
+    """Draw pressure above tangential traction of one pair of surfaces, with the map of stick and
+    slip in 3D.
 
     One panel stands above the other, so that all of them can be read where the figure is 400 pixels
     wide.
-
-    Parameters
-    ----------
-    scene : The scene.
-    problem, solution : The interface problem of one pair of surfaces, and its solution.
-
-    Returns
-    -------
-    The figure of matplotlib.
     """
     from matplotlib.figure import Figure
 
@@ -264,15 +256,6 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 def fit(found: Fit, ax: Any = None) -> Any:
     """Draw what the model leaves of the data, over the standard deviation of the noise, state by
     state.
-
-    Parameters
-    ----------
-    found : The parameters that were fitted.
-    ax : Axes to draw on; by default new ones.
-
-    Returns
-    -------
-    The axes.
     """
     ax = make_axes(ax)
     for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
@@ -287,17 +270,7 @@ def fit(found: Fit, ax: Any = None) -> Any:
 
 
 def design(found: Design, ax: Any = None) -> Any:
-    """Draw the pressure of the designed contact over the place along the surface, and its mean.
-
-    Parameters
-    ----------
-    found : The design.
-    ax : Axes to draw on; by default new ones.
-
-    Returns
-    -------
-    The axes.
-    """
+    """Draw the pressure of the designed contact over the place along the surface, and its mean."""
     ax = make_axes(ax)
     scene, problem = found.reduction.scene, found.reduction.problem
     place = problem.chart.places[0]

@@ -25,20 +25,8 @@ MARKS = "#*o+x%@&"
 
 
 def describe(name: str, changes: dict[str, Any]) -> str:
-    """Write the sheet of a named scene, or of a scene file.
-
-    Parameters
-    ----------
-    name : A key of contactopt.scenes.SCENES, or a file that ends in .toml.
-    changes : Other values of the arguments of a named scene.
-
-    Returns
-    -------
-    The text.
-
-    Raises
-    ------
-    InputError : For an unknown scene or argument, and for a scene file with a mistake.
+    """Write the sheet of a named scene, with other values of its arguments, or of a scene file.
+    InputError for an unknown scene or argument, and for a scene file with a mistake.
     """
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file

@@ -150,8 +150,8 @@ def read_table(path: Path, what: str = "scene file") -> Table:
         raise InputError(f"{what} '{path}' {'is a folder' if os.path.isdir(path) else why}.")
     if path.stat().st_size > MOST_BYTES:
         raise InputError(
-            f"{what} '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their"
-            " own."
+            f"{what} '{path}' has more than {MOST_BYTES}"
+            " bytes; meshes belong into files of their own."
         )
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")

@@ -39,8 +39,8 @@ class Curve:
             raise InputError(f"{self.name} failed: {type(error).__name__}: {error}.") from error
         if found.shape != np.shape(points):
             raise InputError(
-                f"{self.name} must return an array of the shape of its points, {np.shape(points)};"
-                f" got {found.shape}."
+                f"{self.name} must return an array of the shape of"
+                f" its points, {np.shape(points)}; got {found.shape}."
             )
         lost = np.flatnonzero(~np.isfinite(found).all(axis=0))
         if len(lost):

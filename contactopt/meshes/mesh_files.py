@@ -121,8 +121,8 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
     lost = cells[~np.all(np.abs(points[cells]) < FAR, axis=1)]
     if len(lost):
         raise InputError(
-            f"mesh file '{path}': the coordinates of node {lost[0] + 1} are no numbers below"
-            f" {FAR:g}."
+            f"mesh file '{path}': the coordinates of node"
+            f" {lost[0] + 1} are no numbers below {FAR:g}."
         )
     if dim == points.shape[1]:
         return dim, points.T
@@ -188,8 +188,8 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
     if len(both):
         raise cells.refused(
             int(np.argmax(np.any(cells.nodes == both[0], axis=0))),
-            "a node of {} is a corner of one element and within an edge of another; mesh this place"
-            " anew.",
+            "a node of {} is a corner of one element and"
+            " within an edge of another; mesh this place anew.",
         )
     kept = np.concatenate([corners, inner])
     number = np.full(cells.points.shape[1], -1)

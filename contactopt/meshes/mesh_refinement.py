@@ -71,8 +71,8 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     if len(marked) and not large.any():
         place = ", ".join(f"{x:.6g}" for x in corners[:, :, 0].mean(axis=1))
         raise TooSmall(
-            f"the elements near ({place}) cannot be divided further: they are as small as rounding"
-            " allows."
+            f"the elements near ({place}) cannot be divided"
+            " further: they are as small as rounding allows."
         )
     return _refined(mesh, marked[large], curves)
 

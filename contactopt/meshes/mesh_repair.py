@@ -116,8 +116,8 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     pairs = pairs[same]
     if repair:
         log.warning(
-            "%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, "
-            "at most %.3g apart",
+            "%s: nodes that lie on others are merged with them,"
+            " the first at (%s); %d pairs, at most %.3g apart",
             cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
         )  # fmt: skip
     label = joined(pairs.T, len(own))
@@ -157,8 +157,8 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
     wrong = _volumes(cells.points, cells.corners) < 0
     if wrong.any():
         log.warning(
-            "%s: %d elements number their corners the wrong way round and are turned, "
-            "the first is %s",
+            "%s: %d elements number their corners the wrong"
+            " way round and are turned, the first is %s",
             cells.path, wrong.sum(), cells.name(int(np.argmax(wrong))),
         )  # fmt: skip
         nodes = cells.nodes.copy()
@@ -174,8 +174,8 @@ def check_connected(cells: Cells, hint: str) -> None:
     count = len(np.unique(label[cells.corners[0]]))
     if count > 1:
         raise InputError(
-            f"mesh file '{cells.path}': the body falls into {count} pieces that share no node;"
-            f" {hint}."
+            f"mesh file '{cells.path}': the body falls into"
+            f" {count} pieces that share no node; {hint}."
         )
 
 
@@ -191,8 +191,8 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     if len(wrong):
         raise cells.refused(
             wrong[0],
-            "{} does not share the nodes within its edges and faces with its neighbours; mesh this"
-            " place anew.",
+            "{} does not share the nodes within its edges and"
+            " faces with its neighbours; mesh this place anew.",
         )
     volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)

@@ -66,8 +66,8 @@ def flat_punch(
     check_positive(foundation_width=foundation_width, foundation_height=foundation_height)
     if foundation_width < width:
         raise InputError(
-            f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch"
-            f" ({width:g})."
+            f"the foundation ({foundation_width:g} wide) must"
+            f" be at least as wide as the punch ({width:g})."
         )
     a, up = width / 2, "xyz"[dim - 1]
     punch = partial(_block, dim, a, a, height)

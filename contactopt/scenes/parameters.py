@@ -182,8 +182,8 @@ class Parameter:
         names = [one.name for one in named]
         if self.owner and self.owner not in names:
             return (
-                f"it has no {'contact' if self.kind == 'mu' else 'body'} '{self.owner}', only"
-                f" {', '.join(names)}"
+                f"it has no {'contact' if self.kind == 'mu' else 'body'}"
+                f" '{self.owner}', only {', '.join(names)}"
             )
         if self.kind == "mu":
             return "its contacts have no friction"

@@ -250,8 +250,8 @@ class _Comparison:
         for pair in self.whole.scene.pairs:
             if images.get(pair.bodies[0]) == pair.bodies[1]:
                 raise _Differs(
-                    f"the contact '{pair.name}' lies in this plane itself, between a body and its"
-                    " own mirror image"
+                    f"the contact '{pair.name}' lies in this plane"
+                    " itself, between a body and its own mirror image"
                 )
             other, order = self._image_of(pair, images)
             found[pair.name] = other.name
