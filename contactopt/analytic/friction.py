@@ -143,9 +143,7 @@ def _slips(mu: float, beta: float) -> bool:
 
 
 def _without_slip(frictionless: Reference, mu: float) -> Reference:
-    """The same pressure, no shear traction: mu = 0, or sticking because the surfaces move alike
-    (beta = 0).
-    """
+    """The same pressure without shear: mu = 0, or sticking because the surfaces move alike."""
     return replace(
         frictionless,
         shear=lambda x: 0 * frictionless.pressure(x),

@@ -127,8 +127,8 @@ class Panels:
         return matrix
 
     def _inside(self, parity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Integrals from each panel's left end to its nodes; in the central panel from 0 to nodes
-        and end.
+        """Integrals from each panel's left end, of the central one from 0, to its nodes and its
+        end.
         """
         from_zero, from_left = (
             legendre.legval(np.append(NODES, 1.0), legendre.legint(np.eye(ORDER), lbnd=low)).T
@@ -211,9 +211,7 @@ class Panels:
         return (self.columns[LEFT:, None] - self.centre) / self.half
 
     def _correction(self, log: bool) -> np.ndarray:
-        """Exact less Gauss rule for ln |u - v| or 1 / (u - v) on near panels; the Gauss rule leaves
-        out u = v.
-        """
+        """Exact less Gauss rule (without u = v) for ln |u - v| or 1 / (u - v) on near panels."""
         local = self._local()
         i, k = np.nonzero(np.abs(local) < NEAR)
         moments = (_log_moments if log else _cauchy_moments)(local[i, k]) @ TRANSFORM

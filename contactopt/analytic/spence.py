@@ -174,8 +174,8 @@ def _axisymmetric(b: float, mu: float, beta: float) -> UnitPunch:
 def _eliminate(
     pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them would let rounding
-    errors grow.
+    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them make rounding errors
+    grow.
     """
     columns = np.linalg.solve(pp, np.column_stack([np.ones(len(pp)), pq]))
     matrix, right = qq - qp @ columns[:, 1:], -qp @ columns[:, 0]
@@ -185,9 +185,7 @@ def _eliminate(
 
 
 def _excess(punch: UnitPunch, mu: float) -> float:
-    """q - mu p at the end of the stick zone: zero for the right one, positive where it is too
-    large.
-    """
+    """q - mu p at the end of the stick zone: positive where the zone is too large."""
     end = np.count_nonzero(punch.panels.stick)
     panel = slice(end - ORDER, end)
     return float(np.sum(TRANSFORM @ (punch.q[panel] - mu * punch.p[panel])))

@@ -49,9 +49,7 @@ def packed(array: Any) -> dict[str, Any]:
 
 
 def packed_short(array: np.ndarray) -> dict[str, Any]:
-    """Numbers for the data of a page, of two bytes each, which divide their range into 65535
-    steps.
-    """
+    """Numbers for the data of a page, of two bytes each: their range in 65535 steps."""
     low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
     step = (high - low) / SHORT if high > low else 1.0
     text = _text(np.rint((array - low) / step).astype("<u2"))

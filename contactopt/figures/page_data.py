@@ -176,8 +176,7 @@ def _apart(
 def _motion(
     bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
 ) -> np.ndarray:
-    """Displacements (s, k, dim) of places (k, 3): those of the nearest node of a body, none without
-    bodies.
+    """Displacements (s, k, dim) of places (k, 3): those of the nearest node, none without bodies.
     """
     if not bodies:
         return np.zeros((1, len(points), dim))
@@ -222,9 +221,7 @@ def _last_state(mesh: Any, interface: dict[str, np.ndarray], own: slice) -> dict
 
 
 def _contact_states(path: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
-    """As _last_state, for the n states of a load path (n, k); the slip is that since the state
-    before.
-    """
+    """As _last_state, of n states (n, k); the slip is that since the state before."""
     areas, r, u = path["areas"][own], path["reactions"][:, own], path["displacements"][:, own]
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
     vector = np.einsum("kad,ska->skd", path["frames"][own], r) * share[:, None]

@@ -75,7 +75,7 @@ def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, n
 
 
 def solids(kind: str, elements: np.ndarray) -> np.ndarray:
-    """Solid elements as tetrahedra (m, 4) or hexahedra (m, 8) with straight edges; (0, 4) for plane
+    """Solid elements as tetrahedra (m, 4) or hexahedra (m, 8) with straight edges; none of plane
     ones.
     """
     if kind not in SOLIDS:

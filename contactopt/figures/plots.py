@@ -52,16 +52,13 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
 
 
 def contact_place(problem: InterfaceProblem) -> np.ndarray:
-    """Places (k,) along the first direction of the surface [length]; of a closed line from its
-    origin either way.
-    """
+    """Places (k,) along the surface [length]; of a closed line from its origin either way."""
     x, period = problem.chart.places[0], problem.chart.period
     return x if period is None else np.asarray((x + period / 2) % period - period / 2)
 
 
 def _in_rows(problem: InterfaceProblem) -> bool:
-    """Whether a row of contacts crosses the surface, so that values can be drawn along it; always
-    in 2D.
+    """Whether values can be drawn along a row of contacts that crosses the surface; always in 2D.
     """
     return problem.dim == 2 or len(contact_line(problem)) >= max(3.0, np.sqrt(problem.contacts) / 3)
 
@@ -76,17 +73,13 @@ def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
 
 
 def _straight(problem: InterfaceProblem) -> bool:
-    """Whether the contact line follows the first coordinate; true of every surface in 3D, which has
-    its own figures.
-    """
+    """Whether the contact line follows the first coordinate; true of every surface in 3D."""
     extent = np.ptp(problem.coordinates, axis=1)
     return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= STRAIGHT * extent[0])
 
 
 def _singular(scene: Scene) -> bool:
-    """Whether tractions are known to be infinite somewhere, so that the largest nodal value means
-    nothing.
-    """
+    """Whether tractions are known to be infinite somewhere: the largest at a node means nothing."""
     return scene.reference is not None and scene.reference.peak is None
 
 
@@ -128,9 +121,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
 def _about_origin(
     problem: InterfaceProblem, solution: Solution, place: np.ndarray, half_width: float
 ) -> bool:
-    """Whether the contacts that touch are one zone about the origin, of which the half-width is the
-    measure.
-    """
+    """Whether the contacts that touch are one zone about the origin, measured by the half-width."""
     touching = contact_status(problem, solution.reactions).touching
     if half_width <= 0 or not touching.any():
         return False
@@ -143,9 +134,7 @@ def _about_origin(
 
 
 def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Tangential traction against position with the friction bound; sticking and slipping nodes
-    marked.
-    """
+    """Tangential traction against position with the friction bound; stick and slip are marked."""
     ax, (length, stress) = make_axes(ax), scene.units
     if not _in_rows(problem):
         values = np.linalg.norm(solution.reactions[:, 1:], axis=1) / problem.areas
@@ -194,9 +183,7 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
 
 
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction
-    as arrows.
-    """
+    """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows."""
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
@@ -254,9 +241,7 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
-    """Draw what the model leaves of the data, over the standard deviation of the noise, state by
-    state.
-    """
+    """Draw what the model leaves of the data, over the standard deviation of the noise."""
     ax = make_axes(ax)
     for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
         rest = (measured - found.model[name]) / (found.noise[name] or 1.0)

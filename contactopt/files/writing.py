@@ -27,9 +27,7 @@ FRESH = 1.0  # s for which nobody takes a folder without a lock for one that was
 
 
 def check_folder(out: Path) -> None:
-    """Raise InputError unless files can be put into a folder, which may not exist yet. Nothing is
-    left behind.
-    """
+    """Raise InputError unless files can be put into a folder, which may not exist yet."""
     existing = out
     try:
         while not existing.exists() and existing != existing.parent:

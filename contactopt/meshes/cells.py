@@ -85,9 +85,7 @@ def mirrored(kind: str, nodes: np.ndarray) -> np.ndarray:
 
 
 def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
-    """Number all nodes (n,) of a mesh on facets (f,), each once, those within edges and faces
-    included.
-    """
+    """Number all nodes (n,) on facets (f,), each once, those within edges and faces included."""
     if not is_curved(mesh):
         return np.unique(mesh.facets[:, facets])
     return np.unique(mesh.dofs.get_facet_dofs(facets).flatten())

@@ -141,8 +141,7 @@ def _read(path: Path) -> Any:
 
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """The format and the reader of each attempt; what an attempt without a format says of a damaged
-    file does not count.
+    """Format and reader of each attempt. What one without a format says of its failure is not told.
     """
     import meshio
 

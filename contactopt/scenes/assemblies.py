@@ -155,9 +155,7 @@ def _layer(
     elements: int,
     zone: float | None,
 ) -> Any:
-    """A quarter of a ring, or with a height the section of a hollow cylinder; 'inner' or 'outer'
-    touches.
-    """
+    """A quarter of a ring, or with a height the section of a hollow cylinder."""
     inner, outer = radii
     if height is None:
         return rename(_sector(inner, outer, np.pi / 2, elements), contact=touching)

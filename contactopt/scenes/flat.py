@@ -176,9 +176,7 @@ def _half_space(half_width: float, size: float, elements: int, zone: float | Non
 
 
 def _towards_edge(half_width: float, elements: int, first: float) -> np.ndarray:
-    """Grid from 0 to half_width: even spacing half_width / elements at most, falling to `first` at
-    the edge.
-    """
+    """Grid from 0 to half_width: even at first, falling to `first` at the edge."""
     h = half_width / elements
     steps = first * RATIO ** np.arange(max(0.0, np.floor(np.log(h / first) / np.log(RATIO)) + 1))
     steps = steps[np.cumsum(steps) < half_width - h / 2]  # leaves room for an even one

@@ -246,9 +246,7 @@ def _vector(values: dict[str, float], reading: _Reading) -> tuple[float, ...]:
 
 
 def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[str, float]:
-    """The numbers that a table holds for components, each of the present state; `whole`: it holds
-    nothing else.
-    """
+    """The numbers of components in a table, of the present state; `whole`: it holds no others."""
     found = {}
     for key in reading.components:
         if isinstance(table.data.get(key), list):
