@@ -14,9 +14,7 @@ def count(number: int, thing: str, things: str = "") -> str:
 
 
 def line(name: str, *facts: str) -> str:
-    """Write the one-line `repr` of an object, its class and facts about it without empty ones:
-    'Solution(solved, 3 iterations)'.
-    """
+    """The one-line `repr` of an object without empty facts: 'Solution(solved, 3 iterations)'."""
     return f"{name}({', '.join(fact for fact in facts if fact)})"
 
 

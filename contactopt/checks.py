@@ -57,9 +57,7 @@ def check_memory(what: str, needed: float) -> None:
 
 
 def _free_memory() -> float:
-    """What the system and the limits of this process leave [bytes]; infinite where neither is
-    known.
-    """
+    """What the system and the limits of this process leave [bytes]; infinite if unknown."""
     found = np.inf
     with suppress(OSError, ValueError, StopIteration):
         with open("/proc/meminfo") as file:
@@ -76,9 +74,7 @@ def _free_memory() -> float:
 
 
 def given(value: Any) -> bool:
-    """Say whether an optional array was given, that is, whether it has an entry. What no array can
-    be made of counts as given; `real_array` refuses it.
-    """
+    """Whether an optional array has an entry; what no array can be made of counts as given."""
     try:
         return np.size(value) > 0
     except ValueError:

@@ -20,9 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _option(kind: type, value: str, what: str, default: Any = None, in_file: bool = True) -> Any:
-    """An option: its type, how help names its value, what it is, and whether a scene file may hold
-    it.
-    """
+    """An option: its type, its value in help, what it is, whether a scene file may hold it."""
     told = {"kind": kind, "value": value, "what": what, "in_file": in_file}
     return field(default=default, metadata=told)
 
@@ -153,9 +151,7 @@ def choose(
 
 
 def explained(only: str = "") -> str:
-    """Explain the options as the lines of a docstring. `only` is added to those that a scene file
-    may hold.
-    """
+    """The options as lines of a docstring, with `only` added to those of a scene file."""
     return "\n".join(
         textwrap.fill(
             f"{name} : {one.metadata['what']}{only if name in IN_FILES else ''}",

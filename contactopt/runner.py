@@ -203,9 +203,7 @@ def _check_output(out: str | Path | None, options: RunOptions) -> None:
 
 
 def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...], Solved | None]:
-    """The scene after all exact simplifications, and its solution on its first mesh, which proved
-    them.
-    """
+    """The scene after all exact simplifications, and its solution, which proved them."""
     if len(states) > 1:
         raise InputError(
             f"scene '{states[0].name}' has a load path, whose states would all have to be"
@@ -267,9 +265,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
 
 
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
-    """What is known of the answer on one mesh at one state. Half-widths and pressure are the
-    quantities that accuracy bounds.
-    """
+    """What is known of the answer on one mesh at one state."""
     reduction, solution = solved.reduction, solved.solution
     problem = reduction.problem
     found = tables(reduction, solution)
@@ -308,9 +304,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
 
 
 def _smoothed(peak: Reading, largest: float) -> list[str]:
-    """One sentence where the largest pressure at a node and the one that is read around it are not
-    the same.
-    """
+    """One sentence where the largest pressure at a node is not the one that is read around it."""
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
@@ -323,8 +317,7 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
 def _written(
     result: Result, out: str | Path | None, options: RunOptions, start: float, note: Note
 ) -> Result:
-    """The result with its figures and files in a folder, if there is one, and with the seconds
-    since the start.
+    """The result with its figures and files in a folder, if any, and the seconds since the start.
     """
     seconds = result.summary["seconds"]
     if out is None:

@@ -174,9 +174,7 @@ def _axisymmetric(b: float, mu: float, beta: float) -> UnitPunch:
 def _eliminate(
     pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them make rounding errors
-    grow.
-    """
+    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them add rounding errors."""
     columns = np.linalg.solve(pp, np.column_stack([np.ones(len(pp)), pq]))
     matrix, right = qq - qp @ columns[:, 1:], -qp @ columns[:, 0]
     scale = 1 / np.abs(matrix).max(axis=1)

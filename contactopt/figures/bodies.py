@@ -94,7 +94,7 @@ def _draw_section(
 
 
 def _placed_axes() -> tuple[Any, Any]:
-    """Axes and those of a colour bar at fixed places, which take half the time of a layout."""
+    """Axes and those of a colour bar at fixed places: a layout takes as long as drawing."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.8))

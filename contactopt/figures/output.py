@@ -35,9 +35,7 @@ RUN_FILES = (
 
 
 def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
-    """Draw the figures of a result into a folder, each in every format: bodies, pressure and
-    traction of every pair, maps, load path.
-    """
+    """Draw bodies, the surfaces of every pair, maps and load path into files of every format."""
     from contactopt.figures import plots
 
     def save(figure: Any, name: str) -> None:

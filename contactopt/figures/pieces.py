@@ -75,9 +75,7 @@ def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, n
 
 
 def solids(kind: str, elements: np.ndarray) -> np.ndarray:
-    """Solid elements as tetrahedra (m, 4) or hexahedra (m, 8) with straight edges; none of plane
-    ones.
-    """
+    """Solid elements as straight tetrahedra (m, 4) or hexahedra (m, 8); none of plane elements."""
     if kind not in SOLIDS:
         return np.zeros((0, 4), dtype=int)
     return np.concatenate([elements[:, list(part)] for part in SOLIDS[kind]])

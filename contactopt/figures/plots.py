@@ -58,15 +58,12 @@ def contact_place(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _in_rows(problem: InterfaceProblem) -> bool:
-    """Whether values can be drawn along a row of contacts that crosses the surface; always in 2D.
-    """
+    """Whether a row of contacts crosses the surface, along which to draw values; always in 2D."""
     return problem.dim == 2 or len(contact_line(problem)) >= max(3.0, np.sqrt(problem.contacts) / 3)
 
 
 def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
-    """What the places along the contact line are, a coordinate where the line follows an axis and
-    otherwise arc length, and where the line is.
-    """
+    """What the places along the contact line are, a coordinate or arc length, and where it is."""
     if problem.dim == 3:
         return "x", ", y = 0"
     return scene.components[0] if _straight(problem) else "arc length s", ""

@@ -153,9 +153,7 @@ def sketch(meshes: list[Any]) -> list[str]:
 
 
 def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest coordinates (2,) of the picture: of all bodies, or about one that would be
-    lost among larger ones.
-    """
+    """Least and largest coordinates (2,) of the picture: of all bodies, or about a small one."""
     ends = np.array([[x.min(axis=1), x.max(axis=1)] for x in places])  # (bodies, 2, 2)
     low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
     extent = (ends[:, 1] - ends[:, 0]).max(axis=1)

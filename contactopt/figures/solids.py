@@ -126,9 +126,7 @@ def _ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _shares(corners: np.ndarray, own: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (p, 3) of the places (x, y) in the triangles `own` (p,) of (m, 3, 2),
-    each place in one of them.
-    """
+    """Barycentric coordinates (p, 3) of places (x, y) in the triangles `own` (p,) of (m, 3, 2)."""
     after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
     normals = np.stack([after[..., 1] - before[..., 1], before[..., 0] - after[..., 0]])
     with np.errstate(all="ignore"):  # triangles seen from the side own no pixel

@@ -92,8 +92,7 @@ def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 
 def volumes(mesh: skfem.Mesh) -> np.ndarray:
-    """Ratios (e, n + 1) of volumes between elements and their reference, with their signs, at the n
-    nodes of each element and at its centre.
+    """Signed volumes (e, n + 1) over those of the reference, at n nodes and the centre of elements.
     """
     places = np.asarray(mesh.elem().doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
@@ -115,9 +114,7 @@ def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 
 def area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Area times normal (dim, f) of facets with corners (dim, c, f) in their order [length^2];
-    normals are on the right of edges.
-    """
+    """Area times normal (dim, f) of facets (dim, c, f) [length^2]; normals are right of edges."""
     if len(corners) == 2:
         x, y = corners[:, 1] - corners[:, 0]
         return np.stack([y, -x])

@@ -141,8 +141,7 @@ def _read(path: Path) -> Any:
 
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Format and reader of each attempt. What one without a format says of its failure is not told.
-    """
+    """Format and reader of each attempt. Of one without a format no failure is told."""
     import meshio
 
     stated, binary = version(path) if "gmsh" in formats else (None, False)

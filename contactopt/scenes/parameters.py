@@ -122,9 +122,7 @@ class Parameter:
     def _in_part(
         self, part: Any, scene: Scene, value: float | None = None
     ) -> tuple[list[float], Any]:
-        """Its values in one body, several if the name is ambiguous, and the body with another
-        value.
-        """
+        """Its values in one body, one unless its name is ambiguous; the body with another value."""
         material: Any = getattr(part, "material", None)
         if not self.concerns(part) or (self.kind in MATERIAL and material is None):
             return [], part

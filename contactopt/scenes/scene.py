@@ -246,8 +246,7 @@ class Scene:
             )
 
     def _check_pairs(self) -> None:
-        """Names are known and given once; every body is in a pair, and no pair is of rigid bodies.
-        """
+        """Names are known and given once, each body is in a pair, no pair is of rigid bodies."""
         names = [part.name for part in self.parts]
         for name in names:
             if names.count(name) > 1:

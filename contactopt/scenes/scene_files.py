@@ -50,9 +50,7 @@ class SceneFile:
     lines: dict[str, int]
 
     def located(self, error: InputError) -> InputError:
-        """Tell where in the file a mistake is: with the name of the file, and the line of the body
-        or contact that the error names.
-        """
+        """The mistake with the name of the file, and the line of the body or contact in it."""
         for name, line in self.lines.items():
             if f"'{name}'" in str(error):
                 return InputError(f"{self.name}, line {line}: {error}")

@@ -212,8 +212,8 @@ class _Comparison:
         return twins
 
     def _plates(self, part: Any, image: Any) -> set[tuple[str, int]]:
-        """(body, number of a load) of plates that are their own images, if all supports, loads,
-        forces and normals have images.
+        """(body, number of a load) of plates that are their own images, if all conditions have
+        images.
         """
         components, H, found = self.whole.scene.components, self.plane.reflection, set()
         others = list(_conditions(image, components))
