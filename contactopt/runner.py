@@ -317,7 +317,7 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
 def _written(
     result: Result, out: str | Path | None, options: RunOptions, start: float, note: Note
 ) -> Result:
-    """The result with its figures and files in a folder, if any, and the seconds since the start."""
+    """The result with its figures and files in a folder, if any, and the total of seconds."""
     seconds = result.summary["seconds"]
     if out is None:
         seconds["total"] = time.perf_counter() - start

@@ -92,7 +92,7 @@ def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 
 def volumes(mesh: skfem.Mesh) -> np.ndarray:
-    """Signed volumes (e, n + 1) over those of the reference, at n nodes and the centre of elements."""
+    """Signed volumes (e, n + 1) over those of the reference, at n nodes and the centre of cells."""
     places = np.asarray(mesh.elem().doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
     return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))

@@ -50,7 +50,7 @@ def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
 
 
 def disc(radius: float, sectors: int) -> MeshQuad2:
-    """The whole disc with the boundary 'rim', whose nodes divide it evenly into 8 * sectors parts."""
+    """The whole disc with the boundary 'rim', whose nodes divide it into 8 * sectors even parts."""
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     diameter = np.flatnonzero(np.abs(y) < NEAR * radius)
     along = diameter[np.argsort(x[diameter])]
