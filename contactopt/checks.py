@@ -26,19 +26,8 @@ LONGEST_NAME = 100  # characters
 def check_number(
     name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False
 ) -> None:
-    """Check that a value is a finite number in (low, high), or in [low, high) when `closed`.
-
-    Parameters
-    ----------
-    name : What the value is, in the words of the message.
-    value : What the user gave.
-    low, high : The bounds, which are infinite unless given.
-    closed : Whether the lower bound itself is allowed.
-
-    Raises
-    ------
-    InputError : If the value is no number, is not finite, or lies outside the bounds. Text and
-        masked values are no numbers.
+    """Raise InputError unless a value is a finite number in (low, high), or in [low, high) when
+    `closed`. Text and masked values are no numbers. The message calls the value by its `name`.
     """
     try:
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
@@ -56,16 +45,8 @@ def check_number(
 
 
 def check_memory(what: str, needed: float) -> None:
-    """Check that something large fits into the memory that is free, before any is taken for it.
-
-    Parameters
-    ----------
-    what : What needs the memory, in the words of the message.
-    needed : How much it needs at least [bytes].
-
-    Raises
-    ------
-    InputError : If less is free, as far as the system tells.
+    """Raise InputError if `what` needs more memory [bytes] than is free, as far as the system
+    tells, before any is taken for it.
     """
     free = _free_memory()
     if needed > free:
@@ -76,9 +57,7 @@ def check_memory(what: str, needed: float) -> None:
 
 
 def _free_memory() -> float:
-    """What the system and the limits of this process leave [bytes]; infinite where neither is
-    known.
-    """
+    """What the system and the limits of this process leave [bytes]; infinite if unknown."""
     found = np.inf
     with suppress(OSError, ValueError, StopIteration):
         with open("/proc/meminfo") as file:
@@ -95,18 +74,7 @@ def _free_memory() -> float:
 
 
 def given(value: Any) -> bool:
-    """Say whether an optional array was given.
-
-    What no array can be made of counts as given; `real_array` refuses it.
-
-    Parameters
-    ----------
-    value : An array, a number, a list, or an empty array where nothing was given.
-
-    Returns
-    -------
-    True if the value has at least one entry.
-    """
+    """Whether an optional array has an entry; what no array can be made of counts as given."""
     try:
         return np.size(value) > 0
     except ValueError:
@@ -114,32 +82,15 @@ def given(value: Any) -> bool:
 
 
 def check_positive(**sizes: float) -> None:
-    """Check that every size is a positive finite number.
-
-    Parameters
-    ----------
-    sizes : The values by their names, in which _ stands for a space in the message.
-
-    Raises
-    ------
-    InputError : If a size is no number, not finite, or not positive.
+    """Raise InputError unless every size is a positive finite number. In a name _ stands for a
+    space in the message.
     """
     for name, value in sizes.items():
         check_number(name.replace("_", " "), value, low=0.0)
 
 
 def check_count(name: str, value: int) -> None:
-    """Check that a value is a whole number of at least 1.
-
-    Parameters
-    ----------
-    name : What the value is, in the words of the message.
-    value : What the user gave.
-
-    Raises
-    ------
-    InputError : If the value is no integer or is less than 1. True and False are no integers here.
-    """
+    """Raise InputError unless a value is a whole number of at least 1. True and False are none."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
 
@@ -154,12 +105,8 @@ def real_array(name: str, value: Any) -> np.ndarray:
 
     Returns
     -------
-    The numbers in the shape of the value. They are a copy.
-
-    Raises
-    ------
-    InputError : On text, on rows of different lengths, on complex numbers, and on numbers that are
-        not finite.
+    The numbers in the shape of the value. InputError on text, on rows of different lengths, on
+        complex numbers, and on numbers that are not finite.
     """
     try:
         array = np.asarray(value)
@@ -180,20 +127,12 @@ def real_array(name: str, value: Any) -> np.ndarray:
 
 
 def check_name(what: str, name: object) -> None:
-    """Check that a name can become a file's name in a folder, and can lead to no other folder.
+    """Raise InputError unless a name can become a file's name in a folder, and can lead to no other
+    folder. The message says with `what` what has the name.
 
     Refused are names that are no text, empty, longer than 100 characters, or made of dots only;
     names with a slash, a backslash, a colon or a character that cannot be printed; names that begin
     or end with a space; and the device names of Windows.
-
-    Parameters
-    ----------
-    what : What the name belongs to, in the words of the message.
-    name : The name that the user gave.
-
-    Raises
-    ------
-    InputError : If the name is refused.
     """
     wrong = ""
     if not isinstance(name, str):
@@ -213,17 +152,8 @@ def check_name(what: str, name: object) -> None:
 
 
 def short(value: object, most: int = 60) -> str:
-    """Write a value as Python does, with its middle left out if that is long.
-
-    Parameters
-    ----------
-    value : Any object.
-    most : How many characters may stay as they are. A longer text becomes three quarters of this
-        and three dots.
-
-    Returns
-    -------
-    The text for a message.
+    """Write a value as Python does. Of a text of more than `most` characters, three quarters of
+    these stay, with three dots in the middle.
     """
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
@@ -234,8 +164,7 @@ def meant(name: str, known: Iterable[str]) -> str:
 
     Parameters
     ----------
-    name : the unknown name
-    known : those that there are
+    name, known : the unknown name, and those that there are
 
     Returns
     -------

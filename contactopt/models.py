@@ -310,9 +310,7 @@ def _normal_parts(problem: InterfaceProblem) -> tuple[Any, Any, list[Any], dict[
 
 
 def _parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, list[Any], dict[str, Reader]]:
-    """Variable r, its normal part (k,) and tangential part (k (dim - 1),), cost, balance, its
-    multiplier by name.
-    """
+    """Variable r, its normal and tangential parts, cost, balance, its multiplier by name."""
     n, t = _components(problem)
     r = cp.Variable(problem.q.size, name="r")
     balance, approach = _balance(problem.V.T @ r + problem.s, "approach")

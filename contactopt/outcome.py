@@ -82,14 +82,5 @@ class Outcome:
 
 
 def squeeze(t: np.ndarray) -> np.ndarray:
-    """Drop the second axis of an array (k, d) where d is one, as in 2D.
-
-    Parameters
-    ----------
-    t : (k, d) tangential components
-
-    Returns
-    -------
-    ndarray : (k,) or (k, d)
-    """
+    """Drop the second axis of tangential components (k, d) where d is one, as in 2D."""
     return t[:, 0] if t.shape[1] == 1 else t

@@ -20,9 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _option(kind: type, value: str, what: str, default: Any = None, in_file: bool = True) -> Any:
-    """An option: its type, how help names its value, what it is, and whether a scene file may hold
-    it.
-    """
+    """An option: its type, its value in help, what it is, whether a scene file may hold it."""
     told = {"kind": kind, "value": value, "what": what, "in_file": in_file}
     return field(default=default, metadata=told)
 
@@ -47,8 +45,8 @@ class RunOptions:
     preconditioner: str | None = _option(
         str,
         "NAME",
-        "an approximate inverse of Q, of methods that take products with Q; it implies the implicit"
-        " form",
+        "an approximate inverse of Q, of methods that take"
+        " products with Q; it implies the implicit form",
     )
     Q: str = _option(
         str, "FORM", "Q as an array (explicit), or known by its products only (implicit)", "auto"
@@ -101,8 +99,8 @@ class RunOptions:
     html: bool = _option(
         bool,
         "",
-        "also write view.html, the result as a page to explore (needs: pip install"
-        " 'contactopt[view]')",
+        "also write view.html, the result as a page to"
+        " explore (needs: pip install 'contactopt[view]')",
         False,
         in_file=False,
     )
@@ -110,8 +108,8 @@ class RunOptions:
     def __post_init__(self) -> None:
         if self.preconditioner is not None and self.Q == "explicit":
             raise InputError(
-                "a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop"
-                " one of them."
+                "a preconditioner serves products with Q, but Q"
+                " = 'explicit' was asked for; drop one of them."
             )
         if (self.accuracy is None) != (self.quantity is None):
             raise InputError(TOGETHER)
@@ -144,16 +142,8 @@ IN_FILES = tuple(name for name, one in OPTIONS.items() if one.metadata["in_file"
 def choose(
     keywords: Mapping[str, Any], in_file: Mapping[str, Any]
 ) -> tuple[RunOptions, dict[str, Any]]:
-    """Divide keywords into the options of a run and all others.
-
-    Parameters
-    ----------
-    keywords : those of contactopt.run; an option that is None was not given
-    in_file : the options of the scene file, which count where keywords do not give them
-
-    Returns
-    -------
-    RunOptions, dict : the options, and the other keywords
+    """Divide the keywords of contactopt.run into the options of a run, and all others. An option
+    that is None was not given; then that of the scene file counts.
     """
     given = {name: value for name in OPTIONS if (value := keywords.get(name)) is not None}
     others = {name: value for name, value in keywords.items() if name not in OPTIONS}
@@ -161,16 +151,7 @@ def choose(
 
 
 def explained(only: str = "") -> str:
-    """Explain the options as the lines of a docstring.
-
-    Parameters
-    ----------
-    only : what is added to those that a scene file may hold
-
-    Returns
-    -------
-    str : a line `name : what it is` for each, wrapped
-    """
+    """The options as lines of a docstring, with `only` added to those of a scene file."""
     return "\n".join(
         textwrap.fill(
             f"{name} : {one.metadata['what']}{only if name in IN_FILES else ''}",
@@ -184,14 +165,6 @@ def explained(only: str = "") -> str:
 def takes_options(function: F) -> F:
     """Write the options into the signature of a function that takes them as keywords, and into its
     docstring, instead of the line OPTIONS.
-
-    Parameters
-    ----------
-    function : the function, whose last parameter takes all keywords
-
-    Returns
-    -------
-    Callable : the same function
     """
     signature = inspect.signature(function, eval_str=False)
     *own, keywords = signature.parameters.values()

@@ -105,8 +105,8 @@ def run(
 
     Parameters
     ----------
-    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one
-        (PATHS); a scene file, whose name ends in .toml; or a Scene
+    scene : a name of contactopt.scenes.SCENES, which is solved along its load path if it has one; a
+        scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     note : receives progress messages
     team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
@@ -124,8 +124,7 @@ def run(
 
     Raises
     ------
-    InputError : on input that cannot be used, with a sentence that says what to do; nothing is left
-        half-written
+    InputError : with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
     file = _scene_file(scene)
@@ -140,15 +139,13 @@ def run(
     how = Options(form, options.solver, method, options.tol, note=note)
     prepared = time.perf_counter() - start
     try:
-        known = None
+        solved, estimate = None, None
         if options.simplest:
-            states, known = _simplest(states, how)
+            states, solved = _simplest(states, how)
         if team is not None:
             states = _dealt(states, team, note)
-        if known is None or team is not None or options.accuracy is not None:
+        if solved is None or team is not None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
-        else:
-            solved, estimate = known, None
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note)
@@ -159,19 +156,8 @@ def run(
 
 
 def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
-    """The scene that a name or a scene file stands for, of a load path its last state.
-
-    Parameters
-    ----------
-    scene, changes : as for run()
-
-    Returns
-    -------
-    Scene
-
-    Raises
-    ------
-    InputError : for an unknown name, a file with a mistake, or changes that do not fit
+    """The scene that a name or a scene file stands for, with changes as for run(); of a load path
+    its last state.
     """
     return _states(scene, _scene_file(scene), changes)[-1]
 
@@ -219,9 +205,7 @@ def _check_output(out: str | Path | None, options: RunOptions) -> None:
 
 
 def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...], Solved | None]:
-    """The scene after all exact simplifications, and its solution, which proved them on its first
-    mesh.
-    """
+    """The scene after all exact simplifications, and its solution, which proved them."""
     if len(states) > 1:
         raise InputError(
             f"scene '{states[0].name}' has a load path, whose states would all have to be"
@@ -284,9 +268,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
 
 
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
-    """What is known of the answer on one mesh at one state: half-widths and pressure are the
-    quantities that accuracy bounds.
-    """
+    """What is known of the answer on one mesh at one state."""
     reduction, solution = solved.reduction, solved.solution
     problem = reduction.problem
     found = tables(reduction, solution)
@@ -322,24 +304,20 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
 
 
 def _smoothed(peak: Reading, largest: float) -> list[str]:
-    """One sentence where the largest pressure at a node and the one that is read around it are not
-    the same.
-    """
+    """One sentence where the largest pressure at a node is not the one that is read around it."""
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
-        f"the largest pressure at a node is {largest:.4g}, what its neighbours let expect is"
-        f" {peak.value:.4g}, give or take {peak.uncertainty:.2g}: refine the meshes there, or ask"
-        " for an accuracy."
+        f"the largest pressure at a node is {largest:.4g}, what its"
+        f" neighbours let expect is {peak.value:.4g}, give or take"
+        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
     ]
 
 
 def _written(
     result: Result, out: str | Path | None, options: RunOptions, start: float, note: Note
 ) -> Result:
-    """The result with its figures and files in a folder, if there is one, and with the seconds
-    since the start.
-    """
+    """The result with its figures and files in a folder, if any, and the total of seconds."""
     seconds = result.summary["seconds"]
     if out is None:
         seconds["total"] = time.perf_counter() - start

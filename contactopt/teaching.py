@@ -21,16 +21,15 @@ CERTIFIED = 1e-4
 
 
 def check(exercise: str, answer: Any, right: Any) -> bool | None:
-    """Grade an answer to an exercise and print the verdict.
+    """Grade an answer to an exercise, given by its number, and print the verdict.
 
     Parameters
     ----------
-    exercise : str The number of the exercise.
-    answer : Any The reader's answer; `...` says that there is none yet.
-    right : InterfaceProblem, number, array or function An InterfaceProblem: the answer holds
-        contact forces (k, dim), and the certificate of the problem judges them. A number or an
-        array: the answer has to agree to three digits. A function: it is given the answer and says
-        True or False.
+    exercise, answer : The number of the exercise, and the reader's answer; `...` says that there is
+        none yet.
+    right : An InterfaceProblem: the answer holds contact forces (k, dim), and the certificate of
+        the problem judges them. A number or an array: the answer has to agree to three digits. A
+        function: it is given the answer and says True or False.
 
     Returns
     -------
@@ -88,8 +87,8 @@ class Slider:
             for number, (value, frame) in enumerate(zip(self.values, self.frames))
         )
         shown = (
-            "[...box.querySelectorAll('img')].forEach((i, k) => i.style.display = k == this.value ?"
-            " 'block' : 'none')"
+            "[...box.querySelectorAll('img')].forEach((i, k) =>"
+            " i.style.display = k == this.value ? 'block' : 'none')"
         )
         return (
             f'<div class="slider" style="max-width: 40em"><label>{escape(self.label)}<br><input'

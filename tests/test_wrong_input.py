@@ -11,7 +11,7 @@ import pytest
 from contactopt import InputError, InterfaceProblem, fclib, follow, reduce, run, solve
 from contactopt.cli import main
 from contactopt.meshes.structured import rename, tensor_mesh
-from contactopt.scenes import flat_punch
+from contactopt.scenes import cattaneo, flat_punch
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 
@@ -226,6 +226,8 @@ def test_choices_that_there_are_not(choice):
 def test_a_path_of_other_meshes_is_refused():
     with pytest.raises(InputError):
         follow([flat_punch(2, elements=4), flat_punch(2, elements=4, width=7.0)])
+    with pytest.raises(InputError):
+        follow([cattaneo(2, elements=4), cattaneo(2, elements=4, size=200.0)])
 
 
 # Loads that no contact can balance

@@ -10,6 +10,7 @@ conforming  a pin in a hole with clearance (Persson), the press fit (Lame)
 corner      exponents of the stress at the edge of an elastic punch
 
 Half-spaces are elastic, isotropic, homogeneous; strains and slopes small. Any consistent units.
+InputError tells of arguments that are out of range.
 """
 
 from contactopt.analytic.conforming import pin_in_hole, press_fit

@@ -23,6 +23,8 @@ def pin_in_hole(
                         + artanh[sqrt((b^2 - y^2) / (b^2 + 1))] / [b^2 (1 + b^2)]}.
 
     For small b this is Hertz. Positions are lengths of arc R phi from the middle of the contact.
+    Sources: Persson (1964), On the stress distribution of cylindrical elastic bodies in contact
+    (Chalmers); Ciavarella, Decuzzi (2001), Int. J. Solids Struct. 38, 4507-4523.
 
     Parameters
     ----------
@@ -34,17 +36,6 @@ def pin_in_hole(
     Returns
     -------
     Reference : pressure over the place, half-width along the arc and peak
-
-    Raises
-    ------
-    InputError : if an argument is not positive, and for forces beyond those that numbers can
-        resolve
-
-    Notes
-    -----
-    Source: Persson (1964), On the stress distribution of cylindrical elastic bodies in contact
-    (Chalmers); Ciavarella, Decuzzi (2001), The state of stress induced by the plane frictionless
-    cylindrical contact. I. The case of elastic similarity, Int. J. Solids Struct. 38, 4507-4523.
     """
     check_positive(
         force_per_length=force_per_length, radius=radius, clearance=clearance, modulus=modulus
@@ -92,7 +83,8 @@ def press_fit(
         d / (R p) = [(c^2 + R^2) / (c^2 - R^2) + m_h] / M_h
                     + [(R^2 + a^2) / (R^2 - a^2) - m_s] / M_s,
 
-    M = E / (1 - nu^2) and m = nu / (1 - nu) of each body.
+    M = E / (1 - nu^2) and m = nu / (1 - nu) of each body. Source: Timoshenko, Goodier (1970),
+    Theory of Elasticity, section 28.
 
     Parameters
     ----------
@@ -103,22 +95,15 @@ def press_fit(
 
     Returns
     -------
-    Reference : uniform pressure, half of the length of the circle and peak
-
-    Raises
-    ------
-    InputError : if the radii do not grow from bore to radius to outside
-
-    Notes
-    -----
-    Source: Timoshenko, Goodier (1970), Theory of Elasticity, section 28.
+    Reference : uniform pressure, half of the length of the circle and peak. Raises InputError if
+        the radii do not grow from bore to radius to outside
     """
     check_positive(interference=interference, radius=radius, outside=outside)
     check_number("bore", bore, low=0.0, closed=True)
     if not bore < radius < outside:
         raise InputError(
-            f"the radii must grow from bore to radius to outside; got {bore:g}, {radius:g},"
-            f" {outside:g}."
+            "the radii must grow from bore to radius to"
+            f" outside; got {bore:g}, {radius:g}, {outside:g}."
         )
 
     def plane(material: Material) -> tuple[float, float]:

@@ -69,11 +69,7 @@ def corner(
 
     Returns
     -------
-    Exponent, oscillation, and ratio of the tractions.
-
-    Raises
-    ------
-    InputError : For two rigid bodies, or angles out of range.
+    Exponent, oscillation, and ratio of the tractions. Raises InputError for two rigid bodies.
     """
     if upper is None and lower is None:
         raise InputError("both bodies are rigid; at least one must be elastic.")
@@ -113,10 +109,6 @@ def edge_stick_threshold(
     -------
     [-]; inf where the bonded field oscillates, because the edge slips for every mu then, and nan
     where it is bounded.
-
-    Raises
-    ------
-    InputError : For two rigid bodies, or angles out of range.
     """
     bonded = corner(upper, lower, None, angles)
     return float("inf") if bonded.oscillation else abs(bonded.ratio)

@@ -33,18 +33,12 @@ def flat_punch_line_friction(
 
     Parameters
     ----------
-    force_per_length : Normal force P, positive in compression [force / length].
-    half_width : Half-width a of the punch [length].
-    mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-].
+    force_per_length, half_width : As for flat_punch_line().
+    mu, beta : Friction coefficient, at least 0, and Dundurs' constant as in dundurs() [-].
 
     Returns
     -------
     Pressure and shear traction, half-width of contact and stick.
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(flat_punch_line(force_per_length, half_width), mu)
@@ -62,19 +56,12 @@ def flat_punch_axisymmetric_friction(
 
     Parameters
     ----------
-    force : Normal force, positive in compression [force].
-    radius : Radius a of the punch [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
-    mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-].
+    force, radius, modulus : As for flat_punch_axisymmetric().
+    mu, beta : Friction coefficient, at least 0, and Dundurs' constant as in dundurs() [-].
 
     Returns
     -------
     Pressure and shear traction, half-width of contact and stick, and approach.
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(flat_punch_axisymmetric(force, radius, modulus), mu)
@@ -96,19 +83,12 @@ def hertz_line_friction(
 
     Parameters
     ----------
-    force_per_length : Normal force P, positive in compression [force / length].
-    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
-    mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-].
+    force_per_length, radius, modulus : As for hertz_line().
+    mu, beta : Friction coefficient, at least 0, and Dundurs' constant as in dundurs() [-].
 
     Returns
     -------
     Pressure and shear traction, half-width of contact and stick.
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(hertz_line(force_per_length, radius, modulus), mu)
@@ -134,19 +114,12 @@ def hertz_point_friction(
 
     Parameters
     ----------
-    force : Normal force, positive in compression [force].
-    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
-    mu : Friction coefficient, at least 0 [-].
-    beta : Dundurs' constant as in dundurs(), of size below one [-].
+    force, radius, modulus : As for hertz_point().
+    mu, beta : Friction coefficient, at least 0, and Dundurs' constant as in dundurs() [-].
 
     Returns
     -------
     Pressure and shear traction, half-width of contact and stick, and approach.
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(hertz_point(force, radius, modulus), mu)
@@ -170,9 +143,7 @@ def _slips(mu: float, beta: float) -> bool:
 
 
 def _without_slip(frictionless: Reference, mu: float) -> Reference:
-    """The same pressure, no shear traction: mu = 0, or sticking because the surfaces move alike
-    (beta = 0).
-    """
+    """The same pressure without shear: mu = 0, or sticking because the surfaces move alike."""
     return replace(
         frictionless,
         shear=lambda x: 0 * frictionless.pressure(x),

@@ -40,9 +40,7 @@ def hertz_line_tangential(
 
     Parameters
     ----------
-    force_per_length : Normal force P, positive in compression [force / length].
-    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
+    force_per_length, radius, modulus : As for hertz_line().
     mu : Friction coefficient, at least 0 [-].
     loads : The present tangential force T, or its turning points so far and the present one; |T| <=
         mu P [force / length].
@@ -50,10 +48,6 @@ def hertz_line_tangential(
     Returns
     -------
     Pressure and shear traction over the place, half-width of contact and stick, and shift.
-
-    Raises
-    ------
-    InputError : If |T| exceeds mu P, or an argument is not positive.
     """
     normal = hertz_line(force_per_length, radius, modulus)
     limit = _limit(mu, force_per_length)
@@ -78,9 +72,7 @@ def hertz_point_tangential(
 
     Parameters
     ----------
-    force : Normal force, positive in compression [force].
-    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
+    force, radius, modulus : As for hertz_point().
     tangential : Tangential modulus Gs as in tangential_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
     loads : The present tangential force T, or its turning points so far and the present one; |T| <=
@@ -89,10 +81,6 @@ def hertz_point_tangential(
     Returns
     -------
     Pressure and shear traction over the radius, radius of contact and stick, approach, and shift.
-
-    Raises
-    ------
-    InputError : If |T| exceeds mu P, or an argument is not positive.
     """
     check_positive(tangential_modulus=tangential)
     normal = hertz_point(force, radius, modulus)
@@ -110,18 +98,13 @@ def cycle_loss_line(force_per_length: float, modulus: float, mu: float, amplitud
 
     Parameters
     ----------
-    force_per_length : Normal force P, positive in compression [force / length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
+    force_per_length, modulus : As for hertz_line().
     mu : Friction coefficient, at least 0 [-].
     amplitude : Largest tangential force per length [force / length].
 
     Returns
     -------
     Energy per length and cycle [force].
-
-    Raises
-    ------
-    InputError : If the amplitude exceeds mu P, or an argument is not positive.
     """
     check_positive(force_per_length=force_per_length, modulus=modulus)
     limit = _limit(mu, force_per_length)
@@ -141,9 +124,7 @@ def cycle_loss_point(
 
     Parameters
     ----------
-    force : Normal force, positive in compression [force].
-    radius : R of the round body; of two, 1 / R is the sum of curvatures [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
+    force, radius, modulus : As for hertz_point().
     tangential : Tangential modulus Gs as in tangential_modulus() [stress].
     mu : Friction coefficient, at least 0 [-].
     amplitude : Largest tangential force [force].
@@ -151,10 +132,6 @@ def cycle_loss_point(
     Returns
     -------
     Energy per cycle [force length].
-
-    Raises
-    ------
-    InputError : If the amplitude exceeds mu P, or an argument is not positive.
     """
     check_positive(tangential_modulus=tangential)
     a = hertz_point(force, radius, modulus).half_width
@@ -227,7 +204,7 @@ def _limit(mu: float, force: float) -> float:
 def _share(load: float, limit: float) -> float:
     if not load <= limit * (1 + 1e-12):
         raise InputError(
-            f"the tangential load {load:g} exceeds mu times the normal load, {limit:g}: the bodies"
-            " slide."
+            f"the tangential load {load:g} exceeds mu times"
+            f" the normal load, {limit:g}: the bodies slide."
         )
     return min(load / limit, 1.0)

@@ -25,10 +25,6 @@ def hertz_point(force: float, radius: float, modulus: float) -> Reference:
     Returns
     -------
     Pressure over the radius, contact radius, peak and approach.
-
-    Raises
-    ------
-    InputError : If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     a = (3 * force * radius / (4 * modulus)) ** (1 / 3)
@@ -52,10 +48,6 @@ def hertz_line(force_per_length: float, radius: float, modulus: float) -> Refere
     Returns
     -------
     Pressure over the place, half-width and peak.
-
-    Raises
-    ------
-    InputError : If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, radius=radius, modulus=modulus)
     a = float(np.sqrt(4 * force_per_length * radius / (np.pi * modulus)))
@@ -76,10 +68,6 @@ def flat_punch_line(force_per_length: float, half_width: float) -> Reference:
     Returns
     -------
     Pressure over the place, and the half-width.
-
-    Raises
-    ------
-    InputError : If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, half_width=half_width)
     pressure = under_punch(lambda u: force_per_length / np.pi + 0 * u, half_width, 1)
@@ -101,10 +89,6 @@ def flat_punch_axisymmetric(force: float, radius: float, modulus: float) -> Refe
     Returns
     -------
     Pressure over the radius, contact radius and approach.
-
-    Raises
-    ------
-    InputError : If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     pressure = under_punch(lambda u: force / (2 * np.pi) + 0 * u, radius, 2)
@@ -124,17 +108,12 @@ def flat_punch_line_bonded(force_per_length: float, half_width: float, beta: flo
 
     Parameters
     ----------
-    force_per_length : Normal force P, positive in compression [force / length].
-    half_width : Half-width a of the punch [length].
+    force_per_length, half_width : As for flat_punch_line().
     beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
     Pressure and shear traction over the place, and the half-width.
-
-    Raises
-    ------
-    InputError : If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, half_width=half_width)
     check_beta(beta)
@@ -154,28 +133,22 @@ def flat_punch_axisymmetric_bonded(
     """A rigid circular flat punch bonded to a half-space:  approach (P / (2 a E*)) beta /
     artanh(beta).
 
-    The Abel transforms of the tractions are P(t) = int_t^a r p / sqrt(r^2 - t^2) dr and Q(t) = t
-    int_t^a q / sqrt(r^2
-    - t^2) dr. They are P + i Q = D cosh(pi eta) e^(2 i eta u) with u = artanh(t / a), D = E*
-      approach / 2 and eta =
-    artanh(beta) / pi. The stiffness over that without friction is (1 - nu) ln(3 - 4 nu) / (1 - 2
-    nu). At the edges the tractions behave as in flat_punch_line_bonded(). Sources: Mossakovskii
-    (1954), PMM 18, 187-196; Spence (1968), Proc. R. Soc. A 305, 55-80.
+    The Abel transforms of the tractions, with u = artanh(t / a), D = E* approach / 2 and
+    eta = artanh(beta) / pi, are
+        P(t) = int_t^a r p / sqrt(r^2 - t^2) dr,   Q(t) = t int_t^a q / sqrt(r^2 - t^2) dr,
+        P + i Q = D cosh(pi eta) e^(2 i eta u).
+    The stiffness over that without friction is (1 - nu) ln(3 - 4 nu) / (1 - 2 nu). At the edges the
+    tractions behave as in flat_punch_line_bonded(). Sources: Mossakovskii (1954), PMM 18, 187-196;
+    Spence (1968), Proc. R. Soc. A 305, 55-80.
 
     Parameters
     ----------
-    force : Normal force, positive in compression [force].
-    radius : Radius a of the punch [length].
-    modulus : Contact modulus E* as in contact_modulus() [stress].
+    force, radius, modulus : As for flat_punch_axisymmetric().
     beta : Dundurs' constant as in dundurs(), of size below one [-].
 
     Returns
     -------
     Pressure and shear traction over the radius, contact radius and approach.
-
-    Raises
-    ------
-    InputError : If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     check_beta(beta)

@@ -95,9 +95,7 @@ class Panels:
     def evaluate(
         self, values: np.ndarray, v: np.ndarray, parity: int, mean: float = 0.0
     ) -> np.ndarray:
-        """The function with these values at the nodes, at v >= 0; even or odd about a mean;
-        constant past the grid.
-        """
+        """The function at v >= 0; even or odd about a mean; constant past the grid."""
         y = np.minimum(np.atleast_1d(v) - self.b, self.edges[-1])
         panel = np.searchsorted(self.edges[:-1], y, side="left")
         full = np.concatenate([mean + parity * (values[LEFT - 1 :: -1] - mean), values]).reshape(
@@ -127,9 +125,7 @@ class Panels:
         return matrix
 
     def _inside(self, parity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Integrals from each panel's left end to its nodes; in the central panel from 0 to nodes
-        and end.
-        """
+        """Integrals from each panel's left end (the central one's: 0) to its nodes, and its end."""
         from_zero, from_left = (
             legendre.legval(np.append(NODES, 1.0), legendre.legint(np.eye(ORDER), lbnd=low)).T
             @ TRANSFORM
@@ -211,9 +207,7 @@ class Panels:
         return (self.columns[LEFT:, None] - self.centre) / self.half
 
     def _correction(self, log: bool) -> np.ndarray:
-        """Exact less Gauss rule for ln |u - v| or 1 / (u - v) on near panels; the Gauss rule leaves
-        out u = v.
-        """
+        """Exact less Gauss rule (without u = v) for ln |u - v| or 1 / (u - v) on near panels."""
         local = self._local()
         i, k = np.nonzero(np.abs(local) < NEAR)
         moments = (_log_moments if log else _cauchy_moments)(local[i, k]) @ TRANSFORM

@@ -54,10 +54,6 @@ def contact_modulus(first: Material | None, second: Material | None = None) -> f
     Returns
     -------
     E* [stress].
-
-    Raises
-    ------
-    InputError : If both bodies are rigid.
     """
     return 1 / sum((1 - m.nu**2) / m.E for m in _elastic(first, second))
 
@@ -75,10 +71,6 @@ def tangential_modulus(first: Material | None, second: Material | None = None) -
     Returns
     -------
     Gs [stress].
-
-    Raises
-    ------
-    InputError : If both bodies are rigid.
     """
     return 1 / sum((2 - m.nu) * 2 * (1 + m.nu) / m.E for m in _elastic(first, second))
 
@@ -100,10 +92,6 @@ def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, floa
     Returns
     -------
     alpha and beta [-].
-
-    Raises
-    ------
-    InputError : If both bodies are rigid.
     """
     _elastic(upper, lower)
     compliance = [0.0 if m is None else 2 * (1 + m.nu) / m.E for m in (upper, lower)]
@@ -135,10 +123,6 @@ def check_beta(beta: float) -> None:
     Parameters
     ----------
     beta : The constant [-].
-
-    Raises
-    ------
-    InputError : Unless beta is a finite number between -1 and 1.
     """
     check_number("Dundurs' constant beta", beta, low=-1.0, high=1.0)
 

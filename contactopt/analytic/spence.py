@@ -131,10 +131,6 @@ def stick_ratio(mu: float, beta: float, axisymmetric: bool = False) -> float:
     Returns
     -------
     c / a [-].
-
-    Raises
-    ------
-    InputError : If an argument is out of range.
     """
     check_number("the friction coefficient mu", mu, low=0.0, closed=True)
     check_beta(beta)
@@ -178,9 +174,7 @@ def _axisymmetric(b: float, mu: float, beta: float) -> UnitPunch:
 def _eliminate(
     pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them would let rounding
-    errors grow.
-    """
+    """Solve pp p + pq q = 1, qp p + qq q = 0 by blocks: pivots across them add rounding errors."""
     columns = np.linalg.solve(pp, np.column_stack([np.ones(len(pp)), pq]))
     matrix, right = qq - qp @ columns[:, 1:], -qp @ columns[:, 0]
     scale = 1 / np.abs(matrix).max(axis=1)
@@ -189,9 +183,7 @@ def _eliminate(
 
 
 def _excess(punch: UnitPunch, mu: float) -> float:
-    """q - mu p at the end of the stick zone: zero for the right one, positive where it is too
-    large.
-    """
+    """q - mu p at the end of the stick zone: positive where the zone is too large."""
     end = np.count_nonzero(punch.panels.stick)
     panel = slice(end - ORDER, end)
     return float(np.sum(TRANSFORM @ (punch.q[panel] - mu * punch.p[panel])))

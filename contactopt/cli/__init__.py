@@ -22,16 +22,7 @@ __all__ = ["main", "make_parser"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : those after the name of the program; by default those of the process
-
-    Returns
-    -------
-    int : the exit code
-    """
+    """Run the command line with these arguments, by default those of the process; the exit code."""
     told = sys.argv[1:] if arguments is None else list(arguments)
     options = make_parser().parse_args(told, argparse.Namespace(team=None, ranks=None))
     with _logging(options.verbose, options.quiet):

@@ -41,9 +41,7 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
 
 
 def _changes(options: argparse.Namespace) -> dict[str, Any]:
-    """The arguments of the scene that the command line gives; InputError for one that is given
-    twice.
-    """
+    """The arguments of the scene on the command line; InputError for one that is given twice."""
     names = ("mu", "force", "degree", "simplices", "elements")
     changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     given = _arguments_of(options.set)

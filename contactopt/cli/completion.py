@@ -36,17 +36,8 @@ NAMES = {
 
 
 def script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """Write the completion script of a shell.
-
-    Parameters
-    ----------
-    parser : the parser of the command line; it is changed, and takes none but the known names
-        afterwards
-    shell : one of SHELLS
-
-    Returns
-    -------
-    str : the text of the script
+    """Write the completion script of a shell of SHELLS. The parser is changed: it takes none but
+    the known names afterwards.
     """
     import shtab
 

@@ -29,17 +29,17 @@ JOBS = "number of processes (default: one for each core)"
 COMMANDS = {
     "run": "solve a scene, and write its summary, its figures and its fields",
     "view": "turn the folder of a run into a page to explore, and open it",
-    "show": "describe a scene: a sketch, its sizes, its arguments, its source, and what is known"
-    " exactly",
-    "simplify": "say what may be left out of a scene, why it may be left out, and which error that"
-    " makes",
+    "show": "describe a scene: a sketch, its sizes, its"
+    " arguments, its source, and what is known exactly",
+    "simplify": "say what may be left out of a scene, why it"
+    " may be left out, and which error that makes",
     "new": "write an example of a scene file, to start from",
-    "bench": "compare methods: make all runs that an experiment file describes, and a report about"
-    " them",
+    "bench": "compare methods: make all runs that an experiment"
+    " file describes, and a report about them",
     "report": "make the reports of comparisons again from their tables, without solving anything",
     "list": "list everything that is chosen by its name: scenes, laws, methods, solvers, backends",
-    "completion": "print a script with which a shell completes commands, options and names of"
-    " scenes",
+    "completion": "print a script with which a shell completes"
+    " commands, options and names of scenes",
 }
 
 
@@ -52,8 +52,8 @@ def make_parser() -> argparse.ArgumentParser:
     """
     parser = argparse.ArgumentParser(
         "contactopt",
-        description="Computes contact and friction between elastic bodies, and certifies the"
-        " answer.",
+        description="Computes contact and friction between"
+        " elastic bodies, and certifies the answer.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -173,8 +173,8 @@ def _report(report: argparse.ArgumentParser) -> None:
         "names",
         nargs="*",
         metavar="NAME",
-        help="names of experiments (default: all), or folders that `contactopt bench` wrote; these"
-        " get their reports",
+        help="names of experiments (default: all), or folders that"
+        " `contactopt bench` wrote; these get their reports",
     )
     for name, folder, what in (
         ("--experiments", "experiments/campaigns", "the experiment files"),

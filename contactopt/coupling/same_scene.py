@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import FunctionType
 from typing import Any
 
@@ -58,4 +59,6 @@ def _differ(one: Any, other: Any) -> bool:
     if both(FunctionType) and one.__code__ is other.__code__:
         enclosed = [[cell.cell_contents for cell in f.__closure__ or ()] for f in (one, other)]
         return _differ(*enclosed)
+    if both(partial):
+        return _differ(*((f.func, f.args, tuple(f.keywords.items())) for f in (one, other)))
     return False

@@ -30,9 +30,7 @@ def loop(path: PathResult, ax: Any = None) -> Any:
 
 
 def energies(path: PathResult, ax: Any = None) -> Any:
-    """Work since the first state: what did not become elastic energy, friction work, error of the
-    steps.
-    """
+    """Work since the first state: lost, done by friction, and the error of the steps."""
     ax = make_axes(ax)
     since = {key: value - value[0] for key, value in path.history.items()}
     state = np.arange(1, len(path.states) + 1)

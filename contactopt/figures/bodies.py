@@ -22,19 +22,8 @@ PIXELS = 800  # of the longer side of the picture of solids, more than it takes 
 def deformed(
     scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None
 ) -> Any:
-    """Draw the deformed bodies coloured by von Mises stress, mirrored to the whole section (paper,
-    figures 1 and 2).
-
-    Parameters
-    ----------
-    scene : The scene.
-    problem : Its interface problem.
-    fields : Displacements and stresses of its bodies.
-    ax : Axes to draw on; by default new ones.
-
-    Returns
-    -------
-    The axes.
+    """Draw the deformed bodies, with these displacements and stresses, coloured by von Mises stress
+    and mirrored to the whole section (paper, figures 1 and 2).
     """
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     largest = max(float(np.abs(f.displacement).max()) for f in fields)
@@ -105,9 +94,7 @@ def _draw_section(
 
 
 def _placed_axes() -> tuple[Any, Any]:
-    """Axes of a new figure and those of its colour bar, at fixed places: working out places takes
-    as long as drawing.
-    """
+    """Axes and those of a colour bar at fixed places: a layout takes as long as drawing."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.8))
@@ -115,9 +102,7 @@ def _placed_axes() -> tuple[Any, Any]:
 
 
 def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
-    """How far from the centre to look at a small contact on large bodies; None: show the whole
-    bodies.
-    """
+    """How far from the centre to look at a small contact on large bodies; None: at all of them."""
     half_width = scene.reference.half_width if scene.reference else scene.zone
     large = half_width is not None and max(np.ptp(f.mesh.p[0]) for f in fields) > 16 * half_width
     return 4 * half_width if half_width is not None and large and scene.dim == 2 else None

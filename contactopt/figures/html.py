@@ -25,8 +25,8 @@ from contactopt.errors import InputError
 from contactopt.files.writing import whole_file
 
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline';"
-    " img-src data: blob:"
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval';"
+    " style-src 'unsafe-inline'; img-src data: blob:"
 )
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
 
@@ -49,9 +49,7 @@ def packed(array: Any) -> dict[str, Any]:
 
 
 def packed_short(array: np.ndarray) -> dict[str, Any]:
-    """Numbers for the data of a page, of two bytes each, which divide their range into 65535
-    steps.
-    """
+    """Numbers for the data of a page, of two bytes each: their range in 65535 steps."""
     low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
     step = (high - low) / SHORT if high > low else 1.0
     text = _text(np.rint((array - low) / step).astype("<u2"))
@@ -67,22 +65,10 @@ def write_html(
 ) -> Path:
     """Write a page that stands alone.
 
-    Parameters
-    ----------
-    file : Where to write it.
-    title : Of the page, plain text.
-    body : HTML between header and programs, with every name in it escaped.
-    data : What the programs read; anything that JSON can hold.
-    programs : Names of JavaScript files in contactopt/figures/pages, run in this order once plotly
-        is there.
-
-    Returns
-    -------
-    The file.
-
-    Raises
-    ------
-    InputError : If plotly is not installed, or the file cannot be written.
+    `body` is HTML with every name in it escaped, between the header with its title, plain text, and
+    the programs: JavaScript files in contactopt/figures/pages, run in this order once plotly is
+    there. They read `data`, which may be anything that JSON can hold. InputError if plotly is not
+    installed, or the file cannot be written.
     """
     check_installed()
     from plotly.offline import get_plotlyjs
@@ -109,16 +95,8 @@ def write_html(
 
 
 def filled(name: str, **texts: str) -> str:
-    """Fill a template of HTML.
-
-    Parameters
-    ----------
-    name : Of a file in contactopt/figures/pages.
-    texts : What stands there in place of $NAME: HTML, with every name in it escaped.
-
-    Returns
-    -------
-    The HTML.
+    """Fill a template of HTML in contactopt/figures/pages. In place of $NAME stands the HTML given
+    for NAME, with every name in it escaped.
     """
     return Template(_page_file(name)).substitute(texts)
 

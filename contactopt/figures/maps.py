@@ -15,9 +15,7 @@ COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels 
 
 
 def maps_figure(reduction: Reduction, solution: Solution) -> Any:
-    """Draw maps of pressure and gap, and where there is friction of traction, slip and stick, for a
-    scene with a half-space.
-    """
+    """Draw pressure, gap, and where there is friction traction, slip and stick, of half-spaces."""
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 

@@ -35,14 +35,7 @@ RUN_FILES = (
 
 
 def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
-    """Draw the figures of a result: bodies, pressure and traction of every pair, maps, load path.
-
-    Parameters
-    ----------
-    result : The solved scene.
-    folder : Where the files go.
-    formats : Endings of the files, each figure in every one of them.
-    """
+    """Draw bodies, the surfaces of every pair, maps and load path into files of every format."""
     from contactopt.figures import plots
 
     def save(figure: Any, name: str) -> None:
@@ -69,14 +62,9 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
 
 
 def write(result: Outcome, folder: Path, states: bool) -> None:
-    """Write the fields of a result as VTU files, its contact forces and its load path as arrays.
-
-    Parameters
-    ----------
-    result : The solved scene.
-    folder : Where the files go.
-    states : Whether to write the bodies at all states of the path, too, for a page on which they
-        move.
+    """Write the fields of a result as VTU files, its contact forces and its load path as arrays,
+    into a folder. With `states` also the bodies at all states of the path, for a page on which they
+    move.
     """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
@@ -126,19 +114,11 @@ def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
 
 
 def earlier_files(folder: Path) -> set[str]:
-    """List the files that an earlier `contactopt run` wrote into a folder.
+    """Name the files that an earlier `contactopt run` wrote into a folder; none where none has run.
 
     A folder in which one has run holds its summary.json. Its other files have fixed names, but for
     a VTU file per body and per pair of surfaces, told from other people's by the fields in them,
     and pictures of the pairs that the summary names.
-
-    Parameters
-    ----------
-    folder : The folder.
-
-    Returns
-    -------
-    Names of files; empty where none has run.
     """
     with suppress(OSError, ValueError, TypeError):
         summary = json.loads(_plain_text(folder / "summary.json"))

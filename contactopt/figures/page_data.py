@@ -117,8 +117,8 @@ def _near_contact(contact: np.ndarray, box: np.ndarray) -> np.ndarray:
 def _body_values(
     name: str, mesh: Any, dim: int, moving: dict[str, np.ndarray] | None
 ) -> dict[str, np.ndarray]:
-    """Displacement `move` (s, n, dim), von Mises stress (s, n) and stresses (1, n) of a body, at
-    the last or at all s states.
+    """`move` (s, n, dim), von_mises (s, n) and stresses (1, n) of a body, at the last or all
+    states.
     """
     data = mesh.point_data
     values = {key: data[key][None] for key in data if key.startswith(("von_mises", "stress_"))}
@@ -176,9 +176,7 @@ def _apart(
 def _motion(
     bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
 ) -> np.ndarray:
-    """Displacements (s, k, dim) of places (k, 3): those of the nearest node of a body, none without
-    bodies.
-    """
+    """Displacements (s, k, dim) of places (k, 3), from the nearest node; none without bodies."""
     if not bodies:
         return np.zeros((1, len(points), dim))
     nearest = KDTree(np.concatenate([mesh.points for mesh in bodies.values()])).query(points)[1]
@@ -222,9 +220,7 @@ def _last_state(mesh: Any, interface: dict[str, np.ndarray], own: slice) -> dict
 
 
 def _contact_states(path: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
-    """As _last_state, for the n states of a load path (n, k); the slip is that since the state
-    before.
-    """
+    """As _last_state, of n states (n, k); the slip is that since the state before."""
     areas, r, u = path["areas"][own], path["reactions"][:, own], path["displacements"][:, own]
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
     vector = np.einsum("kad,ska->skd", path["frames"][own], r) * share[:, None]

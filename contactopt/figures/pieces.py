@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactopt.meshes.cells import mirrored
+
 # nodes of the faces of a solid element, each face numbered as a plane element, seen from outside
 FACES = {
     "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
@@ -52,13 +54,6 @@ EDGES = {
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "quad9": ((0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0)),
 }
-# the same plane elements numbered the other way round
-TURNED = {
-    "triangle": (0, 2, 1),
-    "triangle6": (0, 2, 1, 5, 4, 3),
-    "quad": (0, 3, 2, 1),
-    "quad9": (0, 3, 2, 1, 7, 6, 5, 4, 8),
-}
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}
 
 
@@ -75,14 +70,12 @@ def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, n
     corners = points[faces[:, : CORNERS[plane]]]
     outward = corners.mean(axis=1) - points[owners].mean(axis=1)
     inside_out = np.sum(_normals(corners) * outward, axis=1) < 0
-    faces[inside_out] = faces[inside_out][:, TURNED[plane]]
+    faces[inside_out] = mirrored(plane, faces[inside_out].T).T
     return plane, faces
 
 
 def solids(kind: str, elements: np.ndarray) -> np.ndarray:
-    """Solid elements as tetrahedra (m, 4) or hexahedra (m, 8) with straight edges; (0, 4) for plane
-    ones.
-    """
+    """Solid elements as straight tetrahedra (m, 4) or hexahedra (m, 8); none of plane elements."""
     if kind not in SOLIDS:
         return np.zeros((0, 4), dtype=int)
     return np.concatenate([elements[:, list(part)] for part in SOLIDS[kind]])

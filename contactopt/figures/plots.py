@@ -52,41 +52,31 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
 
 
 def contact_place(problem: InterfaceProblem) -> np.ndarray:
-    """Places (k,) along the first direction of the surface [length]; of a closed line from its
-    origin either way.
-    """
+    """Places (k,) along the surface [length]; of a closed line from its origin either way."""
     x, period = problem.chart.places[0], problem.chart.period
     return x if period is None else np.asarray((x + period / 2) % period - period / 2)
 
 
 def _in_rows(problem: InterfaceProblem) -> bool:
-    """Whether a row of contacts crosses the surface, so that values can be drawn along it; always
-    in 2D.
-    """
+    """Whether a row of contacts crosses the surface, along which to draw values; always in 2D."""
     return problem.dim == 2 or len(contact_line(problem)) >= max(3.0, np.sqrt(problem.contacts) / 3)
 
 
 def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
-    """What the places along the contact line are, a coordinate where the line follows an axis and
-    otherwise arc length, and where the line is.
-    """
+    """What the places along the contact line are, a coordinate or arc length, and where it is."""
     if problem.dim == 3:
         return "x", ", y = 0"
     return scene.components[0] if _straight(problem) else "arc length s", ""
 
 
 def _straight(problem: InterfaceProblem) -> bool:
-    """Whether the contact line follows the first coordinate; true of every surface in 3D, which has
-    its own figures.
-    """
+    """Whether the contact line follows the first coordinate; true of every surface in 3D."""
     extent = np.ptp(problem.coordinates, axis=1)
     return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= STRAIGHT * extent[0])
 
 
 def _singular(scene: Scene) -> bool:
-    """Whether tractions are known to be infinite somewhere, so that the largest nodal value means
-    nothing.
-    """
+    """Whether tractions are known to be infinite somewhere: the largest at a node means nothing."""
     return scene.reference is not None and scene.reference.peak is None
 
 
@@ -128,9 +118,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
 def _about_origin(
     problem: InterfaceProblem, solution: Solution, place: np.ndarray, half_width: float
 ) -> bool:
-    """Whether the contacts that touch are one zone about the origin, of which the half-width is the
-    measure.
-    """
+    """Whether the contacts that touch are one zone about the origin, measured by the half-width."""
     touching = contact_status(problem, solution.reactions).touching
     if half_width <= 0 or not touching.any():
         return False
@@ -143,9 +131,7 @@ def _about_origin(
 
 
 def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Tangential traction against position with the friction bound; sticking and slipping nodes
-    marked.
-    """
+    """Tangential traction against position with the friction bound; stick and slip are marked."""
     ax, (length, stress) = make_axes(ax), scene.units
     if not _in_rows(problem):
         values = np.linalg.norm(solution.reactions[:, 1:], axis=1) / problem.areas
@@ -194,9 +180,7 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
 
 
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction
-    as arrows.
-    """
+    """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows."""
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
@@ -219,19 +203,11 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Draw pressure above tangential traction, with the map of stick and slip in 3D.
+    """Draw pressure above tangential traction of one pair of surfaces, with the map of stick and
+    slip in 3D.
 
     One panel stands above the other, so that all of them can be read where the figure is 400 pixels
     wide.
-
-    Parameters
-    ----------
-    scene : The scene.
-    problem, solution : The interface problem of one pair of surfaces, and its solution.
-
-    Returns
-    -------
-    The figure of matplotlib.
     """
     from matplotlib.figure import Figure
 
@@ -262,18 +238,7 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
-    """Draw what the model leaves of the data, over the standard deviation of the noise, state by
-    state.
-
-    Parameters
-    ----------
-    found : The parameters that were fitted.
-    ax : Axes to draw on; by default new ones.
-
-    Returns
-    -------
-    The axes.
-    """
+    """Draw what the model leaves of the data, over the standard deviation of the noise."""
     ax = make_axes(ax)
     for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
         rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
@@ -287,17 +252,7 @@ def fit(found: Fit, ax: Any = None) -> Any:
 
 
 def design(found: Design, ax: Any = None) -> Any:
-    """Draw the pressure of the designed contact over the place along the surface, and its mean.
-
-    Parameters
-    ----------
-    found : The design.
-    ax : Axes to draw on; by default new ones.
-
-    Returns
-    -------
-    The axes.
-    """
+    """Draw the pressure of the designed contact over the place along the surface, and its mean."""
     ax = make_axes(ax)
     scene, problem = found.reduction.scene, found.reduction.problem
     place = problem.chart.places[0]

@@ -25,20 +25,8 @@ MARKS = "#*o+x%@&"
 
 
 def describe(name: str, changes: dict[str, Any]) -> str:
-    """Write the sheet of a named scene, or of a scene file.
-
-    Parameters
-    ----------
-    name : A key of contactopt.scenes.SCENES, or a file that ends in .toml.
-    changes : Other values of the arguments of a named scene.
-
-    Returns
-    -------
-    The text.
-
-    Raises
-    ------
-    InputError : For an unknown scene or argument, and for a scene file with a mistake.
+    """Write the sheet of a named scene, with other values of its arguments, or of a scene file.
+    InputError for an unknown scene or argument, and for a scene file with a mistake.
     """
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file
@@ -142,9 +130,7 @@ def _load(load: Any) -> str:
 
 
 def sketch(meshes: list[Any]) -> list[str]:
-    """Lines of characters, one mark per body, where its elements lie; of solids the section across
-    the second axis.
-    """
+    """Lines of characters, one mark per body; of solids the section across the second axis."""
     axes = [0, -1]
     low, high = _window([mesh.p[axes] for mesh in meshes])
     size = np.maximum(high - low, 1e-300)
@@ -167,9 +153,7 @@ def sketch(meshes: list[Any]) -> list[str]:
 
 
 def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest coordinates (2,) of the picture: of all bodies, or about one that would be
-    lost among larger ones.
-    """
+    """Least and largest coordinates (2,) of the picture: of all bodies, or about a small one."""
     ends = np.array([[x.min(axis=1), x.max(axis=1)] for x in places])  # (bodies, 2, 2)
     low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
     extent = (ends[:, 1] - ends[:, 0]).max(axis=1)

@@ -97,9 +97,7 @@ def nearest(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 def _pixels(
     corners: np.ndarray, shape: tuple[int, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangle, row and column of all pixels whose middles lie in triangles (m, 3, 2), row by row
-    of each triangle.
-    """
+    """Triangle, row and column of all pixels whose middles lie in triangles (m, 3, 2)."""
     first = np.maximum(np.ceil(corners[..., 1].min(axis=1) - 0.5 - EDGE).astype(int), 0)
     last = np.minimum(np.floor(corners[..., 1].max(axis=1) - 0.5 + EDGE).astype(int), shape[0] - 1)
     triangle, row = _ranges(first, last)
@@ -121,18 +119,14 @@ def _pixels(
 
 
 def _ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The whole numbers from first to last, for each pair of them, and before them the number of
-    the pair.
-    """
+    """The whole numbers from first to last of each pair, and before them the number of the pair."""
     count = np.maximum(last - first + 1, 0)
     pair = np.repeat(np.arange(len(first)), count)
     return pair, first[pair] + np.arange(len(pair)) - (np.cumsum(count) - count)[pair]
 
 
 def _shares(corners: np.ndarray, own: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (p, 3) of the places (x, y) in the triangles `own` (p,) of (m, 3, 2),
-    each place in one of them.
-    """
+    """Barycentric coordinates (p, 3) of places (x, y) in the triangles `own` (p,) of (m, 3, 2)."""
     after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
     normals = np.stack([after[..., 1] - before[..., 1], before[..., 0] - after[..., 0]])
     with np.errstate(all="ignore"):  # triangles seen from the side own no pixel

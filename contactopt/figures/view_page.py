@@ -35,21 +35,11 @@ WORDS = {
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
-    """Write the page of a run.
+    """Write the page of a run to a file that ends in .html.
 
-    Parameters
-    ----------
-    folder : what `contactopt run` wrote: summary.json, interface.npz, VTU files, and path.npz with
-        history.csv of a load path
-    file : where to write the page, ends in .html
-
-    Returns
-    -------
-    Path : of the page
-
-    Raises
-    ------
-    InputError : if plotly is not installed, or if the folder is not that of a run
+    The folder holds what `contactopt run` wrote: summary.json, interface.npz, VTU files, and
+    path.npz with history.csv of a load path. InputError if plotly is not installed, or if the
+    folder is not that of a run.
     """
     check_installed()
     folder = Path(folder)
@@ -79,8 +69,8 @@ def certificate_words(summary: dict[str, Any]) -> str:
     residual = summary["residual"]
     if summary["status"] == "infeasible":
         return (
-            "No forces solve this problem: a proof of that was found. What is shown is the last"
-            " iterate."
+            "No forces solve this problem: a proof of that"
+            " was found. What is shown is the last iterate."
         )
     size = "" if residual is None or not np.isfinite(residual) else f"{residual:.1e}"
     said = (

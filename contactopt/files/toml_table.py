@@ -48,16 +48,8 @@ class Table:
         self.known: list[str] = []
 
     def fail(self, message: str, *below: str | int) -> InputError:
-        """Make the error to raise about this table, or about an entry of it.
-
-        Parameters
-        ----------
-        message : one sentence
-        below : keys and numbers that lead from this table to the entry
-
-        Returns
-        -------
-        InputError : the sentence after the name of the file and the line
+        """Make the error to raise about this table, or about the entry `below` it, to which keys
+        and numbers lead. It names the file and the line before the message.
         """
         place: Place = (*self.place, *below)
         while place and place not in self.lines:
@@ -67,16 +59,7 @@ class Table:
 
     @contextmanager
     def about(self, *below: str | int) -> Iterator[None]:
-        """Errors raised in this block are about this table, or about an entry of it.
-
-        Parameters
-        ----------
-        below : as for fail()
-
-        Yields
-        ------
-        None
-        """
+        """Within this block errors are about this table, or about an entry of it, as for fail()."""
         try:
             yield
         except InputError as error:
@@ -85,16 +68,7 @@ class Table:
             raise self.fail(str(error), *below) from error
 
     def has(self, key: str) -> bool:
-        """Say whether an entry is there, which close() takes as known from now on.
-
-        Parameters
-        ----------
-        key : name of the entry
-
-        Returns
-        -------
-        bool
-        """
+        """Say whether an entry is there, which close() takes as known from now on."""
         self.known.append(key)
         return key in self.data
 
@@ -107,18 +81,10 @@ class Table:
         what: str = "",
         **limits: Any,
     ) -> Any:
-        """Take an entry, which must be of one type.
+        """Take an entry, which must be of a type of KINDS.
 
-        Parameters
-        ----------
-        key, kind : the name of the entry, and a type of KINDS
-        default, needed : what is returned where there is no entry, or whether that is an error
-        what : how a message names the type, if not in the words of KINDS
-        limits : of a number, as for contactopt.checks.check_number
-
-        Returns
-        -------
-        The value.
+        Where there is none, `default` is returned, or that is an error if it is `needed`. A message
+        calls the type `what`. The limits of a number are those of contactopt.checks.check_number.
         """
         types, usual = KINDS[kind]
         what = what or usual
@@ -135,17 +101,8 @@ class Table:
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:
-        """Take an array of finite numbers, which must be there.
-
-        Parameters
-        ----------
-        key : name of the entry
-        count : how many numbers, or None for any
-        what : how a message names them
-
-        Returns
-        -------
-        list of float
+        """Take an array of finite numbers, which must be there; `count` of them, unless it is None.
+        A message calls them `what`.
         """
         values = self.take(key, list, needed=True, what=what)
         if count is not None and len(values) != count:
@@ -156,30 +113,12 @@ class Table:
         return values
 
     def table(self, key: str) -> Any:
-        """Take the table below an entry.
-
-        Parameters
-        ----------
-        key : name of the entry
-
-        Returns
-        -------
-        Table : None if there is no such entry
-        """
+        """Take the table below an entry; None if there is no such entry."""
         data = self.take(key, dict)
         return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
 
     def tables(self, key: str) -> list[Table]:
-        """Take an array of tables, none if it is not there.
-
-        Parameters
-        ----------
-        key : name of the entry
-
-        Returns
-        -------
-        list of Table
-        """
+        """Take an array of tables, none if it is not there."""
         found = self.take(key, list, [], what="an array of tables, [{ name = value, ... }, ...]")
         for i, data in enumerate(found):
             if not isinstance(data, dict):
@@ -201,28 +140,18 @@ class Table:
 
 
 def read_table(path: Path, what: str = "scene file") -> Table:
-    """Read the whole of a TOML file.
+    """Read the whole of a TOML file; every entry of the table knows its line.
 
-    Parameters
-    ----------
-    path : the file
-    what : what it is, in the words of a message
-
-    Returns
-    -------
-    Table : every entry knows its line
-
-    Raises
-    ------
-    InputError : if there is no such file, if it is too long, or, with the line, if it is not TOML
+    InputError, which calls the file `what`, if there is none, if it is too long, or, with the line,
+    if it is not TOML.
     """
     if not os.path.isfile(path):  # unlike Path.is_file, it answers for names that no file can have
         why = "does not exist" if not os.path.exists(path) else "is no file that can be read"
         raise InputError(f"{what} '{path}' {'is a folder' if os.path.isdir(path) else why}.")
     if path.stat().st_size > MOST_BYTES:
         raise InputError(
-            f"{what} '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their"
-            " own."
+            f"{what} '{path}' has more than {MOST_BYTES}"
+            " bytes; meshes belong into files of their own."
         )
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")

@@ -27,16 +27,7 @@ FRESH = 1.0  # s for which nobody takes a folder without a lock for one that was
 
 
 def check_folder(out: Path) -> None:
-    """Check that files can be put into a folder, which may not exist yet. Nothing is left behind.
-
-    Parameters
-    ----------
-    out : the folder
-
-    Raises
-    ------
-    InputError : if the folder cannot be made or written to
-    """
+    """Raise InputError unless files can be put into a folder, which may not exist yet."""
     existing = out
     try:
         while not existing.exists() and existing != existing.parent:
@@ -54,20 +45,9 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     """Give an empty folder to write files into, which move to the folder `out` together when the
     block ends without an error.
 
-    After an error `out` holds what it held before, and a folder that was made for it is gone.
-
-    Parameters
-    ----------
-    out : where the files shall be in the end; it is made if it does not exist
-    stale : names of files that are removed from `out` unless the block wrote them anew
-
-    Yields
-    ------
-    Path : of the empty folder, inside `out`
-
-    Raises
-    ------
-    InputError : where the operating system refuses to write
+    After an error `out` holds what it held before, and a folder that was made for it is gone. Files
+    named in `stale` are removed from `out` unless the block wrote them anew. InputError where the
+    operating system refuses to write.
     """
     out = Path(out)
     made: list[Path] = []
@@ -90,18 +70,7 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Give a path to write one file to, which replaces `path` when the block ends without an error.
-
-    Parameters
-    ----------
-    path : where the file shall be in the end
-
-    Yields
-    ------
-    Path : to write to, with the same name, from whose ending many writers take their format
-
-    Raises
-    ------
-    InputError : where the operating system refuses to write
+    It has the same name, from whose ending many writers take their format.
     """
     path = Path(path)
     with whole_folder(path.parent) as staging:
@@ -109,15 +78,11 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Replace a file by one that `write` wrote beside it.
+    """Replace a file by one that the function `write` writes to the path it is given, of the same
+    name.
 
-    An error of writing goes on, and nothing is left behind. A symbolic link is replaced, not
-    followed.
-
-    Parameters
-    ----------
-    path : where the file shall be in the end; its folder is made if it does not exist
-    write : a function of a path that writes the file there; the path has the name of `path`
+    The folder is made if it does not exist. An error of writing goes on, and nothing is left
+    behind. A symbolic link is replaced, not followed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with _staging(path.parent) as staging:
@@ -177,18 +142,11 @@ def _make_folder(folder: Path) -> list[Path]:
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:
-    """Remove the files of these names from a folder. All other files stay.
+    """Remove the files of these names from a folder. InputError on a name that could lead to
+    another one.
 
-    A symbolic link is removed itself, and what it leads to stays. Names of files that do not exist
-    are passed over.
-
-    Parameters
-    ----------
-    folder, names : the folder, and the names of the files
-
-    Raises
-    ------
-    InputError : on a name that could lead to another folder
+    A symbolic link is removed itself, and what it leads to stays. Files that do not exist are
+    passed over.
     """
     for name in names:
         check_name("the file", name)
@@ -198,15 +156,9 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def broken_pipe_is_an_error() -> Iterator[None]:
-    """Let writing to a dead process raise an exception, as Python has it, also where a library
-    changed that.
-
-    Gmsh, for one, sets the signal of a broken pipe back to its default, which ends the whole
+    """Within this block writing to a dead process raises BrokenPipeError, as Python has it, also
+    where a library changed that. Gmsh, for one, lets the signal of a broken pipe end the whole
     process without a word.
-
-    Returns
-    -------
-    Within it, a broken pipe raises BrokenPipeError.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield

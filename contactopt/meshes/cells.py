@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import skfem
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 SHAPES = {
     "RefTri": (skfem.MeshTri, {1: skfem.ElementTriP1, 2: skfem.ElementTriP2}),
@@ -32,29 +34,13 @@ MIRRORED = {
 
 
 def is_curved(mesh: skfem.Mesh) -> bool:
-    """Say whether a mesh has nodes of its own on edges, which may lie off the straight line.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-
-    Returns
-    -------
-    False for meshes whose nodes are their vertices.
-    """
+    """Say whether a mesh has nodes of its own on edges, which may lie off the straight line."""
     return int(mesh.p.shape[1]) != int(mesh.nvertices)
 
 
 def straight(mesh: skfem.Mesh) -> skfem.Mesh:
-    """Make the mesh of the same vertices with straight edges. Boundaries keep their names.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-
-    Returns
-    -------
-    The mesh itself if it is straight.
+    """Make the mesh of the same vertices with straight edges; the mesh itself if it is straight.
+    Boundaries keep their names.
     """
     if not is_curved(mesh):
         return mesh
@@ -64,16 +50,9 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
 
 
 def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
-    """Make the mesh of second order; boundaries keep their names.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-    places : (dim, n) positions of all nodes of a quadratic displacement, vertices first [length].
-
-    Returns
-    -------
-    The mesh itself if it is curved.
+    """Make the mesh of second order from the places (dim, n) of all nodes of a quadratic
+    displacement, vertices first [length]; the mesh itself if it is curved. Boundaries keep their
+    names.
     """
     if is_curved(mesh):
         return mesh
@@ -82,17 +61,10 @@ def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
 
 
 def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
-    """List the elements of a mesh with their nodes in the order of VTK.
+    """List the elements of a mesh of first or second order: their name, a value of CELLS, and their
+    nodes (e, v) in the order of VTK.
 
     scikit-fem sorts the corners of simplices; here they are numbered so that volumes are positive.
-
-    Parameters
-    ----------
-    mesh : A mesh of first or second order.
-
-    Returns
-    -------
-    The name of the elements, a value of CELLS, and their nodes (e, v).
     """
     from skfem.io.meshio import HEX_MAPPING
 
@@ -113,26 +85,14 @@ def mirrored(kind: str, nodes: np.ndarray) -> np.ndarray:
 
 
 def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
-    """Find all nodes of a mesh on some of its facets, those within edges and faces included.
-
-    Parameters
-    ----------
-    mesh : A mesh of first or second order.
-    facets : (f,) numbers of facets.
-
-    Returns
-    -------
-    (n,) numbers of nodes, without repetition.
-    """
+    """Number all nodes (n,) on facets (f,), each once, those within edges and faces included."""
     if not is_curved(mesh):
         return np.unique(mesh.facets[:, facets])
     return np.unique(mesh.dofs.get_facet_dofs(facets).flatten())
 
 
 def volumes(mesh: skfem.Mesh) -> np.ndarray:
-    """Ratios (e, n + 1) of volumes between elements and their reference, with their signs, at the n
-    nodes of each element and at its centre.
-    """
+    """Signed volumes (e, n + 1) over those of the reference, at n nodes and the centre of cells."""
     places = np.asarray(mesh.elem().doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
     return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
@@ -153,16 +113,7 @@ def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 
 def area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Compute area times normal of facets; normals are on the right of edges.
-
-    Parameters
-    ----------
-    corners : (dim, c, f) corners of the facets in their order [length].
-
-    Returns
-    -------
-    (dim, f) vectors [length^2].
-    """
+    """Area times normal (dim, f) of facets (dim, c, f) [length^2]; normals are right of edges."""
     if len(corners) == 2:
         x, y = corners[:, 1] - corners[:, 0]
         return np.stack([y, -x])
@@ -170,3 +121,9 @@ def area_vectors(corners: np.ndarray) -> np.ndarray:
     if corners.shape[1] == 3:
         first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return np.asarray(np.cross(first, second, axis=0) / 2)
+
+
+def joined(pairs: np.ndarray, count: int) -> np.ndarray:
+    """(count,) the number of the piece that each belongs to when pairs (2, m) are joined."""
+    graph = coo_matrix((np.ones(pairs.shape[1]), tuple(pairs)), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])

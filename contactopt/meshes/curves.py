@@ -76,9 +76,7 @@ def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]
 
 
 def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Edges (2, e) of the outline, places of nodes, the facet of each edge, and whether any is
-    curved.
-    """
+    """Edges (2, e) of the outline, places of nodes, facets of edges, whether any edge is curved."""
     ends = mesh.facets[:, facets]
     if not is_curved(mesh):
         return ends, mesh.p, facets, False
@@ -133,9 +131,7 @@ def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
-    """Curvatures (2, n) at both ends of the edges of a chain of nodes (2, n + 1), positive to the
-    left.
-    """
+    """Curvatures (2, n), positive to the left, at the ends of the edges of a chain (2, n + 1)."""
     closed = x.shape[1] > 3 and np.array_equal(x[:, 0], x[:, -1])
     turn, length = _turns(x, closed)
     corner = _corners(turn, length)

@@ -62,17 +62,8 @@ def _on_ring(
 
 
 def extrude(p: np.ndarray, t: np.ndarray, z: np.ndarray) -> MeshHex:
-    """Stack bricks over a plane mesh.
-
-    Parameters
-    ----------
-    p : (2, n) plane nodes [length].
-    t : (4, m) numbers of the nodes of each quadrilateral.
-    z : (j,) heights of the layers of nodes, ascending [length].
-
-    Returns
-    -------
-    The mesh of (j - 1) m bricks.
+    """Stack (j - 1) m bricks over a plane mesh of nodes (2, n) and quadrilaterals (4, m), with
+    layers of nodes at the ascending heights z (j,) [length].
     """
     n, levels = p.shape[1], len(z)
     points = np.concatenate([np.tile(p, levels), np.repeat(z, n)[None]])

@@ -22,11 +22,10 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from contactopt.meshes.cells import area_vectors, is_curved, outer_corners
+from contactopt.meshes.cells import area_vectors, is_curved, joined, outer_corners
 from contactopt.meshes.curves import CORNER, STRAIGHT, fitted_sphere, rounding, shares
 from contactopt.meshes.given_curves import Curve
 
@@ -85,7 +84,7 @@ class _Skin:
             rim = ~smooth & flat[pairs[there]]
             self.planes[:, sides[here, rim], pairs[here, rim]] = self.normals[:, pairs[there, rim]]
         inner = smooth & ~flat[pairs[0]] & ~flat[pairs[1]]
-        self.region = np.where(flat, -1, _components(pairs[:, inner], len(flat)))
+        self.region = np.where(flat, -1, joined(pairs[:, inner], len(flat)))
         self.region[~flat] = np.unique(self.region[~flat], return_inverse=True)[1]
         self.shapes = [self._shape(region) for region in range(self.region.max(initial=-1) + 1)]
         free = np.array([shape is None for shape in self.shapes] + [False])[self.region]
@@ -105,7 +104,7 @@ class _Skin:
         count = len(self.owner)
         height = np.sum(self.off * self.normals[:, None], axis=0)
         straight = np.all(np.abs(height) < 2 * self.near, axis=0)
-        piece = _components(pairs[:, smooth], count)
+        piece = joined(pairs[:, smooth], count)
         bent = np.zeros(count, dtype=bool)
         bent[piece[pairs[0, smooth & ~level]]] = True
         bent[piece[~straight]] = True
@@ -178,12 +177,6 @@ def _neighbours(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     same = np.all(ends[:, order[1:]] == ends[:, order[:-1]], axis=0)
     first, second = order[:-1][same], order[1:][same]
     return np.stack([first, second]) % count, np.stack([first, second]) // count
-
-
-def _components(pairs: np.ndarray, count: int) -> np.ndarray:
-    """(count,) the number of the piece that each belongs to when pairs (2, m) are joined."""
-    graph = coo_matrix((np.ones(pairs.shape[1]), tuple(pairs)), (count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _vertex_normals(

@@ -39,8 +39,8 @@ class Curve:
             raise InputError(f"{self.name} failed: {type(error).__name__}: {error}.") from error
         if found.shape != np.shape(points):
             raise InputError(
-                f"{self.name} must return an array of the shape of its points, {np.shape(points)};"
-                f" got {found.shape}."
+                f"{self.name} must return an array of the shape of"
+                f" its points, {np.shape(points)}; got {found.shape}."
             )
         lost = np.flatnonzero(~np.isfinite(found).all(axis=0))
         if len(lost):
@@ -50,13 +50,8 @@ class Curve:
 
 
 def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
-    """Check that the nodes of a boundary lie on its curve.
-
-    Parameters
-    ----------
-    curve, mesh, boundary : The curve of a boundary, a scikit-fem mesh, and the boundary's name.
-        InputError where the nodes of many facets are further from the curve than OFF of the facet,
-        or those of one than FAR.
+    """Raise InputError unless the nodes of a boundary lie on its curve: where those of many facets
+    are further from it than OFF of the facet, or those of one than FAR.
     """
     corners = mesh.facets[:, mesh.boundaries[boundary]]
     places = mesh.p[:, corners]

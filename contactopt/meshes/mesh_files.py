@@ -49,13 +49,9 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     Returns
     -------
     Triangles, quadrilaterals, tetrahedra or hexahedra, curved where the file holds elements of
-    second order. Its boundaries are the groups of facets on its surface, and the groups of nodes
-    that hold all corners of such facets.
-
-    Raises
-    ------
-    InputError : If the file cannot be read, if there is no such group, or if the mesh has a fault
-        that cannot be repaired.
+        second order. Its boundaries are the groups of facets on its surface, and the groups of
+        nodes that hold all corners of such facets. InputError if the file cannot be read, if there
+        is no such group, or if the mesh has a fault that cannot be repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
     path = Path(path)
@@ -88,17 +84,11 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
 def name_boundaries(
     mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[float, float]]]
 ) -> skfem.Mesh:
-    """Add boundaries to a mesh that are named by where they are.
+    """Add boundaries to a mesh, named by where they are: name -> {axis: (least, largest
+    coordinate)}.
 
-    Parameters
-    ----------
-    mesh : Any mesh.
-    places : Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners
-        all lie within these limits, to a millionth of the size of the body.
-
-    Returns
-    -------
-    The mesh with these boundaries beside its own. InputError if no facet lies there.
+    They are the facets of the surface whose corners all lie within these limits, to a millionth of
+    the size of the body. InputError if no facet lies there.
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:, mesh.facets[:, facets]]
@@ -131,8 +121,8 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
     lost = cells[~np.all(np.abs(points[cells]) < FAR, axis=1)]
     if len(lost):
         raise InputError(
-            f"mesh file '{path}': the coordinates of node {lost[0] + 1} are no numbers below"
-            f" {FAR:g}."
+            f"mesh file '{path}': the coordinates of node"
+            f" {lost[0] + 1} are no numbers below {FAR:g}."
         )
     if dim == points.shape[1]:
         return dim, points.T
@@ -198,8 +188,8 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
     if len(both):
         raise cells.refused(
             int(np.argmax(np.any(cells.nodes == both[0], axis=0))),
-            "a node of {} is a corner of one element and within an edge of another; mesh this place"
-            " anew.",
+            "a node of {} is a corner of one element and"
+            " within an edge of another; mesh this place anew.",
         )
     kept = np.concatenate([corners, inner])
     number = np.full(cells.points.shape[1], -1)

@@ -113,8 +113,8 @@ def _read(path: Path) -> Any:
     size = path.stat().st_size
     if not 0 < size < MOST_BYTES:
         raise InputError(
-            f"mesh file '{path}' has {size} bytes; a mesh that can be solved has 1 to"
-            f" {MOST_BYTES:.0e}."
+            f"mesh file '{path}' has {size} bytes; a mesh"
+            f" that can be solved has 1 to {MOST_BYTES:.0e}."
         )
     endings = ["".join(path.suffixes[-n:]).lower() for n in range(len(path.suffixes), 0, -1)]
     formats = [name for ending in endings for name in meshio.extension_to_filetypes.get(ending, ())]
@@ -141,16 +141,14 @@ def _read(path: Path) -> Any:
 
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """The format and the reader of each attempt; what an attempt without a format says of a damaged
-    file does not count.
-    """
+    """Format and reader of each attempt. Of one without a format no failure is told."""
     import meshio
 
     stated, binary = version(path) if "gmsh" in formats else (None, False)
     if stated is not None and stated.partition(".")[0] not in ("2", "4"):
         raise InputError(
-            f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or"
-            " 2.2."
+            f"mesh file '{path}' is of version {stated} of"
+            " Gmsh's format; save it in version 4.1 or 2.2."
         )
     if binary:  # meshio trusts the counts of damaged files
         newer = stated != "4.0"

@@ -9,8 +9,7 @@ that the mesh stands for, which `boundary_curves` finds.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -33,21 +32,20 @@ Function = Callable[[np.ndarray], np.ndarray]
 Curves = Mapping[str, Function | None]  # by the name of the boundary; None where it is flat
 
 
+# scikit-fem says of large arrays that it copies them; no user can do anything about it
+logging.getLogger("skfem.mesh.mesh").addFilter(
+    lambda record: "C_CONTIGUOUS" not in record.getMessage()
+)
+
+
 class TooSmall(InputError):
     """All marked elements are so small that their halves would have no volume for rounding."""
 
 
 def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
-    """Find the line or surface that each boundary of a mesh stands for.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh in the plane or in space.
-    arcs : Whether only arcs, spheres and cylinders count as curved, if the mesh has straight edges.
-
-    Returns
-    -------
-    By the name of the boundary, '' for what has no name, its curve, or None where it is flat.
+    """Find the line or surface that each boundary of a mesh stands for, by its name, '' for what
+    has none; None where it is flat. With `arcs`, only arcs, spheres and cylinders count as curved,
+    if the mesh has straight edges.
     """
     return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
 
@@ -55,20 +53,15 @@ def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
 def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     """Divide the marked elements of a mesh, and others as far as it takes to stay conforming.
 
-    Elements that are as small as rounding allows stay whole. A new node stays on its edge where it
-    would turn an element inside out on the curve.
+    Elements that are as small as rounding allows stay whole; TooSmall if all marked ones are. A new
+    node stays on its edge where it would turn an element inside out on the curve.
 
     Parameters
     ----------
-    mesh : A mesh of straight triangles or tetrahedra, with named boundaries.
+    mesh : A mesh of straight triangles or tetrahedra, with named boundaries, which are kept.
     marked : Numbers of the elements to divide.
     curves : For the names of curved boundaries, and '' for what has no name, a function (dim, k) ->
         (dim, k) that puts new nodes on the true surface.
-
-    Returns
-    -------
-    A mesh of the same kind with the same named boundaries. TooSmall if none of the marked elements
-    can be divided.
     """
     marked = np.asarray(marked)
     corners = mesh.p[:, mesh.t[:, marked]]
@@ -78,23 +71,18 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     if len(marked) and not large.any():
         place = ", ".join(f"{x:.6g}" for x in corners[:, :, 0].mean(axis=1))
         raise TooSmall(
-            f"the elements near ({place}) cannot be divided further: they are as small as rounding"
-            " allows."
+            f"the elements near ({place}) cannot be divided"
+            " further: they are as small as rounding allows."
         )
     return _refined(mesh, marked[large], curves)
 
 
 def split(mesh: Any, curves: Curves) -> Any:
-    """Halve all elements of a mesh, with new nodes of curved boundaries on their curves.
+    """Halve all elements of a mesh, with new nodes of curved boundaries on their curves, as for
+    `divide`.
 
-    Parameters
-    ----------
-    mesh, curves : Any scikit-fem mesh and the curves of its boundaries, as for `divide`.
-
-    Returns
-    -------
-    A mesh of the same kind and order of half the element size, with the same named boundaries. Of
-    second order, its nodes on edges and faces have become corners.
+    Order and named boundaries stay. Of second order, its nodes on edges and faces have become
+    corners.
     """
     fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
     return bent(fine, curves) if is_curved(mesh) else fine
@@ -102,8 +90,7 @@ def split(mesh: Any, curves: Curves) -> Any:
 
 def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
     """The mesh divided as scikit-fem is told, its new nodes at `places`, if any, and on curves."""
-    with _no_word_of_copies():
-        fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
+    fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy() if places is None else places.copy()
     for name, curve in _present(mesh, curves).items():
@@ -114,16 +101,7 @@ def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = No
 
 
 def facets_of(mesh: Any, name: str) -> np.ndarray:
-    """Number the facets of a boundary.
-
-    Parameters
-    ----------
-    mesh, name : A scikit-fem mesh and one of its boundaries; '' stands for what has no name.
-
-    Returns
-    -------
-    (f,) numbers of facets.
-    """
+    """Number the facets (f,) of a boundary; the name '' stands for what has no name."""
     if name:
         return np.asarray(mesh.boundaries[name])
     named = np.concatenate([[0][:0], *(mesh.boundaries or {}).values()])
@@ -157,26 +135,17 @@ def _unfolded(mesh: Any, points: np.ndarray) -> Any:
 
 
 def bent(mesh: Any, curves: Curves) -> Any:
-    """Bend the edges and faces of a mesh of straight elements along its curved boundaries.
+    """Bend the edges and faces of a mesh of straight elements along its curved boundaries: a mesh
+    of second order, or the same mesh where there is no curve.
 
     Elements and named boundaries keep their numbers. An edge that would leave its chord by more
     than BENT of its length, or fold an element, stays straight.
-
-    Parameters
-    ----------
-    mesh : A scikit-fem mesh.
-    curves : By the name of a boundary the curve that moves points (dim, m) onto it [length].
-
-    Returns
-    -------
-    A mesh of second order, or the same mesh where there is no curve.
     """
     known = {name: (facets_of(mesh, name), curve) for name, curve in _present(mesh, curves).items()}
     if not known:
         return mesh
-    with _no_word_of_copies():
-        flat = replace(mesh, _boundaries=None, _subdomains=None)
-        made = CURVED[mesh.refdom.__name__].from_mesh(flat)
+    flat = replace(mesh, _boundaries=None, _subdomains=None)
+    made = CURVED[mesh.refdom.__name__].from_mesh(flat)
     shift, plane = np.zeros_like(made.doflocs), len(mesh.p) == 2
     edges = mesh.facets if plane else mesh.edges
     middle = (made.dofs.facet_dofs if plane else made.dofs.edge_dofs)[0]
@@ -207,21 +176,6 @@ def _shift(
     off = curve(places) - places
     near = np.linalg.norm(off, axis=0) <= BENT * size
     shift[:, nodes[near]] = off[:, near]
-
-
-@contextmanager
-def _no_word_of_copies() -> Iterator[None]:
-    """scikit-fem says of large arrays that it copies them; no user can do anything about it."""
-    skfem_log = logging.getLogger("skfem.mesh.mesh")
-
-    def filtered(record: logging.LogRecord) -> bool:
-        return "C_CONTIGUOUS" not in record.getMessage()
-
-    skfem_log.addFilter(filtered)
-    try:
-        yield
-    finally:
-        skfem_log.removeFilter(filtered)
 
 
 def named_like(old: Any, new: Any) -> Any:

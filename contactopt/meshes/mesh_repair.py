@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import skfem
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
-from contactopt.meshes.cells import area_vectors, mirrored, outer_corners, volumes
+from contactopt.meshes.cells import area_vectors, joined, mirrored, outer_corners, volumes
 
 SAME = 1e-6  # places this fraction of a size apart are one place
 # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
@@ -118,18 +116,12 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     pairs = pairs[same]
     if repair:
         log.warning(
-            "%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, "
-            "at most %.3g apart",
+            "%s: nodes that lie on others are merged with them,"
+            " the first at (%s); %d pairs, at most %.3g apart",
             cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
         )  # fmt: skip
-    label = _pieces(pairs[:, 0], pairs[:, 1], len(own))
+    label = joined(pairs.T, len(own))
     return np.asarray(np.unique(label, return_index=True)[1][label])
-
-
-def _pieces(i: np.ndarray, j: np.ndarray, count: int) -> np.ndarray:
-    """(count,) the piece that each node belongs to when nodes i (m,) and j (m,) are joined."""
-    graph = coo_matrix((np.ones(len(i)), (i, j)), (count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -165,8 +157,8 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
     wrong = _volumes(cells.points, cells.corners) < 0
     if wrong.any():
         log.warning(
-            "%s: %d elements number their corners the wrong way round and are turned, "
-            "the first is %s",
+            "%s: %d elements number their corners the wrong"
+            " way round and are turned, the first is %s",
             cells.path, wrong.sum(), cells.name(int(np.argmax(wrong))),
         )  # fmt: skip
         nodes = cells.nodes.copy()
@@ -177,13 +169,13 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
 
 def check_connected(cells: Cells, hint: str) -> None:
     """Raise InputError, with a hint, if the elements fall into pieces that share no node."""
-    first = np.broadcast_to(cells.corners[0], cells.corners.shape).ravel()
-    label = _pieces(first, cells.corners.ravel(), cells.points.shape[1])
+    first = np.broadcast_to(cells.corners[0], cells.corners.shape)
+    label = joined(np.stack([first, cells.corners]).reshape(2, -1), cells.points.shape[1])
     count = len(np.unique(label[cells.corners[0]]))
     if count > 1:
         raise InputError(
-            f"mesh file '{cells.path}': the body falls into {count} pieces that share no node;"
-            f" {hint}."
+            f"mesh file '{cells.path}': the body falls into"
+            f" {count} pieces that share no node; {hint}."
         )
 
 
@@ -199,8 +191,8 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     if len(wrong):
         raise cells.refused(
             wrong[0],
-            "{} does not share the nodes within its edges and faces with its neighbours; mesh this"
-            " place anew.",
+            "{} does not share the nodes within its edges and"
+            " faces with its neighbours; mesh this place anew.",
         )
     volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)

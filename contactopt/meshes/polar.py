@@ -14,16 +14,10 @@ NEAR = 1e-9  # what counts as zero beside the size of the body
 
 
 def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
-    """Quadrilaterals between circles and rays; their edges along circles bend with them.
+    """Quadrilaterals between circles of ascending radii (m,) [length] and rays at ascending angles
+    (n,) from the x axis towards y [rad]; their edges along circles bend with them.
 
-    Parameters
-    ----------
-    radii : (m,) ascending radii of the circles [length].
-    angles : (n,) ascending angles of the rays, from the x axis towards y [rad].
-
-    Returns
-    -------
-    With the boundaries 'inner' and 'outer', and 'start' and 'end' at the first and the last angle
+    The boundaries are 'inner' and 'outer', and 'start' and 'end' at the first and the last angle
     unless the ring is closed.
     """
     flat = tensor_mesh(angles, radii)
@@ -45,16 +39,8 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
 
 
 def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
-    """The half disc x >= 0.
-
-    Parameters
-    ----------
-    radius : Of the disc [length].
-    sectors : The nodes on the half circle divide it evenly into 4 * sectors parts.
-
-    Returns
-    -------
-    With the boundaries 'rim' and 'axis', the diameter x = 0.
+    """The half disc x >= 0 of a radius, with the boundaries 'rim' and 'axis', the diameter x = 0.
+    Its nodes divide the half circle evenly into 4 * sectors parts.
     """
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     made = _quads(np.stack([y, -x]), t)
@@ -64,17 +50,7 @@ def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
 
 
 def disc(radius: float, sectors: int) -> MeshQuad2:
-    """The whole disc.
-
-    Parameters
-    ----------
-    radius : Of the disc [length].
-    sectors : The nodes on the circle divide it evenly into 8 * sectors parts.
-
-    Returns
-    -------
-    With the boundary 'rim'.
-    """
+    """The whole disc with the boundary 'rim', whose nodes divide it into 8 * sectors even parts."""
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     diameter = np.flatnonzero(np.abs(y) < NEAR * radius)
     along = diameter[np.argsort(x[diameter])]
@@ -110,16 +86,8 @@ def _on_circles(mesh: MeshQuad, only: float | None = None) -> MeshQuad2:
 
 
 def even(start: float, end: float, parts: int) -> np.ndarray:
-    """Radii of rings whose elements are about square, a geometric series.
-
-    Parameters
-    ----------
-    start, end : The first and the last radius [length].
-    parts : Number of elements along half the circle.
-
-    Returns
-    -------
-    array (n,) : Ascending radii [length].
+    """Ascending radii (n,) of rings whose elements are about square, a geometric series from start
+    to end, for a number of elements along half the circle.
     """
     count = max(1, round(np.log(end / start) * parts / np.pi))
     return np.asarray(np.geomspace(start, end, count + 1))

@@ -4,6 +4,7 @@ of stones.
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -39,12 +40,10 @@ def pin_in_bush(
     force: float = 100.0,
     elements: int = 24,
 ) -> Scene:
-    """A pin in the hole of a bush of the same material, pressed down; plane strain, of which half
-    is modelled.
+    """A pin in the hole of a bush of its material, pressed down; half a section in plane strain.
 
     Only contact holds the pin. The force acts on it as a force per volume. On the circle this has
-    the same radial displacements as a force at the centre, but for a rigid motion. The nodes divide
-    the circles evenly.
+    the radial displacements of a force at the centre, but for a rigid motion.
 
     Parameters
     ----------
@@ -52,12 +51,11 @@ def pin_in_bush(
     clearance : by how much the radius of the pin is smaller [mm]
     outside : radius at which the bush is clamped. By default 30 radii of the hole, which stand for
         an infinite plate
-    mu : friction coefficient. Without friction Persson's solution is exact for an infinite plate
     force : total force on the pin [N]
 
     Returns
     -------
-    Scene : 'pin-in-bush', with Persson's solution where it is exact
+    Scene : 'pin-in-bush', with Persson's solution where it is exact: mu = 0, infinite plate
     """
     check_positive(radius=radius, clearance=clearance, depth=depth, force=force)
     check_count("elements", elements)
@@ -65,30 +63,26 @@ def pin_in_bush(
     edge = LARGE * radius if outside is None else outside
     if not clearance < radius < edge:
         raise InputError(
-            f"the clearance must be less than the hole's radius {radius:g}, and the bush end"
-            " beyond it."
+            f"the hole's radius {radius:g} must lie between the clearance and the bush's outside."
         )
 
-    def sectors(elements: int) -> int:
-        return max(1, round(elements * np.pi * radius / (4 * exact.half_width)))
+    def parts(elements: int) -> int:
+        return 4 * max(1, round(elements * np.pi * radius / (4 * exact.half_width)))
 
     def pin(elements: int, zone: float | None) -> Any:
-        return rename(right_half_disc(radius - clearance, sectors(elements)), contact="rim")
+        return rename(right_half_disc(radius - clearance, parts(elements) // 4), contact="rim")
 
     def bush(elements: int, zone: float | None) -> Any:
-        parts = 4 * sectors(elements)
-        angles = np.linspace(-np.pi / 2, np.pi / 2, parts + 1)
-        return rename(ring(even(radius, edge, parts), angles), contact="inner")
+        return rename(_sector(radius, edge, np.pi, parts(elements)), contact="inner")
 
     # the pin of linear elements is a polygon, and bears the force on its area
-    parts = 8 * sectors(elements)
-    area = parts / 2 * np.sin(2 * np.pi / parts) * (radius - clearance) ** 2
+    area = parts(elements) * np.sin(np.pi / parts(elements)) * (radius - clearance) ** 2
     weight = BodyForce((0.0, -force / float(area * depth)))
-    axis = (Support("axis", {"x": 0.0}),)
-    held = Support("start", {"x": 0.0}), Support("end", {"x": 0.0}), Support("outer")
+    axis, start, end = (Support(name, {"x": 0.0}) for name in ("axis", "start", "end"))
+    held = (start, end, Support("outer"))
     return Scene(
         "pin-in-bush",
-        Part("pin", pin, material, axis, (weight,), curve=circle(radius - clearance)),
+        Part("pin", pin, material, (axis,), (weight,), curve=circle(radius - clearance)),
         Part("bush", bush, material, held, curve=circle(radius)),
         mu,
         elements=elements,
@@ -120,8 +114,7 @@ def press_fit(
     ----------
     kind : 'plane-strain' for a quarter of the section; 'axisymmetric' for a slice between two
         frictionless planes
-    radius : at which shaft and hub meet [mm]
-    bore, outside : inner radius of the shaft and outer radius of the hub [mm]
+    bore, radius, outside : of the shaft's hole, of where shaft and hub meet, of the hub [mm]
     interference : of the radii [mm]
     depth : length of the fit along its axis [mm]
     shaft, hub : materials
@@ -133,24 +126,13 @@ def press_fit(
     """
     exact = lame(interference, bore, radius, outside, shaft, hub)
     check_positive(bore=bore, depth=depth)
-    check_count("elements", elements)
     check_choice("kind", kind, "plane-strain", "axisymmetric")
     plane = kind == "plane-strain"
-    components = ("y", "x") if plane else ("z", "z")
-    ends = tuple(Support(end, {c: 0.0}) for end, c in zip(("start", "end"), components))
+    across = ("y", "x") if plane else ("z", "z")
+    ends = tuple(Support(end, {c: 0.0}) for end, c in zip(("start", "end"), across))
 
     def part(name: str, material: Material, inner: float, outer: float, touching: str) -> Part:
-        def mesh(elements: int, zone: float | None) -> Any:
-            if plane:
-                angles = np.linspace(0, np.pi / 2, elements + 1)
-                made = ring(even(inner, outer, 2 * elements), angles)
-                return rename(made, contact=touching)
-            across = max(1, round((outer - inner) * elements / depth))
-            radii = np.linspace(inner, outer, across + 1)
-            made = tensor_mesh(radii, np.linspace(0, depth, elements + 1))
-            side = "x+" if touching == "outer" else "x-"
-            return rename(made, start="y-", end="y+", contact=side)
-
+        mesh = partial(_layer, None if plane else depth, (inner, outer), touching)
         curve = circle(outer if touching == "outer" else inner) if plane else None
         return Part(name, mesh, material, ends, curve=curve)
 
@@ -166,6 +148,29 @@ def press_fit(
     )
 
 
+def _layer(
+    height: float | None,
+    radii: tuple[float, float],
+    touching: str,
+    elements: int,
+    zone: float | None,
+) -> Any:
+    """A quarter of a ring, or with a height the section of a hollow cylinder."""
+    inner, outer = radii
+    if height is None:
+        return rename(_sector(inner, outer, np.pi / 2, elements), contact=touching)
+    count = max(1, round((outer - inner) * elements / height))
+    grids = np.linspace(inner, outer, count + 1), np.linspace(0, height, elements + 1)
+    side = "x+" if touching == "outer" else "x-"
+    return rename(tensor_mesh(*grids), start="y-", end="y+", contact=side)
+
+
+def _sector(inner: float, outer: float, sweep: float, parts: int) -> Any:
+    """A sector of a ring that ends upright, of about square elements, `parts` of them around."""
+    angles = np.linspace(np.pi / 2 - sweep, np.pi / 2, parts + 1)
+    return ring(even(inner, outer, round(parts * np.pi / sweep)), angles)
+
+
 @explained
 def stack(
     *,
@@ -179,8 +184,7 @@ def stack(
     tilt: float = 10.0,
     elements: int = 8,
 ) -> Scene:
-    """Blocks that only rest on each other, the lowest one on a rigid floor, all tilted by an angle;
-    plane strain.
+    """Blocks that only rest on each other, the lowest one on a rigid floor, tilted; plane strain.
 
     Statics give the resultant of every joint. With W the weight above a joint it is W cos(tilt)
     across and W sin(tilt) along, through the centre of gravity of what is above. The stack stands
@@ -200,7 +204,6 @@ def stack(
     Scene : 'stack'
     """
     check_count("blocks", blocks)
-    check_count("elements", elements)
     check_positive(width=width, height=height, depth=depth, weight=weight)
     check_number("tilt", tilt, low=-90.0, high=90.0)
     angle, steepest = np.radians(tilt), min(mu, width / (blocks * height))
@@ -243,8 +246,7 @@ def arch(
     weight: float = 1000.0,
     elements: int = 8,
 ) -> Scene:
-    """A half circle of stones that only rest on each other, the outermost ones on rigid ground;
-    plane strain.
+    """A half circle of stones that rest on each other and on rigid ground; plane strain.
 
     Every springing bears half of the weight, and the thrusts at both springings balance. Stones
     that are thinner than .1075 of the mean radius cannot stand at all (Milankovitch 1907, Theorie
@@ -264,7 +266,6 @@ def arch(
     Scene : 'arch'
     """
     check_count("stones", stones)
-    check_count("elements", elements)
     check_positive(radius=radius, thickness=thickness, depth=depth, weight=weight)
     if not THINNEST < thickness / radius < 2:
         raise InputError(
@@ -278,19 +279,18 @@ def arch(
             # An even number: the keystone has edges in the arch's plane of symmetry.
             rows = 2 * max(1, round(elements * np.pi * radius / stones / thickness))
             angles = np.linspace(number * np.pi / stones, (number + 1) * np.pi / stones, rows + 1)
-            inner, outer = radius - thickness / 2, radius + thickness / 2
-            return ring(np.linspace(inner, outer, 2 * elements + 1), angles)
+            half = thickness / 2
+            return ring(np.linspace(radius - half, radius + half, 2 * elements + 1), angles)
 
         return Part(name, mesh, material, loads=(load,), contact="start")
 
     names = [f"stone-{i + 1}" for i in range(stones)]
-    bodies = [stone(name, i) for i, name in enumerate(names)]
     joints = [Contact(names[0], "right", mu)]
     joints += [Contact(upper, f"{lower}:end", mu) for lower, upper in pairwise(names)]
     joints += [Contact(f"{names[-1]}:end", "left", mu)]
     return Scene(
         "arch",
-        bodies=(Rigid("right"), Rigid("left"), *bodies),
+        bodies=(Rigid("right"), Rigid("left"), *(stone(name, i) for i, name in enumerate(names))),
         contacts=tuple(joints),
         elements=elements,
         **model("plane-strain", depth),

@@ -21,19 +21,11 @@ MOST_ELEMENTS = 2_000_000  # elements of a structured body
 
 
 def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], length: str) -> Any:
-    """Make the mesh that a body's table describes, moved to its place, with its boundaries.
+    """Make the mesh of scikit-fem that a body's table describes, moved to its place, with its
+    boundaries.
 
-    Parameters
-    ----------
-    body : the table of the body in a scene file
-    folder : to which names of mesh files are relative; without one no mesh is made, and the entries
-        are only marked as known
-    components : names of the components of the scene, such as ('x', 'y')
-    length : the scene's unit of length, to which a mesh file's unit is converted
-
-    Returns
-    -------
-    Mesh : of scikit-fem, or None without a folder
+    Names of mesh files are relative to the folder. Without one no mesh is made, and the entries are
+    only marked as known. The unit of a mesh file is converted to the scene's unit of length.
     """
     group, move, places = body.take("group", str), body.table("move"), body.table("boundaries")
     unit, shapes = body.take("unit", str), [shape for shape in SHAPES if body.has(shape)]
@@ -106,8 +98,8 @@ def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
         or np.prod(counts, dtype=float) > MOST_ELEMENTS
     ):
         raise table.fail(
-            f"'elements' must be whole numbers of at least 1, at most {MOST_ELEMENTS} elements in"
-            " all.",
+            "'elements' must be whole numbers of at least"
+            f" 1, at most {MOST_ELEMENTS} elements in all.",
             "elements",
         )
     return [int(count) for count in counts]

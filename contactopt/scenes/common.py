@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.scene import Part, Rigid, Scene
@@ -36,16 +37,9 @@ Make = TypeVar("Make", bound=Callable[..., Any])
 
 
 def explained(make: Make) -> Make:
-    """Write into the docstring of a function that makes a scene what its docstring does not say:
-    the arguments that many scenes have, and when it raises InputError.
-
-    Parameters
-    ----------
-    make : the function, whose docstring has the sections Parameters and Returns
-
-    Returns
-    -------
-    Callable : the same function
+    """Write into the docstring of a function that makes a scene, with the sections Parameters and
+    Returns, what it does not say: the arguments that many scenes have, and when it raises
+    InputError.
     """
     if make.__doc__ is None:  # Python was told to leave docstrings out
         return make
@@ -67,10 +61,11 @@ def check_choice(name: str, value: object, *valid: object) -> None:
 
 def check_shear(shear: float, mu: float, force: float) -> None:
     """Raise InputError where friction cannot hold a shear force."""
+    check_number("shear", shear)
     if shear != 0 and abs(shear) >= mu * force:
         raise InputError(
-            f"the shear {shear:g} is at least mu times the force, {mu * force:g}: the bodies slide"
-            " off."
+            f"the shear {shear:g} is at least mu times the"
+            f" force, {mu * force:g}: the bodies slide off."
         )
 
 
@@ -108,13 +103,12 @@ def with_elements(scene: Scene, degree: int | None = None, simplices: bool = Fal
 
     Parameters
     ----------
-    scene : the scene, which stays as it is
-    degree : of the displacement, 1 or 2; None: the scene's own
+    scene, degree : the scene, and the degree of its displacement, 1 or 2; None: the scene's own
     simplices : whether quadrilaterals and hexahedra are cut into triangles and tetrahedra
 
     Returns
     -------
-    Scene : with these elements
+    Scene : with these elements; the given one stays as it is
     """
 
     def cut(part: Any) -> Any:

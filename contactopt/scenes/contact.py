@@ -71,9 +71,7 @@ class Contact:
 
     @property
     def surfaces(self) -> tuple[str | None, str | None]:
-        """Names of the surfaces of the upper and the lower body; None for the contact boundary of
-        the Part.
-        """
+        """Names of the upper and the lower surface; None for the contact boundary of a Part."""
         return self.upper.partition(":")[2] or None, self.lower.partition(":")[2] or None
 
     @property

@@ -8,15 +8,8 @@ EXAMPLE = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 
 
 def write_example(path: Path) -> None:
-    """Write an example of a scene file, with a comment on every entry.
-
-    Parameters
-    ----------
-    path : the file, whose name ends in .toml
-
-    Raises
-    ------
-    InputError : if the name has another ending, is taken, or cannot be written
+    """Write an example of a scene file, with a comment on every entry. InputError if its name does
+    not end in .toml, is taken, or cannot be written.
     """
     if path.suffix != ".toml":
         raise InputError(f"a scene file's name ends in .toml; got '{path}'.")

@@ -62,9 +62,7 @@ class Expression:
 
 
 def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
-    """The value of a part of the expression; numbers are floating-point from the start, so that
-    none grows without end.
-    """
+    """The value of a part of the expression, of floats from the start: none grows without end."""
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         number: Any = node.value
         return np.float64(number if abs(number) < 1e300 else np.inf)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -65,20 +66,12 @@ def flat_punch(
     check_positive(foundation_width=foundation_width, foundation_height=foundation_height)
     if foundation_width < width:
         raise InputError(
-            f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch"
-            f" ({width:g})."
+            f"the foundation ({foundation_width:g} wide) must"
+            f" be at least as wide as the punch ({width:g})."
         )
     a, up = width / 2, "xyz"[dim - 1]
-
-    def punch(elements: int, zone: float | None) -> Any:
-        mesh = _block(dim, a, elements, a, height)
-        return rename(mesh, contact=f"{up}-", top=f"{up}+")
-
-    def foundation(elements: int, zone: float | None) -> Any:
-        mesh = _block(dim, a, elements, foundation_width / 2, -foundation_height)
-        mesh = rename(mesh, top=f"{up}+", bottom=f"{up}-")
-        return patch(mesh, "top", "contact", [a] * (dim - 1))
-
+    punch = partial(_block, dim, a, a, height)
+    foundation = partial(_block, dim, a, foundation_width / 2, -foundation_height)
     symmetry = tuple(Support(f"symmetry {c}", {c: 0.0}) for c in "xy"[: dim - 1])
     load = {up: -force}
     top = Part("punch", punch, upper, symmetry, (Plate("top", load),))
@@ -94,12 +87,18 @@ def flat_punch(
     )
 
 
-def _block(dim: int, a: float, elements: int, half_width: float, height: float) -> Any:
+def _block(
+    dim: int, a: float, half_width: float, height: float, elements: int, zone: float | None
+) -> Any:
     """A block above a contact of half-width a, or with a negative height beneath it."""
     rise = graded(abs(height), a / elements, GROWTH[dim])
     grid = contact_grid(a, elements, half_width, GROWTH[dim])
     mesh = tensor_mesh(*[grid] * (dim - 1), rise if height > 0 else -rise[::-1])
-    return rename(mesh, **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+    low, high = (f"{'xyz'[dim - 1]}{side}" for side in "-+")
+    mesh = rename(mesh, top=high, **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+    if height > 0:
+        return rename(mesh, contact=low)
+    return patch(rename(mesh, bottom=low), "top", "contact", [a] * (dim - 1))
 
 
 @explained
@@ -141,20 +140,11 @@ def rigid_punch(
     check_positive(half_width=half_width, foundation=size, depth=depth, force=force)
     if size < 2 * half_width:
         raise InputError(
-            f"the foundation ({size:g}) must be at least two half-widths ({2 * half_width:g})"
-            " large."
+            f"the foundation ({size:g}) must be at least two half-widths large, {2 * half_width:g}."
         )
     plane = kind == "plane-strain"
     across, up = ("x", "y") if plane else ("r", "z")
-
-    def mesh(elements: int, zone: float | None) -> Any:
-        first = EDGE * half_width
-        contact = _towards_edge(half_width, elements, first)
-        beyond = half_width + graded(size - half_width, first, RATIO)[1:]
-        block = tensor_mesh(np.concatenate([contact, beyond]), -graded(size, first, RATIO)[::-1])
-        block = rename(block, axis="x-", bottom="y-", top="y+")
-        return patch(block, "top", "contact", [half_width])
-
+    mesh = partial(_half_space, half_width, size)
     return Scene(
         "rigid-punch-2d" if plane else "rigid-punch-axisymmetric",
         Rigid("punch", force={up: -force}),
@@ -176,10 +166,17 @@ def _exact(
     return flat_punch_axisymmetric_friction(force, half_width, contact_modulus(lower), mu, beta)
 
 
+def _half_space(half_width: float, size: float, elements: int, zone: float | None) -> Any:
+    """The block under the rigid punch."""
+    first = EDGE * half_width
+    contact = _towards_edge(half_width, elements, first)
+    beyond = half_width + graded(size - half_width, first, RATIO)[1:]
+    block = tensor_mesh(np.concatenate([contact, beyond]), -graded(size, first, RATIO)[::-1])
+    return patch(rename(block, axis="x-", bottom="y-", top="y+"), "top", "contact", [half_width])
+
+
 def _towards_edge(half_width: float, elements: int, first: float) -> np.ndarray:
-    """Grid from 0 to half_width: even spacing half_width / elements at most, falling to `first` at
-    the edge.
-    """
+    """Grid from 0 to half_width: even at first, falling to `first` at the edge."""
     h = half_width / elements
     steps = first * RATIO ** np.arange(max(0.0, np.floor(np.log(h / first) / np.log(RATIO)) + 1))
     steps = steps[np.cumsum(steps) < half_width - h / 2]  # leaves room for an even one

@@ -122,9 +122,7 @@ class Parameter:
     def _in_part(
         self, part: Any, scene: Scene, value: float | None = None
     ) -> tuple[list[float], Any]:
-        """Its values in one body, none or one unless the name is ambiguous, and the body with
-        another value.
-        """
+        """Its values in one body, one unless its name is ambiguous; the body with another value."""
         material: Any = getattr(part, "material", None)
         if not self.concerns(part) or (self.kind in MATERIAL and material is None):
             return [], part
@@ -182,8 +180,8 @@ class Parameter:
         names = [one.name for one in named]
         if self.owner and self.owner not in names:
             return (
-                f"it has no {'contact' if self.kind == 'mu' else 'body'} '{self.owner}', only"
-                f" {', '.join(names)}"
+                f"it has no {'contact' if self.kind == 'mu' else 'body'}"
+                f" '{self.owner}', only {', '.join(names)}"
             )
         if self.kind == "mu":
             return "its contacts have no friction"

@@ -15,19 +15,10 @@ STEPS = 8  # of the iteration that keeps a coordinate
 
 
 def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
-    """Put a scene on the meshes made for `elements` and then halved several times.
+    """Put a scene on the meshes made for `elements` across the contact half-width and then halved
+    several times, whatever number of elements it is asked for later.
 
     New nodes lie on the `curve` of their part, or on the curve that the first mesh stands for.
-
-    Parameters
-    ----------
-    scene : the scene, which stays as it is
-    elements : number across the contact half-width, for which the meshes are made
-    splits : how often they are halved
-
-    Returns
-    -------
-    Scene : with these meshes, whatever number of elements it is asked for
     """
 
     def finer(part: Any) -> Any:
@@ -52,16 +43,8 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
 
 
 def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
-    """Find the curves of all curved boundaries of a part.
-
-    Parameters
-    ----------
-    part, mesh : the part and its mesh
-
-    Returns
-    -------
-    dict : by the name of a boundary, or '' for what has no name, the curve that the part gives, or
-        that of the mesh
+    """Find the curves of all curved boundaries of a part and its mesh: by the name of a boundary,
+    or '' for what has no name, the curve that the part gives, or that of the mesh.
     """
     found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
     return {name: curve for name, curve in found.items() if curve is not None}

@@ -268,9 +268,7 @@ def _round_bodies(
 
 
 def _candidates(elements: int, zone: float) -> np.ndarray:
-    """Positions of the candidate contact nodes: even spacing, one node at the zone's edge, a margin
-    beyond it.
-    """
+    """Even places of the candidate contact nodes: one at the zone's edge, and a margin beyond."""
     return zone / elements * np.arange(elements + int(np.ceil((MARGIN - 1) * elements)) + 1)
 
 

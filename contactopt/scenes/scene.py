@@ -228,9 +228,7 @@ class Scene:
             raise self._wrong("give upper, lower and mu, or bodies and contacts.")
 
     def _check_mirror(self) -> None:
-        """Axes are known, named once, and agree with the number of copies, which they set if it was
-        not given.
-        """
+        """Axes are known and named once. They set the number of copies, or agree with it."""
         if self.mirror is None:
             return
         axes = [name for name in self.components if name != "r"]
@@ -248,9 +246,7 @@ class Scene:
             )
 
     def _check_pairs(self) -> None:
-        """Names of bodies are known and not given twice; no pair twice; no body without a pair; no
-        two rigid bodies.
-        """
+        """Names are known and given once, each body is in a pair, no pair is of rigid bodies."""
         names = [part.name for part in self.parts]
         for name in names:
             if names.count(name) > 1:

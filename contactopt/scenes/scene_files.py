@@ -50,35 +50,15 @@ class SceneFile:
     lines: dict[str, int]
 
     def located(self, error: InputError) -> InputError:
-        """Tell where in the file a mistake is.
-
-        Parameters
-        ----------
-        error : an error that may name a body or contact
-
-        Returns
-        -------
-        InputError : with the name of the file, and the line of the body or contact that it names
-        """
+        """The mistake with the name of the file, and the line of the body or contact in it."""
         for name, line in self.lines.items():
             if f"'{name}'" in str(error):
                 return InputError(f"{self.name}, line {line}: {error}")
         return InputError(f"{self.name}: {error}")
 
     def changed(self, changes: dict[str, Any]) -> tuple[Scene, ...]:
-        """Give the states another degree of the displacement.
-
-        Parameters
-        ----------
-        changes : {'degree': 1 or 2}, or nothing
-
-        Returns
-        -------
-        tuple of Scene
-
-        Raises
-        ------
-        InputError : for any other change: a scene file says everything itself
+        """Give the states another degree of the displacement, {'degree': 1 or 2}. InputError for
+        any other change: a scene file says everything itself.
         """
         for key in changes:
             if key != "degree":
@@ -111,19 +91,9 @@ class _Reading:
 
 
 def read_scene_file(path: str | Path) -> SceneFile:
-    """Read a scene file.
-
-    Parameters
-    ----------
-    path : a TOML file; the names of mesh files in it are relative to its folder
-
-    Returns
-    -------
-    SceneFile : the states of the scene, one unless it is a load path, and how they are solved
-
-    Raises
-    ------
-    InputError : with the line of the first mistake and what to write instead
+    """Read a scene file in TOML: the states of the scene, one unless it is a load path, and how
+    they are solved. Names of mesh files in it are relative to its folder. InputError with the line
+    of the first mistake and what to write instead.
     """
     path = Path(path)
     table = read_table(path)
@@ -132,8 +102,8 @@ def read_scene_file(path: str | Path) -> SceneFile:
     for length, at, key in reading.lengths:
         if length not in (1, count):
             raise at.fail(
-                f"{key!r} has values for {length} states of the load path, other numbers for"
-                f" {count}.",
+                f"{key!r} has values for {length} states of"
+                f" the load path, other numbers for {count}.",
                 key,
             )
     states = [first]
@@ -168,8 +138,8 @@ def _scene(
     pairs = top.tables("contacts")
     if not pairs:
         raise top.fail(
-            "there are no contacts; add a table [[contacts]] for each pair of surfaces that may"
-            " touch."
+            "there are no contacts; add a table [[contacts]]"
+            " for each pair of surfaces that may touch."
         )
     meshes = reading.meshes.values()
     curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
@@ -274,9 +244,7 @@ def _vector(values: dict[str, float], reading: _Reading) -> tuple[float, ...]:
 
 
 def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[str, float]:
-    """The numbers that a table holds for components, each of the present state; `whole`: it holds
-    nothing else.
-    """
+    """The numbers of components in a table, of the present state; `whole`: it holds no others."""
     found = {}
     for key in reading.components:
         if isinstance(table.data.get(key), list):

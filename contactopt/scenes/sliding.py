@@ -18,7 +18,7 @@ from contactopt.analytic import (
     hertz_point_tangential,
     tangential_modulus,
 )
-from contactopt.checks import check_count, check_number, check_positive
+from contactopt.checks import check_count, check_positive
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.meshes.discs import extrude, half_disc
@@ -59,10 +59,9 @@ def cattaneo(
     """A cylinder or sphere pressed on a flat body of the same material, then pushed sideways.
 
     The upper body hangs on a plate that carries both loads and does not tilt, and the lower one is
-    clamped below. Their meshes are mirror images but for the round surface, a parabola, so that
-    normal and tangential loads hardly disturb each other. Put on at once, the loads give the same
-    answer as one after the other, because slip never turns back. Unloading needs a path:
-    shear_cycle().
+    clamped below. Their meshes are mirror images but for the round surface, so that normal and
+    tangential loads hardly disturb each other. Put on at once, the loads give the answer of one
+    after the other, because slip never turns back. Unloading needs a path: shear_cycle().
 
     Parameters
     ----------
@@ -83,7 +82,6 @@ def cattaneo(
     radius = RADIUS[dim] if radius is None else radius
     material = (RUBBER if dim == 2 else Material(RUBBER.E, 0.0)) if material is None else material
     check_positive(radius=radius, depth=depth, force=force)
-    check_number("shear", shear)
     check_shear(shear, mu, force)
     exact = _exact(force, radius, depth if dim == 2 else None, material, mu, shear)
     a, up = exact.half_width, "xyz"[dim - 1]
@@ -94,20 +92,13 @@ def cattaneo(
             f"the contact half-width would be {a:.3g}: too much for bodies of radius {radius:g} and"
             f" size {size:g}; lower the force or take stiffer or larger bodies."
         )
-
-    def paraboloid(x: np.ndarray) -> np.ndarray:
-        return np.concatenate([x[:-1], np.sum(x[:-1] ** 2, axis=0, keepdims=True) / (2 * radius)])
-
-    upper, lower = (
-        partial(_block, exact, dim, size, radius),
-        partial(_block, exact, dim, size, None),
-    )
+    mesh, curve = partial(_block, exact, dim, size), partial(_paraboloid, radius)
     symmetry = (Support("symmetry", {"y": 0.0}),) if dim == 3 else ()
     plate = Plate("far", {"x": shear, up: -force})
     return Scene(
         f"cattaneo-{dim}d",
-        Part("upper", upper, material, symmetry, (plate,), curve=paraboloid),
-        Part("lower", lower, material, (*symmetry, Support("far"))),
+        Part("upper", partial(mesh, radius), material, symmetry, (plate,), curve=curve),
+        Part("lower", partial(mesh, None), material, (*symmetry, Support("far"))),
         mu,
         elements=ELEMENTS[dim] if elements is None else elements,
         **model(KINDS[dim], depth, dim - 1),
@@ -158,13 +149,13 @@ def _exact(
     return hertz_point_tangential(force, radius, modulus, along, mu, [shear])
 
 
+def _paraboloid(radius: float, x: np.ndarray) -> np.ndarray:
+    """Points (dim, k) moved onto the round surface."""
+    return np.concatenate([x[:-1], np.sum(x[:-1] ** 2, axis=0, keepdims=True) / (2 * radius)])
+
+
 def _block(
-    exact: Reference,
-    dim: int,
-    size: float,
-    radius: float | None,
-    elements: int,
-    zone: float | None,
+    exact: Reference, dim: int, size: float, radius: float | None, elements: int, zone: float | None
 ) -> Any:
     """The mesh of the upper body with its radius, or of the lower one, which has none."""
     a, growth = exact.half_width, GROWTH[dim]

@@ -105,8 +105,8 @@ class Simplified:
         used = [each for each in self.found if each.folds]
         if not used:
             return (
-                f"Scene '{self.given.name}' needs all of its model: nothing can be left out"
-                " exactly."
+                f"Scene '{self.given.name}' needs all of its"
+                " model: nothing can be left out exactly."
             )
         (unknowns, contacts), first = used[-1].after, used[0].before
         doubt = "" if used[-1].exact else ", if the proof holds, which takes its solution"

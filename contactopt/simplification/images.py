@@ -212,8 +212,8 @@ class _Comparison:
         return twins
 
     def _plates(self, part: Any, image: Any) -> set[tuple[str, int]]:
-        """(body, number of a load) of plates that are their own images, if all supports, loads,
-        forces and normals have images.
+        """(body, number of a load) of plates that are their own images, if all conditions have
+        images.
         """
         components, H, found = self.whole.scene.components, self.plane.reflection, set()
         others = list(_conditions(image, components))
@@ -250,8 +250,8 @@ class _Comparison:
         for pair in self.whole.scene.pairs:
             if images.get(pair.bodies[0]) == pair.bodies[1]:
                 raise _Differs(
-                    f"the contact '{pair.name}' lies in this plane itself, between a body and its"
-                    " own mirror image"
+                    f"the contact '{pair.name}' lies in this plane"
+                    " itself, between a body and its own mirror image"
                 )
             other, order = self._image_of(pair, images)
             found[pair.name] = other.name

@@ -57,17 +57,11 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
 
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
-    """What is left of a scene after all simplifications that are proved, and its solution.
+    """What is left of a scene after all simplifications that are proved, and its solution on that
+    scene's own mesh.
 
-    Parameters
-    ----------
-    scene : What to solve.
-    options : How to solve it; its `note` is told what was found.
-
-    Returns
-    -------
-    The report, and the solution of its `scene` on that scene's own mesh. Where nothing was proved
-    the scene is the given one, and the solution is None.
+    The note of the options is told what was found. Where nothing was proved the scene is the given
+    one, and the solution is None.
     """
     notes: list[str] = []
     chain: list[Simplification] = []

@@ -124,9 +124,7 @@ def whole_of(scene: Scene) -> Whole:
 def with_pairs(
     scene: Scene, bodies: tuple[Any, ...], pairs: tuple[Contact, ...], **others: Any
 ) -> Scene:
-    """The scene with other bodies, pairs of surfaces and fields, in its short form if it has one
-    and they fit.
-    """
+    """The scene with other bodies, pairs and fields; in its short form if that holds them."""
     if not scene.contacts and len(pairs) == 1 and len(bodies) == 2:
         upper, lower = bodies
         others |= {"upper": upper, "lower": lower, "mu": pairs[0].mu, "law": pairs[0].law}
