@@ -323,7 +323,8 @@ def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A matrix in single precision and blocks of the k nodes present, (k dim, k dim), whose held
-    unknowns are rows of their own; the place (n,) of each unknown of A in it; and the nodes present (k,).
+    unknowns are rows of their own; the place (n,) of each unknown of A in it; and the nodes present
+    (k,).
 
     A, node and component are as in contactopt.bodies.solvers.system.System, dim is the number of
     components. The rows are made some at a time, for the copies take more than the result.
