@@ -18,11 +18,11 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.solvers.superlu import SuperLUSolver
+from contactopt.coupling.compliance import estimate_diagonal
 from contactopt.coupling.costs import form_of
 from contactopt.linear.operators import (
     InterfaceOperator,
     block,
-    estimate_diagonal,
     loosened,
     shifted,
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.sparse as sp
 import skfem
 from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
@@ -39,7 +40,8 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     weight = (factors[scene.kind] * scene.copies, axisymmetric)
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, axisymmetric)
     A = isotropic_stiffness(basis, lame(part.material), weight)
-    pieces = connected_components(A, directed=False)[0]
+    touching = sp.csr_matrix((np.ones(len(A.indices), dtype=np.int8), A.indices, A.indptr))
+    pieces = connected_components(touching, directed=False)[0]
     if pieces > 1:
         raise InputError(
             f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to"

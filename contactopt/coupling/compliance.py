@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +18,6 @@ from contactopt.linear.operators import (
     InterfaceOperator,
     Product,
     dense,
-    estimate_diagonal,
 )
 from contactopt.linear.saddle_point import BodyTerm, CoupledForm
 from contactopt.problem.chart import nodal_weights
@@ -149,3 +149,37 @@ def _rows(B: sp.csr_matrix) -> np.ndarray:
     """
     filled = np.flatnonzero(np.diff(B.indptr))
     return filled if 4 * len(filled) < 3 * B.shape[0] else np.arange(B.shape[0])
+
+
+def estimate_diagonal(
+    product: Product, weights: Sequence[np.ndarray], moves: np.ndarray
+) -> np.ndarray:
+    """The diagonal of Q from one product with a column for each pair of surfaces.
+
+    The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared
+    out by the weights. Each pair has signs of its own: a thin body between two pairs moves one of
+    them by forces on the other as far as by its own, and such a share may be negative.
+
+    Parameters
+    ----------
+    product : The product with Q.
+    weights : (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
+    moves : (k dim,) mask of the components that can move.
+
+    Returns
+    -------
+    array (k dim,) : The estimate [length / force], 0 where a component cannot move.
+    """
+    dim = len(moves) // max(sum(len(own) for own in weights), 1)
+    ends = np.cumsum([0, *(dim * len(own) for own in weights)])
+    signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
+    columns = np.zeros((len(moves), len(weights)))
+    for i, (first, stop) in enumerate(pairwise(ends)):
+        columns[first:stop, i] = signs[first:stop]
+    traces = np.einsum("ij,ij->j", columns, product(columns, 1e-2))
+    diagonal = np.zeros(len(moves))
+    for own, trace, (first, stop) in zip(weights, traces, pairwise(ends)):
+        shares = np.repeat(own**-2, dim) * moves[first:stop]
+        if shares.any():
+            diagonal[first:stop] = shares * (trace / shares.sum())
+    return diagonal

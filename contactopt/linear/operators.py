@@ -9,9 +9,8 @@ matrix in compressed rows (csr_array), and an InterfaceOperator.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
-from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -388,37 +387,3 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
     """
     accuracy = max(accuracy, FINEST)
     return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
-
-
-def estimate_diagonal(
-    product: Product, weights: Sequence[np.ndarray], moves: np.ndarray
-) -> np.ndarray:
-    """The diagonal of Q from one product with a column for each pair of surfaces.
-
-    The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared
-    out by the weights. Each pair has signs of its own: a thin body between two pairs moves one of
-    them by forces on the other as far as by its own, and such a share may be negative.
-
-    Parameters
-    ----------
-    product : The product with Q.
-    weights : (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
-    moves : (k dim,) mask of the components that can move.
-
-    Returns
-    -------
-    array (k dim,) : The estimate [length / force], 0 where a component cannot move.
-    """
-    dim = len(moves) // max(sum(len(own) for own in weights), 1)
-    ends = np.cumsum([0, *(dim * len(own) for own in weights)])
-    signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
-    columns = np.zeros((len(moves), len(weights)))
-    for i, (first, stop) in enumerate(pairwise(ends)):
-        columns[first:stop, i] = signs[first:stop]
-    traces = np.einsum("ij,ij->j", columns, product(columns, 1e-2))
-    diagonal = np.zeros(len(moves))
-    for own, trace, (first, stop) in zip(weights, traces, pairwise(ends)):
-        shares = np.repeat(own**-2, dim) * moves[first:stop]
-        if shares.any():
-            diagonal[first:stop] = shares * (trace / shares.sum())
-    return diagonal

@@ -14,8 +14,7 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import straight
 
 MOST_CELLS = 2e7  # of one mesh
-# bytes of memory that a run takes for each cell in the plane and in space, at least
-NEEDED = {2: 6e3, 3: 15e3}
+NEEDED = 6e3  # bytes of memory that a run takes for each cell, at least
 # shortest cell over the length of a grid; below it, places of nodes are lost in rounding
 FINEST = 1e-8
 
@@ -93,7 +92,7 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
         raise InputError(
             f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements."
         )
-    check_memory(f"a mesh of {cells:.2g} elements", NEEDED[len(grids)] * cells)
+    check_memory(f"a mesh of {cells:.2g} elements", NEEDED * cells)
     for grid in grids:
         size, shortest = np.ptp(grid), np.diff(grid).min()
         if not shortest >= FINEST * size:

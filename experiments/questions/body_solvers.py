@@ -55,7 +55,7 @@ class Plain:
         blocks, self.place, present = nodal_blocks(*system[:3], len(system.points))
         modes = rigid_motions(system.points[:, present])
         modes[np.setdiff1d(np.arange(len(modes)), self.place)] = 0.0
-        self.hierarchy = pyamg.smoothed_aggregation_solver(blocks, modes)
+        self.hierarchy = pyamg.smoothed_aggregation_solver(blocks.astype(float), modes)
         self.complexity = self.hierarchy.operator_complexity()
 
     def solve(self, load: np.ndarray) -> np.ndarray:

@@ -35,7 +35,10 @@ class Block:
         """S A for a matrix S (m, n) with few rows."""
         n, N = len(self.kept), self.whole.shape[0]
         spread = sp.csr_matrix((np.ones(n), self.kept, np.arange(n + 1)), (n, N))
-        return sp.csr_matrix(((S @ spread) @ self.whole)[:, self.kept])
+        wide = sp.csr_matrix(S @ spread)
+        touched = wide.indices if wide.nnz else np.zeros(1, dtype=int)
+        rows = slice(int(touched.min()), int(touched.max()) + 1)
+        return sp.csr_matrix((wide[:, rows] @ self.whole[rows])[:, self.kept])
 
 
 class System(NamedTuple):
