@@ -304,7 +304,9 @@ class Coupled:
 
     def __init__(self, tangent: Tangent, form: CoupledForm):
         self.tangent, self.form = tangent, form
-        self.contacts = Krylov(tangent, fitted(model_of(tangent.problem, deflate=False), form))
+        self.contacts = Krylov(
+            tangent, fitted(model_of(tangent.problem, deflate=False), form, tangent.problem.V)
+        )
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         tangent, form, contacts = self.tangent, self.form, self.contacts

@@ -16,6 +16,7 @@ FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body 
 
 # Chosen by the times of trials.
 LEAF = 48  # nodes of a piece of the mesh that nested dissection does not cut further
+COARSE_LEAF = 200  # the same where only the size of the factors is estimated
 
 # Chosen by the times of trials that varied one of these at a time.
 COARSEST = 60  # nodes or aggregates that multigrid does not coarsen further
