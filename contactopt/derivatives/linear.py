@@ -303,10 +303,9 @@ class Coupled:
     """
 
     def __init__(self, tangent: Tangent, form: CoupledForm):
-        self.tangent, self.form = tangent, form
-        self.contacts = Krylov(
-            tangent, fitted(model_of(tangent.problem, deflate=False), form, tangent.problem.V)
-        )
+        self.tangent, self.form, problem = tangent, form, tangent.problem
+        P = fitted(model_of(problem, deflate=False), form, problem.V)
+        self.contacts = Krylov(tangent, P)
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         tangent, form, contacts = self.tangent, self.form, self.contacts

@@ -70,7 +70,8 @@ def choose(n: int, dim: int, pardiso: bool = False) -> str:
 
     Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2)
     and n^2 operations. The work and the memory of multigrid grow with n. The limits stand in
-    contactopt.bodies.solvers.constants.
+    contactopt.bodies.solvers.constants. Where a scene is at hand, contactopt.coupling.costs knows
+    more.
     """
     if dim == 2 or n <= PARDISO_FROM:
         return "superlu"

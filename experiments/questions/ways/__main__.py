@@ -39,13 +39,14 @@ had a share of the machine. A way was given up after {limit} s.
 
 {findings}
 
-The costs in `contactopt/coupling/costs.py` were fitted to {fit} other scenes. The upper bodies of
-these have another shape, stiffness and gradation. The scenes by which the choice is judged:
+The costs in `contactopt/coupling/costs.py` were fitted to the times of another family of scenes,
+whose upper bodies have another shape, stiffness and gradation. The scenes by which the choice is judged:
 
 {{judges}}
 
 `auto` is what contactopt takes by itself. The prices and how far the estimates are off on the
-scenes to which they were fitted:
+scenes to which they were fitted (this table and the next one are empty where the judges alone were
+measured):
 
 {{prices}}
 
@@ -174,7 +175,7 @@ def main(arguments: list[str]) -> None:
                 print(of[family][-1], flush=True)
     findings = "\n".join(judged(of["judge"]))
     tables = {"judges": of["judge"], "prices": fitted(of["fit"]), "times": of["fit"]}
-    text = TEXT.format(limit=LIMIT, findings=findings, fit=len(of["fit"]))
+    text = TEXT.format(limit=LIMIT, findings=findings)
     write("ways", "Which way to the solution", text, tables, {})
 
 
