@@ -298,14 +298,13 @@ class Coupled:
     (contactopt.methods.kernels.coupled_newton).
 
     With Q = T A^-1 T' + R the unknowns X of the bodies are eliminated by A X = T' dr forward, by A
-    X = -T' z in the adjoint. One flexible GMRES iteration sees bodies and contacts; one V-cycle per
-    body stands for A^-1 in its preconditioner.
+    X = -T' z in the adjoint. Flexible GMRES sees bodies and contacts, with a V-cycle for A^-1.
     """
 
     def __init__(self, tangent: Tangent, form: CoupledForm):
-        self.tangent, self.form, problem = tangent, form, tangent.problem
-        P = fitted(model_of(problem, deflate=False), form, problem.V)
-        self.contacts = Krylov(tangent, P)
+        self.tangent, self.form = tangent, form
+        P = model_of(tangent.problem, deflate=False)
+        self.contacts = Krylov(tangent, fitted(P, form, tangent.problem.V))
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         tangent, form, contacts = self.tangent, self.form, self.contacts

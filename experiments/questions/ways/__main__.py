@@ -39,18 +39,20 @@ had a share of the machine. A way was given up after {limit} s.
 
 {findings}
 
-The costs in `contactopt/coupling/costs.py` were fitted to the times of another family of scenes,
-whose upper bodies have another shape, stiffness and gradation. The scenes by which the choice is judged:
+The costs in `contactopt/coupling/costs.py` were fitted to the times of another family of scenes.
+Their upper bodies have another shape, stiffness and gradation. The scenes by which the choice is
+judged:
 
 {{judges}}
 
-`auto` is what contactopt takes by itself. The prices and how far the estimates are off on the
-scenes to which they were fitted (this table and the next one are empty where the judges alone were
-measured):
+`auto` is what contactopt takes by itself.
+"""
+
+FITTED = """
+The prices, how far the estimates are off on the scenes to which they were fitted, and the times
+there:
 
 {{prices}}
-
-The times that they were fitted to:
 
 {{times}}
 """
@@ -174,8 +176,10 @@ def main(arguments: list[str]) -> None:
                 of[family].append(measured(case))
                 print(of[family][-1], flush=True)
     findings = "\n".join(judged(of["judge"]))
-    tables = {"judges": of["judge"], "prices": fitted(of["fit"]), "times": of["fit"]}
-    text = TEXT.format(limit=LIMIT, findings=findings)
+    tables, text = {"judges": of["judge"]}, TEXT.format(limit=LIMIT, findings=findings)
+    if of["fit"]:
+        tables |= {"prices": fitted(of["fit"]), "times": of["fit"]}
+        text += FITTED.format()
     write("ways", "Which way to the solution", text, tables, {})
 
 
