@@ -17,9 +17,10 @@ from contactopt import (
     scenes,
     solve,
 )
+from contactopt.bodies.assembled import Work
 from contactopt.bodies.solvers.superlu import SuperLUSolver
 from contactopt.coupling.compliance import estimate_diagonal
-from contactopt.coupling.costs import form_of
+from contactopt.coupling.costs import AGAIN, estimates
 from contactopt.linear.operators import (
     InterfaceOperator,
     block,
@@ -226,17 +227,28 @@ def test_auto_gives_up_a_start_that_leads_nowhere(monkeypatch):
     assert solution.solved and solution.iterations == cold.iterations + 2
 
 
-def test_the_form_is_chosen_by_cost():
-    assert form_of(200, 4000, 2, False) == form_of(900, 20_000, 3, False) == "explicit"
-    assert (
-        form_of(2050, 80_000, 2, False)
-        == form_of(9000, 20_000, 3, False)
-        == form_of(200, 4000, 2, True)
-        == "implicit"
-    )
-    for dim in (2, 3):  # more interface on the same body never makes an explicit Q cheaper
-        chosen = [form_of(m, 30_000, dim, False) for m in (10, 100, 1000, 3000, 9000)]
-        assert chosen == sorted(chosen) and len(set(chosen)) == 2
+def cheapest(works, unknowns, dim, **changed):
+    asked = {"solvers": ("superlu", "multigrid"), "Q": "auto", "once": True} | changed
+    costs = estimates(works, unknowns, dim, **asked)
+    return min(costs, key=costs.get)
+
+
+def test_the_way_is_chosen_by_cost():
+    small = Work(40_000, 200, (1e5, 5e6), (2e5, 1e7))
+    large = Work(4_000_000, 900, (3e7, 3e10), (6e7, 9e10))
+    assert cheapest([small] * 2, 200, 2) == ("dense", "superlu")
+    assert cheapest([large] * 2, 900, 3) == ("coupled", "multigrid")
+    assert cheapest([small] * 2, 9000, 2)[0] != "dense"
+    assert cheapest([small] * 2, 200, 2, Q="implicit")[0] != "dense"
+    assert cheapest([large] * 2, 900, 3, Q="explicit") == ("dense", "superlu")
+    assert cheapest([small] * 2, 200, 2, solvers=("multigrid",)) == ("coupled", "multigrid")
+    assert not estimates([small] * 2, 200, 2, ("another",), "auto", True)
+    once, again = (estimates([large], 900, 3, ("superlu", "multigrid"), "auto", x) for x in (1, 0))
+    rises = {way: again[way] / once[way] for way in once}  # factors serve again, V-cycles do not
+    assert rises.pop(("coupled", "multigrid")) == AGAIN and set(rises.values()) == {1.0}
+
+
+def test_a_bad_form_of_q_is_refused():
     with pytest.raises(InputError, match="choose from auto, explicit, implicit"):
         reduce(scenes.flat_punch(2, elements=4), Q="dense")
 

@@ -96,6 +96,20 @@ class Guides(NamedTuple):
     planes: tuple[tuple[int, float, float], ...] = ()
 
 
+class Work(NamedTuple):
+    """How large the linear system of a body is; nothing for a body without one.
+
+    stiffness  number of the entries of its stiffness;  contact  of its contact unknowns
+    factors, factors_contact_last  entries and operations of its factors, in an order of few entries
+               and in one that ends with the contact unknowns (contactopt.bodies.solvers.ordering)
+    """
+
+    stiffness: int = 0
+    contact: int = 0
+    factors: tuple[float, float] = (0.0, 0.0)
+    factors_contact_last: tuple[float, float] = (0.0, 0.0)
+
+
 class AssembledBody(ABC):
     """A body whose surface and size are known, before its linear system is made solvable.
 
@@ -154,6 +168,11 @@ class AssembledBody(ABC):
         the initial gap (k,) [length].
         """
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
+
+    @property
+    def work(self) -> Work:
+        """What its linear system takes."""
+        return Work()
 
     @abstractmethod
     def guides(self) -> Guides:

@@ -8,12 +8,13 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface
+from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import build_body
 from contactopt.bodies.elastic import ElasticBody, condense
 from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.solvers import solver_type
+from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import check_curve
 from contactopt.scenes.scene import Part, Scene
@@ -42,6 +43,20 @@ class AssembledElastic(AssembledBody):
 
     def iterates(self, solver: str) -> bool:
         return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
+
+    @cached_property
+    def work(self) -> Work:
+        """From the graph of all nodes, of which supports hold few."""
+        body, dim = self.body, len(self.body.unknowns)
+        first = body.unknowns[0]  # unknown of the first component of each node; others follow it
+        graph = body.A[first][:, first]
+        kept = body.surface_nodes
+        return Work(
+            body.A.nnz,
+            len(kept) * dim,
+            elimination_work(graph, body.locations, kept[:0]),
+            elimination_work(graph, body.locations, kept),
+        )
 
     def surface(self, name: str | None = None) -> Surface:
         """The contact surface, with the places of its nodes on the curve that the part gives."""

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies import resident
-from contactopt.bodies.assembled import AssembledBody, Guides, Surface
+from contactopt.bodies.assembled import AssembledBody, Guides, Surface, Work
 from contactopt.bodies.fields import Region
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
@@ -328,6 +328,10 @@ class AssembledRemote(Remote, AssembledBody):
     @cached_property
     def interface_unknowns(self) -> int:
         return int(self._ask("interface_unknowns"))
+
+    @cached_property
+    def work(self) -> Work:
+        return Work(*self._ask("work"))
 
     def guides(self) -> Guides:
         return Guides(*self._ask("guides"))

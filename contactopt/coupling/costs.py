@@ -1,58 +1,89 @@
-"""The choice between the ways to a solution by their cost, with every number that it rests on.
+"""The choice between the ways to a solution by their cost, estimated from the matrices at hand.
 
-`python -m experiments.questions.ways` measures the ways on punches of growing size, in the plane
-and in space, fits COSTS to the measured times and draws both as maps (reports/ways/report.md).
-MOST_EXPLICIT is not fitted but chosen: an array of half a gigabyte. STEPS_BY_PRODUCTS was measured
-on rigid and elastic bodies of 130 to 870 interface unknowns that friction alone holds.
+A way is a form of Q and a solver of the bodies: a dense Q, products with Q by factors, or bodies
+and contact at once by multigrid. `python -m experiments.questions.ways` measures them on meshes
+that nobody prepared, fits COSTS to one family of meshes and judges the choice by another
+(reports/ways/report.md). MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a
+gigabyte, and a coupled way that takes less than half the time of factors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-WAYS = ("dense", "products", "coupled")
+from contactopt.bodies.assembled import Work
+
 MOST_EXPLICIT = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
-# seconds that Newton's steps by products take beyond the products, in the smallest problem
-STEPS_BY_PRODUCTS = 0.2
+AGAIN = 2.0  # factor on the cost of the coupled way where factors would serve more than one solve
 
-# (dimension, body solver) -> seconds per unit of each of `terms`, on one core
-COSTS: dict[tuple[int, str], tuple[float, ...]] = {
-    (2, "superlu"): (3.35e-05, 0.0, 4.8e-10, 1.21e-06),
-    (2, "pardiso"): (2.87e-05, 0.0, 2.47e-10, 3.43e-06),
-    (2, "multigrid"): (8.1e-05, 0.0, 0.0, 0.0),
-    (3, "superlu"): (6.77e-05, 5.44e-09, 1.34e-09, 2.38e-06),
-    (3, "pardiso"): (6.26e-05, 1.12e-09, 4.86e-10, 5.08e-06),
-    (3, "multigrid"): (0.00012, 0.0, 0.0, 0.0),
+# (way, solver of the bodies) -> seconds per unit of each of `terms`, on one core
+COSTS: dict[tuple[str, str], tuple[float, ...]] = {
+    ("dense", "superlu"): (7.09e-02, 6.12e-07, 3.39e-10, 1.52e-10),
+    ("dense", "pardiso"): (7.55e-02, 8.23e-07, 8.27e-12, 1.45e-10),
+    ("products", "superlu"): (1.24e-01, 1.60e-07, 1.94e-10, 4.19e-07, 6.48e-04, 2.10e-06),
+    ("products", "pardiso"): (1.87e-01, 9.42e-07, 1.76e-10, 0.0, 8.11e-04, 1.85e-06),
+    ("coupled", "multigrid"): (1.83e-01, 1.70e-06, 1.19e-03, 7.87e-07),
 }
+FORM_OF = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
 
 
-def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
-    """What the cost of a way grows with, (4,) terms, to which COSTS gives the seconds.
+def terms(way: str, works: Sequence[Work], unknowns: int, dim: int) -> np.ndarray:
+    """What the cost of a way grows with, to which COSTS gives the seconds.
 
-    The largest body has n unknowns, m of them on the contact surface. Assembly grows with n, and so
-    does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and n^2 in
-    space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
+    Every way has a fixed cost, and assembly grows with the entries of the stiffness. Factors take
+    the operations of their elimination; those of a dense Q keep the contact unknowns to the end. A
+    dense Q takes the cubes of the contact unknowns of each body, to invert a Schur complement, and
+    of all, for Newton's steps. Products with Q take the entries of the factors, and a model of Q on
+    the contact surface, which takes more for each unknown of a surface than for one of a line. The
+    coupled way takes V-cycles, whose matrices have a share of the entries of the stiffness, and the
+    same model.
+
+    Parameters
+    ----------
+    way : A key of FORM_OF.
+    works : Of each body.
+    unknowns : Number of all interface unknowns.
+    dim : Number of dimensions, 2 or 3.
+
+    Returns
+    -------
+    The terms, as many as COSTS has prices.
     """
-    factors = n ** (1.5 if dim == 2 else 2.0)
-    substitution = n * np.log2(max(n, 2)) if dim == 2 else n ** (4 / 3)
+    total = np.sum([[w.stiffness, *w.factors, *w.factors_contact_last] for w in works], axis=0)
+    stiffness, entries, operations, _, ordered = total
+    cubes = sum(float(w.contact) ** 3 for w in works) + float(unknowns) ** 3
+    model = unknowns, unknowns**2 if dim == 3 else 0
     of_way = {
-        "dense": (n, factors, m**3, 0),
-        "products": (n, factors, 0, substitution),
-        "coupled": (n, 0, 0, 0),
+        "dense": (1, stiffness, ordered, cubes),
+        "products": (1, stiffness, operations, entries, *model),
+        "coupled": (1, stiffness, *model),
     }
     return np.array(of_way[way], dtype=float)
 
 
-def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
-    """Estimated time [s] of set-up and solution on one core, with a solver of bodies by factors."""
-    return float(np.dot(COSTS[dim, solver], terms(way, m, n, dim)))
+def estimates(
+    works: Sequence[Work], unknowns: int, dim: int, solvers: Sequence[str], Q: str, once: bool
+) -> dict[tuple[str, str], float]:
+    """Estimated seconds of set-up and solution on one core, for each way that is open.
 
+    Parameters
+    ----------
+    works, unknowns, dim : As for `terms`.
+    solvers : Solvers of the bodies that may be taken.
+    Q : The form of Q that is asked for, or 'auto'.
+    once : Whether one problem is solved by Newton's steps, and factors serve nothing else.
 
-def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") -> str:
-    """The cheaper form of Q, 'explicit' or 'implicit', as for `terms`. Where a body is `iterative`,
-    without factors, an explicit Q would need m solves, which never pays.
+    Returns
+    -------
+    (way, solver) -> seconds.
     """
-    if iterative or m > MOST_EXPLICIT:
-        return "implicit"
-    dense, products = (seconds(way, m, n, dim, solver) for way in WAYS[:2])
-    return "explicit" if dense <= products + STEPS_BY_PRODUCTS else "implicit"
+    found = {}
+    for (way, solver), prices in COSTS.items():
+        asked = Q in ("auto", FORM_OF[way])
+        large = way == "dense" and Q == "auto" and unknowns > MOST_EXPLICIT
+        if solver in solvers and asked and not large:
+            cost = float(np.dot(prices, terms(way, works, unknowns, dim)))
+            found[way, solver] = cost * (AGAIN if way == "coupled" and not once else 1.0)
+    return found

@@ -31,11 +31,11 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.protocol import Body
-from contactopt.bodies.solvers import factors_of
+from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.coupling.compliance import compliance, filling, operator
-from contactopt.coupling.costs import MOST_EXPLICIT, form_of
+from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling, couple
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
 from contactopt.coupling.problem_of_bodies import problem_of, signed_map
@@ -271,6 +271,7 @@ def reduce_bodies(
     Q: str = "auto",
     solver: str = "auto",
     coupling: str | None = None,
+    once: bool = True,
 ) -> Reduction:
     """Reduce a scene to its interface problem and keep the bodies, from which fields are recovered.
 
@@ -279,6 +280,8 @@ def reduce_bodies(
     Parameters
     ----------
     scene, elements, zone, Q, solver, coupling : As for reduce(), and so are the errors.
+    once : Whether one problem is solved by Newton's steps. If not, factors serve more than that,
+        and multigrid is taken only where it costs much less.
 
     Returns
     -------
@@ -298,8 +301,8 @@ def reduce_bodies(
         planes = mirror_planes(scene, [body.guides() for body in assembled], cutting)
     times.append(time.perf_counter())
 
+    Q, solver = _way(scene, assembled, maps, (Q, solver), once)
     iterate = any(body.iterates(solver) for body in assembled)
-    Q = _form(Q, scene.dim, assembled, maps, iterate, solver)
     implicit = Q == "implicit"
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, maps[0].shape[0])
     if not implicit:
@@ -338,22 +341,29 @@ def _checked(
     return elements, zone
 
 
-def _form(
-    Q: str,
-    dim: int,
+def _way(
+    scene: Scene,
     assembled: Sequence[AssembledBody],
     maps: Sequence[sp.csr_matrix],
-    iterate: bool,
-    solver: str,
-) -> str:
-    """The form of Q that was asked for, or the cheaper one."""
-    if Q != "auto":
-        return Q
-    contact = max(body.interface_unknowns for body in assembled)
-    largest = max(body.unknowns for body in assembled)
-    if filling(maps) ** 0.5 > MOST_EXPLICIT:
-        contact = MOST_EXPLICIT + 1
-    return form_of(contact, largest, dim, iterate, factors_of(solver, dim))
+    asked: tuple[str, str],
+    once: bool,
+) -> tuple[str, str]:
+    """The form of Q and the solver of the bodies that were asked for; for `auto`, those of
+    the cheapest way.
+    """
+    Q, solver = asked
+    if any(body.iterates(solver) for body in assembled if not body.work.stiffness):
+        return ("implicit" if Q == "auto" else Q), solver
+    solvers = solvers_there() if solver == "auto" else (solver,)
+    unknowns = round(filling(maps) ** 0.5)
+    costs = estimates([body.work for body in assembled], unknowns, scene.dim, solvers, Q, once)
+    if not costs:  # a solver of others, whose costs nobody knows
+        iterative = any(body.iterates(solver) for body in assembled)
+        return ("implicit" if iterative else "explicit") if Q == "auto" else Q, solver
+    way, solver = min(costs, key=lambda own: costs[own])
+    told = ", ".join(f"{name} {by} {cost:.2g} s" for (name, by), cost in costs.items())
+    log.info("scene '%s': the way is %s by %s, of %s", scene.name, way, solver, told)
+    return FORM_OF[way], solver
 
 
 def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:

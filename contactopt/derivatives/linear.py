@@ -232,11 +232,9 @@ def _with_bodies(tangent: Tangent, form: CoupledForm) -> Solve:
     """With the equilibrium of the bodies beside the contacts, so that no product with Q is needed
     (contactopt.methods.kernels.coupled_newton).
     """
-    P = fitted(model_of(tangent.problem, deflate=False), form)
-    coupled, linearised = (
-        Coupled(tangent.equations, form, P),
-        Linearised(tangent.equations, tangent.D),
-    )
+    equations = tangent.equations
+    P = fitted(model_of(tangent.problem, deflate=False), form, equations.V)
+    coupled, linearised = Coupled(equations, form, P), Linearised(equations, tangent.D)
     none = form.pulled(np.zeros(tangent.D.shape[0] * tangent.D.shape[1]))
 
     def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

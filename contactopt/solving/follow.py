@@ -61,7 +61,8 @@ def follow(
     bodies: Forces | None = None
     for scene in scenes:
         if solved is None:
-            solved = solve_scene(scene, elements, zone, options)
+            once = isinstance(scenes, Sized) and len(scenes) == 1
+            solved = solve_scene(scene, elements, zone, options, once=once)
         else:
             solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
         state, bodies = _state(solved, states[-1] if states else None, bodies)

@@ -31,6 +31,7 @@ from contactopt.solving.progress import progress_lines
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
+STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ def solve_scene(
     zone: float | None = None,
     options: Options | None = None,
     start: Solved | None = None,
+    once: bool = True,
 ) -> Solved:
     """Reduce a scene on one mesh and solve it. The solution says itself whether it is certified.
 
@@ -101,13 +103,15 @@ def solve_scene(
     start : The same scene solved on another mesh, to start from. Without one, where Newton's steps
         take products with Q, the scene is first solved on a coarser mesh, if its bodies can make
         one.
+    once : Whether no further states follow on the same bodies, whose factors would serve them too.
     """
     options = options or Options()
     if not isinstance(scene, Scene):
         raise InputError(f"a scene must be a Scene; got {type(scene).__name__}.")
     elements = scene.elements if elements is None else elements
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
-    reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
+    once = once and options.method in STEPS
+    reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver, once=once)
     coarse: dict[str, float] = {}
     Q = reduction.problem.Q
     # half-spaces have coarse grids of their own

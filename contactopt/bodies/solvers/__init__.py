@@ -60,21 +60,9 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
     return kind
 
 
-def factors_of(name: str, dim: int) -> str:
-    """Name the solver with factors that a name stands for in a large body.
-
-    Parameters
-    ----------
-    name : A key of SOLVERS, or 'auto', which takes PARDISO in space where it is installed.
-    dim : Number of dimensions, 2 or 3.
-
-    Returns
-    -------
-    A key of FACTORS_UP_TO.
-    """
-    if name in FACTORS_UP_TO:
-        return name
-    return "pardiso" if dim == 3 and find_spec("pypardiso") is not None else "superlu"
+def solvers_there() -> tuple[str, ...]:
+    """The names of the solvers whose packages are installed."""
+    return tuple(name for name in SOLVERS if name != "pardiso" or find_spec("pypardiso"))
 
 
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
@@ -82,7 +70,8 @@ def choose(n: int, dim: int, pardiso: bool = False) -> str:
 
     Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2)
     and n^2 operations. The work and the memory of multigrid grow with n. The limits stand in
-    contactopt.bodies.solvers.constants.
+    contactopt.bodies.solvers.constants. Where a scene is at hand, contactopt.coupling.costs knows
+    more.
     """
     if dim == 2 or n <= PARDISO_FROM:
         return "superlu"

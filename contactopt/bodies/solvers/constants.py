@@ -10,12 +10,12 @@ from __future__ import annotations
 # number of unknowns.
 PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
 
-# `python -m experiments.questions.ways` compares whole solves; multigrid takes less than half the
-# time of factors beyond these limits.
+# The limits for a body by itself. In a scene contactopt.coupling.costs chooses for all its bodies.
 FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body that is factorised
 
 # Chosen by the times of trials.
 LEAF = 48  # nodes of a piece of the mesh that nested dissection does not cut further
+COARSE_LEAF = 200  # the same where only the size of the factors is estimated
 
 # Chosen by the times of trials that varied one of these at a time.
 COARSEST = 60  # nodes or aggregates that multigrid does not coarsen further

@@ -18,6 +18,7 @@ fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ from contactopt.errors import BackendError, InputError
 from contactopt.linear.concurrency import Crew
 
 SINGLE = np.float32
+IMPORTING = Lock()  # of two threads that import pyamg at once one may see half of it
 PIECES = 16  # in which the rows of a matrix are brought into blocks
 
 
@@ -221,8 +223,9 @@ def _coarsen(
     A (n, n) in blocks of nodes;  modes (n, j) it should represent exactly;  points (dim, nodes)
     """
     try:
-        from pyamg.aggregation.aggregate import standard_aggregation
-        from pyamg.aggregation.tentative import fit_candidates
+        with IMPORTING:
+            from pyamg.aggregation.aggregate import standard_aggregation
+            from pyamg.aggregation.tentative import fit_candidates
     except ImportError as error:
         raise InputError(
             "the body solver 'multigrid' needs the package pyamg: pip install pyamg, or choose"

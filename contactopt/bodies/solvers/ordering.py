@@ -12,11 +12,13 @@ Trans. Math. Softw. 11, 141-153.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import spilu
 
-from contactopt.bodies.solvers.constants import LEAF
+from contactopt.bodies.solvers.constants import COARSE_LEAF, LEAF
 
 
 def elimination_order(
@@ -73,26 +75,70 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
     Of the median planes across the axes the one with the fewest separating nodes cuts the nodes at
     points (dim, n), whose graph (n, n) is a symmetric pattern.
     """
+    blocks = [block for block, _ in _dissected(graph, points, LEAF)]
+    return np.concatenate(blocks[::-1]) if blocks else np.zeros(0, dtype=np.intp)
+
+
+def elimination_work(
+    graph: sp.csr_matrix, points: np.ndarray, kept: np.ndarray
+) -> tuple[float, float]:
+    """Estimate what sparse factors take from the graph of the nodes alone.
+
+    When the separator of a piece is eliminated, it fills a front with itself and with the nodes
+    around the piece. With s and b nodes these are s^2 / 2 + s b entries and s^3 / 3 + s^2 b + s b^2
+    operations. Pieces that are not cut any further are left out, for their work grows with the
+    number of nodes alone.
+
+    Parameters
+    ----------
+    graph : (n, n) pattern of the nodes that share an element.
+    points : (dim, n) their coordinates.
+    kept : (m,) nodes whose unknowns are eliminated last.
+
+    Returns
+    -------
+    The entries of the factors and the multiplications that make them, of scalars.
+    """
+    dim = len(points)
+    outside = np.ones(graph.shape[0], dtype=bool)
+    inside = np.setdiff1d(np.arange(graph.shape[0]), kept)
+    entries, operations = 0.0, 0.0
+    for block, piece in _dissected(graph[inside][:, inside], points[:, inside], COARSE_LEAF):
+        if len(block) == len(piece):
+            continue
+        own, s = inside[piece], float(len(block))
+        outside[own] = False
+        around = np.unique(graph[own].indices)
+        b = float(np.count_nonzero(outside[around]))
+        outside[own] = True
+        entries += s**2 / 2 + s * b
+        operations += s**3 / 3 + s**2 * b + s * b**2
+    m = float(len(kept))
+    return dim**2 * (entries + m**2 / 2), dim**3 * (operations + m**3 / 3)
+
+
+def _dissected(
+    graph: sp.csr_matrix, points: np.ndarray, leaf: int
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Separators with the pieces that they cut, from the whole mesh on; a piece of at most `leaf`
+    nodes, and one that no plane cuts, is its own separator.
+    """
     graph = sp.csr_matrix((np.ones(graph.nnz, np.int8), graph.indices, graph.indptr), graph.shape)
-    order = np.empty(graph.shape[0], dtype=np.intp)
-    stack = [(graph, np.arange(graph.shape[0]), graph.shape[0])]
-    while stack:  # `end`: one past the place in `order` of the last node of this piece
-        piece, nodes, end = stack.pop()
-        if len(nodes) <= LEAF:
-            order[end - len(nodes) : end] = nodes
+    stack = [(graph, np.arange(graph.shape[0]))]
+    while stack:
+        piece, nodes = stack.pop()
+        if len(nodes) <= leaf:
+            yield nodes, nodes
             continue
         left, separator = min(
             (_cut(piece, x) for x in points[:, nodes]), key=lambda cut: int(cut[1].sum())
         )
         right = ~(left | separator)
-        count = int(separator.sum())
-        if count in (0, len(nodes)) and not (left.any() and right.any()):
-            order[end - len(nodes) : end] = nodes
+        if separator.sum() in (0, len(nodes)) and not (left.any() and right.any()):
+            yield nodes, nodes
             continue
-        order[end - count : end] = nodes[separator]
-        for part, stop in ((right, end - count), (left, end - count - int(right.sum()))):
-            stack.append((piece[part][:, part], nodes[part], stop))
-    return order
+        yield nodes[separator], nodes
+        stack += [(piece[part][:, part], nodes[part]) for part in (left, right)]
 
 
 def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

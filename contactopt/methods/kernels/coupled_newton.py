@@ -55,6 +55,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
 MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
+IDLE = 3  # steps without progress after which it begins anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,20 +157,23 @@ def coupled_steps(
     """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
 
     `form` is the dimensionless problem's Q before condensation; `start` None stands for the bonded
-    solution. Yields an iterate, and the residual of the equations that its step began with. The
-    iteration ends where a step fails.
+    solution. Yields an iterate, and the residual of the equations that its step began with.
+
+    Where the residual does not fall for more than IDLE steps, a rough start has led the sorting of
+    the contacts into a circle, and the iteration begins anew, once, from an accurate bonded
+    solution. It ends where a step fails.
     """
     with one_blas_thread():
         several = len(problem.pairs) > 1
         P = model_of(problem, preconditioner, deflate=several)
         equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
-        coupled = Coupled(equations, form, P if several else fitted(P, form))
+        coupled = Coupled(equations, form, P if several else fitted(P, form, problem.V))
         at = (
-            _bonded(problem, coupled)
+            _bonded(problem, coupled, COUPLED_FIRST)
             if start is None
             else State(in_equilibrium(form, start[0], GIVEN_BALANCE), *start)
         )
-    last = np.inf
+    first, last, best, idle = COUPLED_FIRST, np.inf, np.inf, 0
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
@@ -182,14 +186,20 @@ def coupled_steps(
             error = _parted(right)[1].reshape(at.r.shape)
             known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
         yield known, residual
-        rtol = forcing(residual, last, COUPLED_FIRST, COUPLED_LOOSEST, COUPLED_TIGHTEST)
+        best, idle = min(best, residual), 0 if residual < best else idle + 1
+        if idle > IDLE and first > COUPLED_TIGHTEST:
+            first, last, idle = COUPLED_TIGHTEST, np.inf, 0
+            with one_blas_thread():
+                at = _bonded(problem, coupled, first)
+            continue
+        rtol = forcing(residual, last, first, COUPLED_LOOSEST, COUPLED_TIGHTEST)
         with one_blas_thread():
             at, last = coupled.step(at, right, linearised, rtol), residual
 
 
-def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
-    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to COUPLED_FIRST,
-    or no force at all.
+def _bonded(problem: InterfaceProblem, coupled: Coupled, rtol: float) -> State | None:
+    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to a relative
+    accuracy, or no force at all.
     """
     none = np.zeros(problem.q.shape)
     zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
@@ -198,32 +208,38 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
         return zero
     glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
     right, linearised = glue.linearised(zero)
-    bonded = glue.step(zero, right, linearised, COUPLED_FIRST)
+    bonded = glue.step(zero, right, linearised, rtol)
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
 
 
-def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
+def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditioner:
     """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a
-    random force does most of its work.
+    random balanced force does most of its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur
-    complement that is rather too large than too small.
+    complement that is rather too large than too small. Forces that are not in balance tell nothing:
+    a body that no support holds is held at a few nodes meanwhile, where they are taken up, and the
+    V-cycle knows the large motion that follows to a few digits only. So x has V'x = 0, and of Q x
+    counts what no motion V lambda can undo.
 
     Parameters
     ----------
     P : The preconditioner, with its model of Q if it has one.
     form : Q before condensation.
+    V : (n, p) the motions of the contacts that the multipliers stand for.
 
     Returns
     -------
     P and its model, scaled.
     """
-    # The mean eigenvalue of P Q, weighted with the work of a random force x: (Qx)' P (Qx) over x'
-    # Qx.
+    # The mean eigenvalue of P Q, weighted with the work of the force: (Qx)' P (Qx) over x' Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])
+    x -= V @ np.linalg.lstsq(V, x, rcond=None)[0]
     Qx = form.moved(form.approximate(form.pulled(x)), x)
+    PV = np.stack([P @ v for v in V.T], axis=1) if V.shape[1] else V
+    Qx = Qx - V @ (np.linalg.pinv(V.T @ PV) @ (PV.T @ Qx))
     factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)

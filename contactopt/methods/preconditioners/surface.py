@@ -47,7 +47,7 @@ from contactopt.methods.preconditioners.constants import (
 )
 from contactopt.problem import InterfaceProblem
 
-ACCURACY = 1e-4  # of the rational function
+ACCURACY = 1e-3  # of the rational function
 
 Act = Callable[[np.ndarray], np.ndarray]
 Root = tuple[Act, Act]  # products with P and with G = P^-1

@@ -1,0 +1,1 @@
+"""Which way to the solution is the cheapest on meshes that nobody prepared?"""

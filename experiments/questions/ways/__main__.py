@@ -1,0 +1,187 @@
+"""Which way to the solution is the cheapest, and does contactopt take it?
+
+`python -m experiments.questions.ways` measures all ways on both families of meshes. The costs of
+contactopt.coupling.costs are fitted to the family `fit`, and the choice is judged by the family
+`judge`. The command with the name of a family measures this one alone, and with `none` it fits and
+judges what was measured before.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+from contactopt import Scene, reduce_bodies, solve
+from contactopt.bodies import assemble
+from contactopt.bodies.assembled import Work
+from contactopt.bodies.solvers import solvers_there
+from contactopt.coupling.costs import COSTS, FORM_OF, terms
+from experiments.questions.ways.unprepared import FAMILIES, Case, cases, scene, warm
+from experiments.report import stored, write
+
+LIMIT = 10.0  # CPU seconds after which a way is given up
+SHORT, REPEATS = 0.5, 2  # the least of so many runs counts if the first one takes less seconds
+WITHIN = 1.3  # times the best way that a good choice takes
+
+TEXT = """Which way to the solution is the cheapest, and does contactopt take it? There are three
+ways: a dense Q, products with Q by the factors of both bodies, or bodies and contact at once by
+multigrid (`coupled`). The scenes are two bodies on meshes by Gmsh, and on structured meshes whose
+nodes are shaken and renumbered. mu is 0.3, and the default method solves them to a certificate of
+1e-8. Times are CPU seconds of one run, with the set-up and with one thread of BLAS; other programs
+had a share of the machine. A way was given up after {limit} s.
+
+{findings}
+
+The costs in `contactopt/coupling/costs.py` were fitted to the times of another family of scenes.
+Their upper bodies have another shape, stiffness and gradation. The scenes by which the choice is
+judged:
+
+{{judges}}
+
+`auto` is what contactopt takes by itself.
+"""
+
+FITTED = """
+The prices, how far the estimates are off on the scenes to which they were fitted, and the times
+there:
+
+{{prices}}
+
+{{times}}
+"""
+
+
+def timed(made: Scene, Q: str, solver: str) -> tuple[float, str]:
+    """CPU time of a run, and the way that it took."""
+    begin = time.process_time()
+    reduction = reduce_bodies(made, Q=Q, solver=solver)
+    solution = solve(reduction.problem)
+    took = time.process_time() - begin
+    form = "dense" if isinstance(reduction.problem.Q, np.ndarray) else "products"
+    name = reduction.bodies[0].solver.name  # type: ignore[attr-defined]
+    way = f"{'coupled' if name == 'multigrid' else form} {name}"
+    return (took if solution.solved else np.inf), way
+
+
+@contextmanager
+def limited() -> Iterator[None]:
+    """TimeoutError after LIMIT seconds of CPU."""
+
+    def out(*_: Any) -> None:
+        raise TimeoutError
+
+    signal.signal(signal.SIGPROF, out)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def measured(case: Case) -> dict[str, Any]:
+    """Times of all ways and of the choice, alternating where they are short."""
+    made = scene(case)
+    runs = {" ".join(way): (FORM_OF[way[0]], way[1]) for way in COSTS if way[1] in solvers_there()}
+    row: dict[str, Any] = {
+        "family": case.family,
+        "scene": case.name,
+        "unknowns": sum(body.unknowns for body in _assembled(made)),
+        "on the contact": sizes(made)[1],
+        "taken": "",
+    }
+    best: dict[str, float] = {}
+    for again in range(REPEATS):
+        for name, (Q, solver) in (runs | {"auto": ("auto", "auto")}).items():
+            if again and best[name] > SHORT:
+                continue
+            took, way = LIMIT, ""
+            with suppress(TimeoutError), limited():
+                took, way = timed(made, Q, solver)
+            if name == "auto":
+                row["taken"] = way
+            best[name] = min(took, best.get(name, np.inf))
+    return row | {name: round(took, 3) for name, took in best.items()}
+
+
+def sizes(made: Scene) -> tuple[list[Work], int]:
+    """What the estimates are made from: the work of each body, and the interface unknowns."""
+    bodies = _assembled(made)
+    return [body.work for body in bodies], len(bodies[0].body.nodes) * made.dim
+
+
+def _assembled(made: Scene) -> list[Any]:
+    return [assemble(made, part, 16, None) for part in made.parts]
+
+
+def fitted(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The prices by least squares of relative errors, not negative, and how far they are off."""
+    named = {case.name: case for case in cases("fit")}
+    known = {row["scene"]: (*sizes(scene(named[row["scene"]])), row) for row in rows}
+    found = []
+    for way, solver in COSTS:
+        name = f"{way} {solver}"
+        mine = [one for one in known.values() if 0 < float(one[2].get(name) or 0) < LIMIT]
+        if not mine:
+            continue
+        t = np.array([float(row[name]) for *_, row in mine])
+        dims = [3 if row["scene"].startswith("solid") else 2 for *_, row in mine]
+        A = np.array([terms(way, works, k, dim) for (works, k, _), dim in zip(mine, dims)])
+        prices, _ = nnls(A / t[:, None], np.ones(len(t)))
+        off = A @ prices / t
+        found.append(
+            {
+                "way": name,
+                "prices": " ".join(f"{price:.2e}" for price in prices),
+                "estimate over measured": f"{off.min():.2f} to {off.max():.2f}",
+            }
+        )
+    return found
+
+
+def judged(rows: list[dict[str, Any]]) -> list[str]:
+    """What the choice costs, over the best way; each row gets its ratio."""
+    ways = [" ".join(way) for way in COSTS if any(row.get(" ".join(way)) for row in rows)]
+    for row in rows:
+        row["best"] = min(ways, key=lambda way: float(row[way]))
+        row["auto / best"] = round(float(row["auto"]) / float(row[row["best"]]), 2)
+    ratios = np.array([row["auto / best"] for row in rows])
+    solvers = " and ".join(sorted({way.split()[1] for way in ways}))
+    return [
+        f"- On {len(rows)} scenes the choice takes {np.median(ratios):.2f} times the best way in"
+        f" the median and {ratios.max():.2f} times at worst, its own cost included. On"
+        f" {np.count_nonzero(ratios <= WITHIN)} of them it takes at most {WITHIN} times.",
+        f"- The solvers of the bodies are {solvers}.",
+    ]
+
+
+def main(arguments: list[str]) -> None:
+    known = stored("ways", "times") + stored("ways", "judges")
+    measure = [name for name in FAMILIES if not arguments or name in arguments]
+    of = {name: [row for row in known if row["family"] == name] for name in FAMILIES}
+    for small in warm() if measure else ():
+        for way, solver in COSTS:
+            if solver in solvers_there():
+                timed(small, FORM_OF[way], solver)
+    with suppress(KeyboardInterrupt):  # what was measured until then is written
+        for family in measure:
+            of[family] = []
+            for case in cases(family):
+                of[family].append(measured(case))
+                print(of[family][-1], flush=True)
+    findings = "\n".join(judged(of["judge"]))
+    tables, text = {"judges": of["judge"]}, TEXT.format(limit=LIMIT, findings=findings)
+    if of["fit"]:
+        tables |= {"prices": fitted(of["fit"]), "times": of["fit"]}
+        text += FITTED.format()
+    write("ways", "Which way to the solution", text, tables, {})
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
