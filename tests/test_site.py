@@ -97,7 +97,7 @@ def test_tutorials_were_executed_and_their_slider_is_there(built):
         assert "<img" in page, f"{path.stem}: no figure"
         assert page.count("<details>") == path.read_text().count("<details>") > 0
     assert (
-        'class="one-node"'
+        'class="slider"'
         in (built / "generated" / "tutorials" / "one_contact_node.html").read_text()
     )
 

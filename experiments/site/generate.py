@@ -42,7 +42,6 @@ ACCURACY = (
     "facing_surfaces",
     "load_cycle",
     "calculix",
-    "qp_backends",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
