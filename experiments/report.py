@@ -20,8 +20,8 @@ def environment() -> str:
     """Python, packages and machine, in one line."""
     packages = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return (
-        f"Python {platform.python_version()}, {packages}; {platform.machine()}, {os.cpu_count()}"
-        " cores"
+        f"Python {platform.python_version()}, {packages};"
+        f" {platform.machine()}, {os.cpu_count()} cores"
     )
 
 

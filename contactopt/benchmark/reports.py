@@ -162,8 +162,8 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
         raise InputError("; ".join(errors))
     if not made:
         raise InputError(
-            f"'{reports}' holds no table of these experiments; make one with: contactopt report"
-            " --run quick"
+            f"'{reports}' holds no table of these experiments;"
+            " make one with: contactopt report --run quick"
         )
     return page
 

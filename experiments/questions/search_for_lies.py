@@ -197,8 +197,8 @@ def changed(case: dict, seed: int, answer: Solution) -> str:
         )
         if answer.solved and case["only"] is not None and miss > FORCES:
             return (
-                f"the answer changes by {miss:.1e} with forces times {force:g} and lengths times"
-                f" {length:g}"
+                f"the answer changes by {miss:.1e} with forces"
+                f" times {force:g} and lengths times {length:g}"
             )
     return ""
 
