@@ -197,7 +197,7 @@ for much in (0.5, 2.4, 2.6):
 # Two things must be told apart. At a slope of $-1$ this *iteration* stops converging. But the
 # solution stays unique, and other methods find it. At a slope of $+1$ the solution stops being
 # *unique*: there are loads with several solutions, whatever the method. [Tutorial
-# 5](no_one_or_three_solutions.py) shows both.
+# 4](no_one_or_three_solutions.py) shows both.
 
 # %% [markdown]
 # ## Both at once: an SOCP
@@ -383,22 +383,6 @@ Slider("friction coefficient [-]", np.linspace(0, 1.2, 13), in_the_cone, start=5
 # in_3d = InterfaceProblem(Q3, [q3], mu)
 # assert natural_map_residual(in_3d, r3.value[None]) < 1e-4
 # assert np.allclose(r3.value, solve(in_3d).reactions, atol=1e-4)
-# ```
-#
-# </details>
-#
-# **3.** Change the sign of the coupling, $Q_{nt} = -0.4$. Does friction now make the normal force
-# smaller or larger than without friction? Explain the sign of $\mu\, Q_{nt}/Q_{nn}$.
-#
-# <details><summary>Solution</summary>
-#
-# The friction force $r_t < 0$ contributes $Q_{nt} r_t$ to the gap. With $Q_{nt} > 0$ it pulls the
-# node into the floor, which presses back harder: the slope $\mu Q_{nt} / Q_{nn}$ is positive. With
-# $Q_{nt} < 0$ it lifts the node, the normal force falls, and the slope is negative.
-#
-# ```python
-# flipped = solve(InterfaceProblem(Q * [[1, -1], [-1, 1]], [q], mu))
-# assert flipped.reactions[0, 0] < 1.0 < solution.reactions[0, 0]
 # ```
 #
 # </details>
