@@ -55,18 +55,11 @@ class NothingToRun(InputError):
 class Experiment:
     """One experiment file.
 
-    Its fields are the keys of the file; lists and ranges in problems and methods are expanded.
+    Its fields are the keys of the file, which `contactopt.benchmark.keys` describes. Lists and
+    ranges in problems and methods are expanded, and plug-in files are named by their whole path.
 
-    plugins       files, relative to the experiment file
-    settings      names of SETTINGS or bounds on the certificate
-    starts        "cold", "warm": from the certified solution at nine tenths of the load and of the
-                  friction
-    time_limit    [s] wall clock of one run; memory_limit [GB] of data of its process
-    seed          of NumPy's and Python's generators before each run
-    diagnose      rank, condition and thresholds of friction with each problem (contactopt.diagnose)
-    quick         keys that a quick version replaces
-    figures       of the report, see contactopt.benchmark.reports; findings: file with a function
-                  findings(table)
+    path     of the file
+    skipped  why optional entries are left out
     """
 
     name: str
