@@ -20,8 +20,8 @@ def environment() -> str:
     """Python, packages and machine, in one line."""
     packages = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return (
-        f"Python {platform.python_version()}, {packages}; {platform.machine()}, {os.cpu_count()}"
-        " cores"
+        f"Python {platform.python_version()}, {packages};"
+        f" {platform.machine()}, {os.cpu_count()} cores"
     )
 
 
@@ -53,7 +53,9 @@ def write(
         save(name, stem, rows)
     for stem, figure in figures.items():
         figure.savefig(folder / f"{stem}.png", dpi=120)
-    body = text.format(**{stem: markdown(rows) for stem, rows in tables.items()})
+    body = text
+    for stem, rows in tables.items():
+        body = body.replace(f"{{{stem}}}", markdown(rows))
     path = folder / "report.md"
     pictures = "\n\n".join(f"![{stem}]({stem}.png)" for stem in figures)
     foot = f"Made by `python -m experiments.questions.{name}`.\nEnvironment: {environment()}."

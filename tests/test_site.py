@@ -97,7 +97,7 @@ def test_tutorials_were_executed_and_their_slider_is_there(built):
         assert "<img" in page, f"{path.stem}: no figure"
         assert page.count("<details>") == path.read_text().count("<details>") > 0
     assert (
-        'class="one-node"'
+        'class="slider"'
         in (built / "generated" / "tutorials" / "one_contact_node.html").read_text()
     )
 
@@ -146,12 +146,12 @@ def test_every_room_has_a_page_that_names_its_modules(reference):
         if path.suffix == ".py" or (path / "__init__.py").exists()
     }
     rooms -= {"__init__", "__main__"}
-    assert rooms == set(reference.ROOMS) == set(reference.rooms(ROOT)), (
-        "give the new room a sentence in ROOMS"
+    assert rooms == set(reference.purposes(ROOT)) == set(reference.rooms(ROOT)), (
+        "give the new room a sentence in the map of CONTRIBUTING.md"
     )
     for room in rooms:
         page = pages[Path("api", f"{room}.md")]
-        assert reference.ROOMS[room] in page
+        assert reference.purposes(ROOT)[room] in page
         for path in (ROOT / "contactopt" / room).glob("[a-z]*.py"):
             assert f"automodule:: contactopt.{room}.{path.stem}\n" in page
     for name in re.findall(r"\]\(api/(\w+)\.md\)", pages[Path("api.md")]):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from coulomb_check import violations
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
 from contactopt.benchmark.packings import packing
@@ -44,26 +43,6 @@ def test_both_forms_are_the_same_problem(stack):
     assert natural_map_residual(stack, r) == pytest.approx(
         natural_map_residual(array, r), rel=1e-12
     )
-
-
-@pytest.mark.parametrize("method", ["auto", "newton", "proximal", "nsgs", "admm", "apg"])
-def test_methods_solve_it_and_keep_it_sparse(method, monkeypatch):
-    problem = packing(2, 16, mu=0.3)
-    monkeypatch.setattr(
-        InterfaceProblem, "explicit", lambda self: pytest.fail("Q was formed as an array")
-    )
-    solution = solve(problem, method, tol=1e-6, max_iterations=20_000, time_limit=20)
-    assert solution.solved
-    found = violations(
-        problem.Q.toarray(),
-        problem.q,
-        problem.mu,
-        problem.V,
-        problem.s,
-        solution.reactions,
-        solution.multipliers,
-    )
-    assert max(found.values()) < 2e-5
 
 
 @pytest.mark.parametrize("dim,mu", [(2, 0.0), (2, 0.5), (3, 0.0), (3, 0.7), (3, 1e5)])

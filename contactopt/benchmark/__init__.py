@@ -31,7 +31,7 @@ history. `problem` registers a function that makes an InterfaceProblem in the sa
 
 What a method claims is never believed: each answer gets the certificate of
 contactopt.natural_map_residual, in the process of the campaign and from the problem that it holds.
-Plug-ins run in worker processes only, so that none can change how it is judged.
+Methods run in worker processes only: a crash, a hang or a full memory of one costs one row.
 """
 
 from importlib import import_module

@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 
 from contactopt.benchmark.measure import Answer, Task
-from contactopt.benchmark.plugins import Registry
+from contactopt.benchmark.plugins import PASSED, Registry
 from contactopt.benchmark.process import one_line
-from contactopt.benchmark.runs import PASSED
 from contactopt.benchmark.store import STATUSES
 from contactopt.errors import BackendError, InputError
-from contactopt.methods import METHODS, find_method
+from contactopt.methods import find_method
 from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution, Status
 
@@ -98,7 +97,7 @@ def call(
 ) -> Answer:
     """The answer of a method, in whatever form it gave it. Its own errors pass through."""
     spec, usual = task.run.method, task.run.setting == "default"
-    plugin = None if spec.name in METHODS else plugins.find(spec.name)
+    plugin = plugins.find(spec.name) if spec.foreign else None
     given: dict[str, Any] = {
         "tol": task.run.tolerance,
         "time_limit": task.time_limit,

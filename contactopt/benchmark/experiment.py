@@ -17,18 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark import worker
-from contactopt.benchmark.plugins import Catalogue
+from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
-from contactopt.benchmark.process import Ended, Process
-from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
+from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run, method_spec
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
-from contactopt.methods import METHODS
 
 MOST_RUNS = 200_000  # of one experiment
-LOAD_LIMIT = 120.0  # s to load all plug-ins
 # key -> type of its value, and how a message names that
 TYPES: dict[str, tuple[type, str]] = {
     **dict.fromkeys(("name", "title", "text", "findings"), (str, "a text")),
@@ -59,18 +55,11 @@ class NothingToRun(InputError):
 class Experiment:
     """One experiment file.
 
-    Its fields are the keys of the file; lists and ranges in problems and methods are expanded.
+    Its fields are the keys of the file, which `contactopt.benchmark.keys` describes. Lists and
+    ranges in problems and methods are expanded, and plug-in files are named by their whole path.
 
-    plugins       files, relative to the experiment file
-    settings      names of SETTINGS or bounds on the certificate
-    starts        "cold", "warm": from the certified solution at nine tenths of the load and of the
-                  friction
-    time_limit    [s] wall clock of one run; memory_limit [GB] of data of its process
-    seed          of NumPy's and Python's generators before each run
-    diagnose      rank, condition and thresholds of friction with each problem (contactopt.diagnose)
-    quick         keys that a quick version replaces
-    figures       of the report, see contactopt.benchmark.reports; findings: file with a function
-                  findings(table)
+    path     of the file
+    skipped  why optional entries are left out
     """
 
     name: str
@@ -226,18 +215,16 @@ class _Reader:
     def experiment(self) -> Experiment:
         data, folder = self.table.data, self.path.parent
         paths = tuple(str((folder / plugin).resolve()) for plugin in data.get("plugins", ()))
-        catalogue = self.catalogue(paths)
+        registry = self.registry(paths)
 
         def problem(kind: str, name: str, parameters: dict[str, Any]) -> list[ProblemSpec]:
             found = named(kind, name, parameters, folder)
             for spec in found:
-                spec.check(catalogue.problems)
+                spec.check(registry.problems)
             return found
 
         def method(kind: str, name: str, settings: dict[str, Any]) -> list[MethodSpec]:
-            spec = MethodSpec(name, settings, catalogue.methods.get(name))
-            spec.check()
-            return [spec]
+            return [method_spec(name, settings, registry)]
 
         problems = self.expanded("problems", KINDS, problem)
         methods = self.expanded("methods", ("method",), method)
@@ -249,12 +236,11 @@ class _Reader:
         values |= {"problems": tuple(problems), "methods": tuple(methods), "plugins": paths}
         return Experiment(**values, path=self.path, skipped=tuple(self.skipped))
 
-    def catalogue(self, paths: tuple[str, ...]) -> Catalogue:
-        """What the plug-ins declare, and installed packages for the methods named."""
-        given = [e.get("method") for e in self.table.data["methods"] if isinstance(e, dict)]
-        names = [name for one in given for name in (one if isinstance(one, list) else [one])]
+    def registry(self, paths: tuple[str, ...]) -> Registry:
+        """What the plug-ins declare."""
+        found = Registry()
         with self.table.about("plugins"):
-            found = read_catalogue(paths, [name for name in names if isinstance(name, str)])
+            found.load(paths)
         for name in found.problems:
             if name in FAMILIES:
                 raise self.table.fail(
@@ -312,28 +298,6 @@ def _blamed(message: str, entry: Mapping[str, Any], kind: str) -> str:
         if starts and key != kind:
             places[key] = min(starts)
     return min(places, key=places.__getitem__, default=kind)
-
-
-def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
-    """What plug-in files declare, and the entry points among names of methods, read in a process of
-    its own.
-
-    InputError, naming the file, if a plug-in fails, hangs or ends the process.
-    """
-    asked = [name for name in dict.fromkeys(names) if name not in METHODS]
-    if not paths and not asked:
-        return Catalogue()
-    process = Process()
-    try:
-        found: Catalogue | str = process.ask(LOAD_LIMIT, "load", worker.inspect, paths, asked)
-    except Ended as end:
-        where = ", ".join(f"'{path}'" for path in paths) or "entry points"
-        raise InputError(f"plug-ins ({where}) could not be loaded: {end.status}, {end}.") from end
-    finally:
-        process.kill()
-    if isinstance(found, str):
-        raise InputError(found)
-    return found
 
 
 def _size_of(value: Any) -> int:

@@ -1,8 +1,8 @@
 """Methods and problems of the user: decorated in a file that the experiment names, or entry points
 of a package.
 
-A plug-in runs in worker processes only. The campaign knows it by what it declares, which a process
-of its own reads (contactopt.benchmark.experiment).
+The campaign's process runs the file, to know what it declares. The functions themselves are called
+in worker processes only.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
@@ -23,6 +23,8 @@ from contactopt.methods import METHODS
 
 GROUP = "contactopt.methods"  # of entry points
 LAWS = ("coulomb", "associated")
+# to a plug-in, if it has such an argument
+PASSED = ("tol", "time_limit", "max_iterations", "start")
 
 
 @dataclass(frozen=True)
@@ -39,29 +41,20 @@ class Plugin:
     def iterates(self) -> bool:
         return hasattr(self.make, "iterate")
 
-
-@dataclass(frozen=True)
-class Declared:
-    """A plug-in method without its code: its law, whether it iterates, and its arguments."""
-
-    law: str
-    iterates: bool
-    arguments: inspect.Signature
-
-
-@dataclass(frozen=True)
-class Catalogue:
-    """methods and problems that plug-ins declare, by name."""
-
-    methods: Mapping[str, Declared] = field(default_factory=dict)
-    problems: Mapping[str, inspect.Signature] = field(default_factory=dict)
+    def check(self, settings: Mapping[str, Any]) -> None:
+        """InputError if it does not take these settings."""
+        arguments = inspect.signature(self.make)
+        passed = {name: None for name in PASSED if name in arguments.parameters}
+        problem = [] if self.iterates else [None]
+        try:
+            arguments.bind(*problem, **passed | dict(settings))
+        except TypeError as error:
+            raise InputError(f"method '{self.name}': {error}.") from error
 
 
 @dataclass(frozen=True)
 class Registry:
     """What plug-in files have declared to one process.
-
-    The process owns it and hands it to whoever runs plug-ins.
 
     methods   by name
     problems  functions that return problems, by name
@@ -87,19 +80,12 @@ class Registry:
         """The method of that name, from a loaded file or an entry point; None if there is none."""
         if name not in self.methods:
             for point in entry_points(group=GROUP, name=name):
-                self.methods[name] = Plugin(name, point.load())
+                try:
+                    self.methods[name] = Plugin(name, point.load())
+                except Exception as error:
+                    text = f"plug-in '{point.value}' failed: {type(error).__name__}: {error}"
+                    raise InputError(text) from error
         return self.methods.get(name)
-
-    def declared(self, names: Sequence[str]) -> Catalogue:
-        """What was loaded, and the entry points of these names, without any code."""
-        for name in names:
-            self.find(name)
-        methods = {
-            p.name: Declared(p.law, p.iterates, arguments_of(p.make)) for p in self.methods.values()
-        }
-        return Catalogue(
-            methods, {name: arguments_of(make) for name, make in self.problems.items()}
-        )
 
 
 # The registry that receives what the plug-in file declares that is being run; None at any other
@@ -202,13 +188,3 @@ def _run(path: Path) -> None:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
-
-
-def arguments_of(function: Callable[..., Any]) -> inspect.Signature:
-    """The arguments of a function or class, without types, and None for each default value."""
-    empty = inspect.Parameter.empty
-    parameters = [
-        own.replace(annotation=empty, default=empty if own.default is empty else None)
-        for own in inspect.signature(function).parameters.values()
-    ]
-    return inspect.Signature(parameters)

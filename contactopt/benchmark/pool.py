@@ -86,7 +86,7 @@ class Worker:
                 how = f"{end.status} while its warm start was sought: {end}"
                 row |= {"status": "not_built", "message": how}
             return row
-        if task.run.method.plugin is not None and not row["success"] and row["status"] != "refused":
+        if task.run.method.foreign and not row["success"] and row["status"] != "refused":
             self.doubted = task.run.method.label
         return row
 
@@ -134,8 +134,8 @@ class Worker:
                 self._restart()
                 if end.phase == START:
                     raise InputError(
-                        f"a worker process cannot start ({end.status}, {end}); is there memory"
-                        " enough?"
+                        f"a worker process cannot start ({end.status},"
+                        f" {end}); is there memory enough?"
                     ) from end
                 if end.phase != "warm up":  # which says nothing of the run itself
                     raise
@@ -158,7 +158,7 @@ class Worker:
         if task.run.start == "warm":
             self.solver.ask(BUILD_LIMIT, "neighbour", worker.find_start, self.held)
         if (method.label, dim) not in self.warm and method.name not in _cold:
-            least = WARM_UP if method.plugin is None else PLUGIN_WARM_UP
+            least = PLUGIN_WARM_UP if method.foreign else WARM_UP
             limit = max(MARGIN * task.time_limit + GRACE, least)
             self.solver.ask(limit, "warm up", worker.warm_up, task, dim)
             self.warm.add((method.label, dim))

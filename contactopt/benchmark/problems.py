@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from inspect import Signature
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.benchmark.packings import packing
-from contactopt.benchmark.plugins import arguments_of
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
@@ -44,30 +43,26 @@ class ProblemSpec:
         given = ", ".join(f"{key}={short_number(value)}" for key, value in self.parameters.items())
         return f"{self.name}({given})" if given else self.name
 
-    def check(self, declared: Mapping[str, Signature]) -> None:
+    def check(self, declared: Mapping[str, Callable[..., Any]]) -> None:
         """InputError if the name or a parameter is unknown or out of range. Builds nothing.
 
-        declared  arguments of the problems that plug-ins declare, by name
+        declared  functions of the problems that plug-ins declare, by name
         """
         if self.kind == "scene":
             scene(self.name, **self.parameters)
         elif self.kind == "family":
-            families = {name: arguments_of(make) for name, make in FAMILIES.items()}
-            families |= declared
+            families = FAMILIES | dict(declared)
             if self.name not in families:
                 raise InputError(
                     f"unknown family {self.name!r}; choose from {', '.join(families)}."
                 )
             try:
-                families[self.name].bind(**self.parameters)
+                signature(families[self.name]).bind(**self.parameters)
             except TypeError as error:
                 raise InputError(f"family '{self.name}': {error}.") from error
 
     def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem:
-        """The problem; InputError on parameters that make none.
-
-        declared  functions of the problems that plug-ins declare, by name
-        """
+        """The problem; InputError on parameters that make none. `declared` as for `check`."""
         if self.kind == "scene":
             return reduced(self.name, **self.parameters)
         if self.kind == "fclib":
@@ -101,8 +96,8 @@ def scene(name: str, **parameters: Any) -> Scene:
     bodies = {"upper": made.upper, "lower": made.lower}
     if len(made.meshed) < len(bodies):
         raise InputError(
-            f"scene '{name}' has a rigid body; give its deformable material as arguments of the"
-            " scene."
+            f"scene '{name}' has a rigid body; give its"
+            " deformable material as arguments of the scene."
         )
     if "stiffness_ratio" in given and "lower_E" in given:
         raise InputError("give stiffness_ratio or lower_E, not both.")

@@ -1,19 +1,9 @@
 """Reports: Markdown and one HTML page, from experiment files and the small tables beside the
 reports. Solves nothing.
 
-An experiment file lists its figures and tables in order, each with a caption, a choice of rows and
-arguments:
-
-    findings = "mine.py"                # with a function findings(table) -> sentences, computed
-    [[figures]]
-    kind = "speed_accuracy"             # a function of benchmark.report_figures or .tables
-    caption = "Time against accuracy."
-    where = {"problem.elements" = 16}   # law = "coulomb" unless given
-    optional = true                     # left out where no row fits, as in a quick version
-    time = "cpu_seconds"                # all other keys are arguments of that function
-
-A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its table
-REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
+An experiment file lists its figures and tables in order (`contactopt.benchmark.keys.FIGURE` has the
+keys). A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its
+table REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations
@@ -162,8 +152,8 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
         raise InputError("; ".join(errors))
     if not made:
         raise InputError(
-            f"'{reports}' holds no table of these experiments; make one with: contactopt report"
-            " --run quick"
+            f"'{reports}' holds no table of these experiments;"
+            " make one with: contactopt report --run quick"
         )
     return page
 

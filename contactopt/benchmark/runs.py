@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
-from contactopt.benchmark.plugins import Declared
+from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
 from contactopt.methods import METHODS, find_method
@@ -19,19 +19,17 @@ from contactopt.methods.method import NATIVE
 
 SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
 STARTS = ("cold", "warm")
-# to a plug-in, if it has such an argument
-PASSED = ("tol", "time_limit", "max_iterations", "start")
 # methods of contactopt that solve another problem than Coulomb's
 OTHER_LAWS = {"relaxation": "associated"}
 
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method of contactopt, or a plug-in by what it declares, with the settings given."""
+    """A method of contactopt, or a plug-in, with the settings given and the law that it solves."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
-    plugin: Declared | None = None
+    law: str = "coulomb"
 
     @property
     def label(self) -> str:
@@ -42,33 +40,35 @@ class MethodSpec:
         return f"{self.name}({given})" if given else self.name
 
     @property
-    def law(self) -> str:
-        return self.plugin.law if self.plugin is not None else OTHER_LAWS.get(self.name, "coulomb")
-
-    def check(self) -> None:
-        """InputError if the name or a setting is unknown, or a backend is not installed."""
-        if self.name not in METHODS and self.plugin is None:
-            raise InputError(
-                f"unknown method {self.name!r}; choose from {', '.join(METHODS)}, or name its"
-                " plug-in file."
-            )
-        if self.plugin is not None:
-            arguments = self.plugin.arguments
-            passed = {name: None for name in PASSED if name in arguments.parameters}
-            problem = [] if self.plugin.iterates else [None]
-            try:
-                arguments.bind(*problem, **passed | dict(self.settings))
-            except TypeError as error:
-                raise InputError(f"method '{self.name}': {error}.") from error
-        else:
-            find_method(self.name, **self.settings)
-        self.backends(2, 3)
+    def foreign(self) -> bool:
+        """Whether it is a plug-in."""
+        return self.name not in METHODS
 
     def backends(self, *dims: int) -> str:
         """Names and versions of the backends in any of these dimensions, "native" without;
         InputError if none works.
         """
         return _backends(self.name, json.dumps(dict(self.settings)), dims)
+
+
+def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> MethodSpec:
+    """The method with these settings, checked.
+
+    InputError if its name or a setting is unknown, or a backend is not installed.
+    """
+    if name in METHODS:
+        find_method(name, **settings)
+        law = OTHER_LAWS.get(name, "coulomb")
+    elif (plugin := registry.find(name)) is not None:
+        plugin.check(settings)
+        law = plugin.law
+    else:
+        raise InputError(
+            f"unknown method {name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
+        )
+    spec = MethodSpec(name, settings, law)
+    spec.backends(2, 3)
+    return spec
 
 
 @lru_cache(maxsize=1000)

@@ -1,5 +1,4 @@
-"""What the processes do in which code of the user runs: list what plug-ins declare, build problems,
-run methods.
+"""What the processes do in which code of the user runs: build problems, run methods.
 
 They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them
 from outside. Each keeps its plug-ins, its problem and what is imported from call to call. What runs
@@ -18,7 +17,7 @@ import numpy as np
 
 from contactopt.benchmark.calls import call, measure
 from contactopt.benchmark.measure import Answer, Task
-from contactopt.benchmark.plugins import Catalogue, Registry
+from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
 from contactopt.errors import InputError
@@ -47,17 +46,6 @@ class Kept:
 _kept = Kept()
 
 
-def inspect(paths: tuple[str, ...], names: list[str]) -> Catalogue | str:
-    """What plug-in files declare, and the entry points of these names; a sentence if one fails."""
-    try:
-        _kept.plugins.load(paths)
-        return _kept.plugins.declared(names)
-    except InputError as error:
-        return str(error)
-    except (Exception, SystemExit) as error:
-        return f"a plug-in cannot be used: {type(error).__name__}: {error}"
-
-
 def build(
     spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float
 ) -> tuple[InterfaceProblem, dict[str, Any]] | str:
@@ -70,8 +58,8 @@ def build(
         seconds = time.perf_counter() - begin
         if isinstance(problem.Q, InterfaceOperator):
             raise InputError(
-                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other"
-                " processes."
+                f"problem '{spec.label}' must have Q as a"
+                " matrix; a benchmark hands it to other processes."
             )
         facts = {
             "fingerprint": problem.fingerprint,

@@ -108,8 +108,8 @@ def write(
     law = problem.law
     if not (law.unilateral and law.proportional) or law.dilatant:
         raise InputError(
-            f"FCLib knows Coulomb's law only; this problem has {type(law).__name__} and cannot be"
-            " written."
+            "FCLib knows Coulomb's law only; this problem"
+            f" has {type(law).__name__} and cannot be written."
         )
     if isinstance(problem.Q, InterfaceOperator):
         raise InputError("Q is known by its products only; write problem.explicit().")

@@ -67,8 +67,8 @@ def read_text(path: Path) -> InterfaceProblem:
         raise InputError(f"its dimension is {dim}, not 2 or 3")
     if contacts < 0 or rows != dim * contacts or columns != rows:
         raise InputError(
-            f"its matrix is {rows} by {columns}, which does not fit {contacts} contacts in {dim}"
-            " dimensions"
+            f"its matrix is {rows} by {columns}, which does"
+            f" not fit {contacts} contacts in {dim} dimensions"
         )
     rest = head[5] if len(head) > 5 else ""
     if storage == SPARSE:
@@ -139,8 +139,8 @@ def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
     size, count = [int(found[1]), int(found[2])], int(found[4])
     if size != [n, n] or not 0 <= count <= len(text) // 4:
         raise InputError(
-            f"its sparse matrix announces {size[0]} by {size[1]} with {count} entries, which does"
-            " not fit"
+            f"its sparse matrix announces {size[0]} by {size[1]}"
+            f" with {count} entries, which does not fit"
         )
     listed = "triplet" in line
     entries: list[tuple[int, int, float]] = []

@@ -31,8 +31,8 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
             "A failure counts as the time limit. The least shifted geometric mean CPU time is that"
             f" of `{overall.iloc[0]['method']}` ({1e3 * overall.iloc[0]['shifted mean']:.2g} ms)."
             f" Then follow `{overall.iloc[1]['method']}` ({overall.iloc[1]['over the least']:.1f}"
-            f" times) and `{overall.iloc[2]['method']}` ({overall.iloc[2]['over the least']:.1f}"
-            " times)."
+            f" times) and `{overall.iloc[2]['method']}`"
+            f" ({overall.iloc[2]['over the least']:.1f} times)."
         ),
         "A warm start from nine tenths of load and friction changes the median number of iterations"
         " by the factors "

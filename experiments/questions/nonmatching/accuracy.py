@@ -11,11 +11,8 @@ from contactopt import reduce_bodies, scenes, solve
 from contactopt.scenes.sliding import _sheared
 from contactopt.solving.follow import follow
 from experiments.questions.accuracy.sheared import error
-from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch
+from experiments.questions.nonmatching.bodies import apart, carried, press_fit
 
-METHODS = ("newton", "auto")
-FINE = 192
-SIZES = ((16, 16), (24, 24), (16, 24), (24, 16), (32, 32), (48, 48), (32, 48))
 SHEARS = (10.0, 30.0, 45.0)
 OTHERS = (5.0, 15.0, 25.0, 35.0)
 
@@ -46,41 +43,6 @@ def press_fits() -> list[dict[str, Any]]:
                 rows.append(row | {"friction, largest": float(np.abs(q).max() / exact)})
                 last = off
     return rows
-
-
-def resultant_curve(problem: Any, reactions: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Contact forces (2, places) from the axis to some places: they converge at any pressure."""
-    order = np.argsort(problem.coordinates[0])
-    x = problem.coordinates[0][order]
-    ends = np.concatenate([[0.0], (x[1:] + x[:-1]) / 2, x[-1:]])
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(reactions[order], axis=0)])
-    return np.stack([np.interp(places, ends, s) for s in sums.T])
-
-
-def elastic_punch() -> list[dict[str, Any]]:
-    rows, places = [], np.linspace(0, 20, 101)
-    for degree in (1, 2):
-        fine = reduce_bodies(apart(punch(), FINE, FINE, degree)).problem
-        reference = resultant_curve(fine, solve(fine).reactions, places)
-        for sizes in SIZES:
-            problem = reduce_bodies(apart(punch(), *sizes, degree)).problem
-            found = {method: solve(problem, method=method) for method in METHODS}
-            off = resultant_curve(problem, found["newton"].reactions, places) - reference
-            scale = np.abs(reference).max(axis=1)
-            rms = np.sqrt(np.mean(off**2, axis=1)) / scale
-            row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}"}
-            row |= {"normal": float(rms[0]), "tangential": float(rms[1])}
-            rows.append(row | steps(found))
-    return rows
-
-
-def steps(found: dict[str, Any]) -> dict[str, Any]:
-    newton, auto = (found[method] for method in METHODS)
-    return {
-        "newton: steps": newton.iterations,
-        "newton": newton.status.label,
-        "auto": auto.status.label,
-    }
 
 
 def sheared(

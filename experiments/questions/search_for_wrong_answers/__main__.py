@@ -46,7 +46,7 @@ Disagreements: {count} of {scenes} scenes. Several solutions, of which the ways 
 The width in the table is the median over all quantities of both estimates together, relative to the
 size of the quantity: a wrong answer that is closer than this is not seen.
 
-{table}
+{{table}}
 """
 
 
@@ -85,7 +85,7 @@ def report(found: list[tuple[Verdict, float]]) -> None:
         for each in wrong
     )
     seeds = [verdict.seed for verdict, _ in found]
-    text = TEXT.replace("{table}", "TABLE").format(
+    text = TEXT.format(
         first=min(seeds),
         last=max(seeds),
         scenes=len(found),
@@ -94,7 +94,6 @@ def report(found: list[tuple[Verdict, float]]) -> None:
         sharp=SHARP,
         listed=listed,
     )
-    text = text.replace("{", "(").replace("}", ")").replace("TABLE", "{table}")
     write("search_for_wrong_answers", "A search for wrong answers", text, {"table": rows}, {})
 
 
