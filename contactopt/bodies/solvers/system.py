@@ -67,6 +67,14 @@ class Iteration(NamedTuple):
     cycle: Callable[[np.ndarray], np.ndarray]
 
 
+def out_of_memory(n: int) -> MemoryError:
+    """What to raise where the factors of a body of n unknowns do not fit."""
+    return MemoryError(
+        f"the factors of a body of {n:,} unknowns do not fit into memory; take a coarser mesh, or"
+        " the solver 'multigrid'."
+    )
+
+
 class BodySolver(ABC):
     """Solves A x = b. Several solvers may work at the same time in different threads.
 
@@ -114,8 +122,9 @@ class BodySolver(ABC):
 
     @property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
-        complement of the others in these places. None where there is none without a solve.
+        """R (m, m) lower triangular, zeros above, and the place (m,) of each of `trailing`: R R' is
+        the Schur complement of the others in these places. None where there is none without a
+        solve.
         """
         return None
 
@@ -133,8 +142,8 @@ class BodySolver(ABC):
         at, triangle = self._asked(), self.trailing_triangle
         if triangle is not None:
             R, place = triangle
-            X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
-            C = X.T @ X  # NumPy keeps it symmetric
+            C = la.lapack.dpotri(R, lower=True)[0] if R.size else R.copy()  # its lower triangle
+            C += np.tril(C, -1).T
             return np.asarray(C[np.ix_(place, place)])
         C = np.empty((len(at), len(at)))
         for start in range(0, len(at), COLUMNS):
