@@ -138,8 +138,10 @@ def phases(name: str, solver: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    names = sys.argv[1:] or list(SCENES)
-    pairs = [(n, s) for n in names for s in SOLVERS if s != "pardiso" or find_spec("pypardiso")]
+    # scenes and solvers may be named: those alone are measured again
+    names = [n for n in SCENES if n in sys.argv] or list(SCENES)
+    solvers = [s for s in SOLVERS if s in sys.argv] or list(SOLVERS)
+    pairs = [(n, s) for n in names for s in solvers if s != "pardiso" or find_spec("pypardiso")]
     rows = {
         "ratios": [measure(*pair) for pair in pairs],
         "phases": [phases(*pair) for pair in pairs],

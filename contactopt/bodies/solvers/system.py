@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from contactopt.errors import InputError
 from contactopt.linear.operators import Product
 
-COLUMNS = 64  # unit loads that are solved for at a time, which bounds the memory that they take
+COLUMNS = 64  # of the inverse that are made at a time, which bounds the memory beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +143,11 @@ class BodySolver(ABC):
         if triangle is not None:
             R, place = triangle
             C = la.lapack.dpotri(R, lower=True)[0] if R.size else R.copy()  # its lower triangle
-            C += np.tril(C, -1).T
-            return np.asarray(C[np.ix_(place, place)])
+            for start in range(0, len(C), COLUMNS):  # now its upper triangle
+                here, after = slice(start, start + COLUMNS), slice(start + COLUMNS, None)
+                C[here, after] = C[after, here].T
+                C[here, here] += np.tril(C[here, here], -1).T
+            return C if np.all(np.diff(place) == 1) else np.asarray(C[place][:, place])
         C = np.empty((len(at), len(at)))
         for start in range(0, len(at), COLUMNS):
             chosen = at[start : start + COLUMNS]
