@@ -353,7 +353,7 @@ def _form(
     largest = max(body.unknowns for body in assembled)
     if filling(maps) ** 0.5 > MOST_EXPLICIT:
         contact = MOST_EXPLICIT + 1
-    return form_of(contact, largest, dim, iterate, factors_of(solver, dim))
+    return form_of(contact, largest, dim, iterate, factors_of(solver))
 
 
 def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:

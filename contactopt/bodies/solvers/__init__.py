@@ -60,13 +60,12 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
     return kind
 
 
-def factors_of(name: str, dim: int) -> str:
+def factors_of(name: str) -> str:
     """Name the solver with factors that a name stands for in a large body.
 
     Parameters
     ----------
-    name : A key of SOLVERS, or 'auto', which takes PARDISO in space where it is installed.
-    dim : Number of dimensions, 2 or 3.
+    name : A key of SOLVERS, or 'auto', which takes PARDISO where it is installed.
 
     Returns
     -------
@@ -74,7 +73,7 @@ def factors_of(name: str, dim: int) -> str:
     """
     if name in FACTORS_UP_TO:
         return name
-    return "pardiso" if dim == 3 and find_spec("pypardiso") is not None else "superlu"
+    return "superlu" if find_spec("pypardiso") is None else "pardiso"
 
 
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
@@ -84,7 +83,5 @@ def choose(n: int, dim: int, pardiso: bool = False) -> str:
     and n^2 operations. The work and the memory of multigrid grow with n. The limits stand in
     contactopt.bodies.solvers.constants.
     """
-    if dim == 2 or n <= PARDISO_FROM:
-        return "superlu"
-    factors = "pardiso" if pardiso else "superlu"
-    return factors if n <= FACTORS_UP_TO[factors] else "multigrid"
+    factors = "pardiso" if pardiso and n > PARDISO_FROM else "superlu"
+    return factors if dim == 2 or n <= FACTORS_UP_TO[factors] else "multigrid"
