@@ -54,7 +54,7 @@ class PardisoSolver(BodySolver):
         # own values; METIS; the Schur complement beside the factors
         for index, value in {1: 1, 2: 2, 36: 2 if len(trailing) else 0}.items():
             self.factors.set_iparm(index, value)
-        # as one column: of as many right-hand sides as columns PARDISO would ask for memory
+        # as one column: asked for as many right-hand sides as S has columns, oneMKL crashes
         self._schur = self._call(np.zeros(max(len(trailing) ** 2, 1)))
         self.factors.set_phase(SOLVE)
 
