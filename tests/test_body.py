@@ -82,7 +82,7 @@ def test_areas_and_loads_add_up(kind, area, volume):
     dim = 3 if kind == "solid" else 2
     traction = Traction("top", tuple(np.arange(1.0, dim + 1)))
     body = body_of(kind, loads=(traction,))
-    assert body.areas.sum() == pytest.approx(area)
+    assert body.trace.areas.sum() == pytest.approx(area)
     for i in range(dim):
         assert body.load[body.basis.nodal_dofs[i]].sum() == pytest.approx((i + 1) * area)
     heavy = body_of(kind, loads=(BodyForce((0.0,) * (dim - 1) + (-2.0,)),))
@@ -91,9 +91,9 @@ def test_areas_and_loads_add_up(kind, area, volume):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_normals_point_outward(kind):
-    assert np.allclose(body_of(kind).normals.T, np.eye(3 if kind == "solid" else 2)[-1])
+    assert np.allclose(body_of(kind).trace.normals.T, np.eye(3 if kind == "solid" else 2)[-1])
     assert np.allclose(
-        body_of(kind, contact="bottom").normals.T, -np.eye(3 if kind == "solid" else 2)[-1]
+        body_of(kind, contact="bottom").trace.normals.T, -np.eye(3 if kind == "solid" else 2)[-1]
     )
 
 
@@ -103,8 +103,8 @@ def test_normals_of_a_closed_surface_sum_to_zero():
     )
     part = Part("disc", mesh, MATERIAL, (Support("all"),), contact="all")
     body = build_body(Scene("s", part, two_blocks("plane-strain").lower, 0.0), part, 1, None)
-    assert np.abs(body.normals @ body.areas).max() < 1e-12
-    assert np.all(np.sum(body.normals * body.points, axis=0) > 0)
+    assert np.abs(body.trace.normals @ body.trace.areas).max() < 1e-12
+    assert np.all(np.sum(body.trace.normals * body.points, axis=0) > 0)
 
 
 @pytest.mark.parametrize(

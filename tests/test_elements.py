@@ -89,13 +89,13 @@ def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
     their plane.
     """
     body = body_of(kind, degree, cut)
-    W = body.weights
+    W = body.trace.weights
     assert np.allclose(W.sum(axis=1), 1, atol=1e-12)
     up = (0.0,) * (len(body.unknowns) - 1) + (1.0,)
     scene = with_elements(two_blocks(kind), degree, cut)
     loaded = build_body(scene, replace(scene.lower, loads=(Traction("top", up),)), 1, None)
     assert np.allclose(
-        body.areas @ W, loaded.load[body.unknowns[-1]], atol=1e-13 * body.areas.sum()
+        body.trace.areas @ W, loaded.load[body.unknowns[-1]], atol=1e-13 * body.trace.areas.sum()
     )
     if degree == 1:
         assert np.array_equal(body.nodes, W.indices) and np.allclose(W.data, 1)

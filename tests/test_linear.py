@@ -230,7 +230,8 @@ def test_choice_of_a_solver():
     for pardiso, name in ((False, "superlu"), (True, "pardiso")):
         assert choose(FACTORS_UP_TO[name], 3, pardiso) == name
         assert choose(FACTORS_UP_TO[name] + 1, 3, pardiso) == "multigrid"
-        assert choose(10**6, 2, pardiso) == choose(PARDISO_FROM, 3, pardiso) == "superlu"
+        assert choose(10**6, 2, pardiso) == name
+        assert choose(PARDISO_FROM, 2, pardiso) == choose(PARDISO_FROM, 3, pardiso) == "superlu"
     assert make_solver("auto", BODIES["plane"]).name == "superlu"
 
 
@@ -438,3 +439,27 @@ with ThreadPoolExecutor(1, thread_name_prefix=Prefix()) as pool:
         [sys.executable, "-c", program], timeout=60, check=True, capture_output=True, text=True
     )
     assert "collected True" in ended.stdout
+
+
+def test_threads_share_the_factors_of_pardiso():
+    A, *_ = args = BODIES["solid punch"]
+    solver = made("pardiso", args)
+    loads = np.random.default_rng(0).standard_normal((24, A.shape[0], 3))
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(solver.solve, loads))
+    for load, x in zip(loads, found):
+        assert np.abs(A @ x - load).max() <= 1e-10 * np.abs(load).max()
+
+
+def test_memory_of_pardiso_is_given_back():
+    pytest.importorskip("pypardiso")
+    scene = scenes.flat_punch(3)
+    arguments, sizes = system(scene, scene.lower, 12), []
+    for _ in range(10):
+        solver = make_solver("pardiso", arguments)
+        solver.trailing_inverse()
+        kept = resident()
+        del solver
+        sizes.append(resident())
+    assert kept - sizes[-1] > 20  # its factors were large enough to be seen
+    assert sizes[-1] - sizes[2] < kept - sizes[-1]  # seven of them would be left

@@ -124,13 +124,10 @@ class AssembledBody(ABC):
 
         @property
         def name(self) -> str: ...
-
         @property
         def unknowns(self) -> int: ...
-
         @property
         def interface_unknowns(self) -> int: ...
-
         @property
         def meshed(self) -> bool: ...
 

@@ -62,18 +62,6 @@ class Assembly:
         return self.trace.nodes
 
     @property
-    def areas(self) -> np.ndarray:
-        return self.trace.areas
-
-    @property
-    def normals(self) -> np.ndarray:
-        return self.trace.normals
-
-    @property
-    def weights(self) -> sp.csr_matrix:
-        return self.trace.weights
-
-    @property
     def degree(self) -> int:
         """Of the displacement in every element, 1 or 2."""
         return 1 if self.unknowns.shape[1] == self.basis.mesh.nvertices else 2

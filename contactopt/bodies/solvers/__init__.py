@@ -73,7 +73,5 @@ def choose(n: int, dim: int, pardiso: bool = False) -> str:
     contactopt.bodies.solvers.constants. Where a scene is at hand, contactopt.coupling.costs knows
     more.
     """
-    if dim == 2 or n <= PARDISO_FROM:
-        return "superlu"
-    factors = "pardiso" if pardiso else "superlu"
-    return factors if n <= FACTORS_UP_TO[factors] else "multigrid"
+    factors = "pardiso" if pardiso and n > PARDISO_FROM else "superlu"
+    return factors if dim == 2 or n <= FACTORS_UP_TO[factors] else "multigrid"

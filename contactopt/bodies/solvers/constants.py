@@ -7,8 +7,9 @@ None of them changes what a solver converges to. They change only how long it ta
 from __future__ import annotations
 
 # `python -m experiments.questions.body_solvers` measures time and memory of every solver over the
-# number of unknowns.
-PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
+# number of unknowns of a 3D body, and `python -m experiments.questions.cost_ratio` whole solves in
+# the plane and in space.
+PARDISO_FROM = 5_000  # unknowns of a body from which PARDISO is faster, its library loaded or not
 
 # The limits for a body by itself. In a scene contactopt.coupling.costs chooses for all its bodies.
 FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body that is factorised

@@ -1,27 +1,33 @@
-"""Sparse factors by Intel's oneMKL PARDISO."""
+"""Sparse factors by Intel's oneMKL PARDISO.
+
+One factorisation gives all that is asked for. PARDISO eliminates the unknowns t, `trailing`, after
+all others h if it is told so, and hands out their Schur complement S = A_tt - A_th A_hh^-1 A_ht
+while it keeps the factors of the whole matrix. The block of the inverse on t is S^-1.
+
+Source: oneMKL Developer Reference, pardiso iparm Parameter, iparm(36) = 2.
+"""
 
 from __future__ import annotations
 
 import weakref
+from functools import cached_property
+from threading import Lock
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.bodies.solvers.mkl import library
-from contactopt.bodies.solvers.system import BodySolver, System
+from contactopt.bodies.solvers.system import BodySolver, System, out_of_memory
 from contactopt.errors import InputError
 
-SETTINGS = {1: 1, 2: 2}  # iparm: own settings; nested dissection by METIS
-FACTORISE, SOLVE = 12, 33  # phases
+FACTORISE, SOLVE = 12, 33  # PARDISO's phases
+NO_MEMORY = -2, -9  # its errors
 
 
 class PardisoSolver(BodySolver):
-    """Cholesky factors of oneMKL PARDISO in its own nested dissection order (pip install
-    pypardiso).
-
-    One factorisation gives both the factors and the Schur complement of the unknowns `trailing`,
-    which are eliminated last (iparm(36) = 2, perm = 1 at these unknowns).
+    """Cholesky factors of oneMKL PARDISO in its own nested dissection order, with `trailing`
+    eliminated last (pip install pypardiso).
     """
 
     name = "pardiso"
@@ -36,32 +42,46 @@ class PardisoSolver(BodySolver):
             ) from error
         super().__init__(system)
         library()  # so that pypardiso need not search for it
-        trailing = np.zeros(0, int) if self.trailing is None else self.trailing
-        m = len(trailing)
         self.upper = sp.triu(system.A, format="csr")
         self.upper.sort_indices()
         self.factors = PyPardisoSolver(mtype=2, phase=FACTORISE)  # symmetric positive definite
         # MKL's memory is not Python's
         weakref.finalize(self, self.factors.free_memory, everything=True)
-        for index, value in (SETTINGS | ({36: 2} if m else {})).items():
-            self.factors.set_iparm(index, value)
+        self._one_at_a_time = Lock()  # PARDISO writes to its handle
+        trailing = np.zeros(0, int) if system.trailing is None else system.trailing
         self.factors.perm = np.zeros(self.n, dtype=np.int32)
         self.factors.perm[trailing] = 1
-        # what comes back is the Schur complement, in the order of the sorted unknowns
-        schur = self.factors._call_pardiso(self.upper, np.zeros((m, m) if m else (self.n, 1)))
-        triangle = la.cholesky(schur.T, lower=True, overwrite_a=True) if m else np.zeros((0, 0))
-        self._triangle = triangle, np.argsort(np.argsort(trailing))
+        # own values; METIS; the Schur complement beside the factors
+        for index, value in {1: 1, 2: 2, 36: 2 if len(trailing) else 0}.items():
+            self.factors.set_iparm(index, value)
+        # as one column: asked for as many right-hand sides as S has columns, oneMKL crashes
+        self._schur = self._call(np.zeros(max(len(trailing) ** 2, 1)))
         self.factors.set_phase(SOLVE)
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         if not load.size:
             return np.zeros(load.shape)
-        # the public method of pypardiso compares the whole matrix with that of the factors
-        return np.asarray(
-            self.factors._call_pardiso(self.upper, np.asfortranarray(load, dtype=float))
-        )
+        return self._call(np.asfortranarray(load, dtype=float))
 
-    @property
-    def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray]:
-        self._asked()
-        return self._triangle
+    @cached_property
+    def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """None where rounding left the Schur complement not positive definite."""
+        trailing = self._asked()
+        if not len(trailing):
+            return np.zeros((0, 0)), trailing
+        # in the order of the sorted unknowns; its memory becomes that of the triangle
+        S, self._schur = self._schur.reshape(2 * trailing.shape, order="F"), np.zeros(0)
+        R, failed = la.lapack.dpotrf(S, lower=True, overwrite_a=True)
+        return None if failed else (R, np.argsort(np.argsort(trailing)))
+
+    def _call(self, load: np.ndarray) -> np.ndarray:
+        """What PARDISO makes of a load in the phase that is set."""
+        from pypardiso.pardiso_wrapper import PyPardisoError
+
+        try:
+            with self._one_at_a_time:
+                return np.asarray(self.factors._call_pardiso(self.upper, load))
+        except PyPardisoError as error:
+            if error.value in NO_MEMORY:
+                raise out_of_memory(self.n) from error
+            raise

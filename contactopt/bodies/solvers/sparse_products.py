@@ -1,10 +1,9 @@
 """Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by
 SciPy elsewhere.
 
-One oneMKL product of single precision takes half the time of one of SciPy. Neither holds Python's
-lock, so that the pieces of one product can be made in several threads. The package sparse_dot_mkl
-calls the same functions, but makes a handle for each product, which doubles the time of small ones;
-numba is no faster.
+Neither holds Python's lock, so that the pieces of one product can be made in several threads.
+oneMKL's functions are called here rather than through the package sparse_dot_mkl, because that
+package makes a new handle of the matrix for each product.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from contactopt.bodies.solvers.ordering import elimination_order
-from contactopt.bodies.solvers.system import BodySolver, System
+from contactopt.bodies.solvers.system import BodySolver, System, out_of_memory
 from contactopt.linear.operators import Product
 
 
@@ -62,10 +62,7 @@ def factorise(A: sp.csc_matrix) -> Any:
     except (MemoryError, RuntimeError) as error:
         if "singular" in str(error):
             raise
-        raise MemoryError(
-            f"the factors of a body of {A.shape[0]:,} unknowns do not fit into memory; take a"
-            " coarser mesh, or the solver 'multigrid'."
-        ) from error
+        raise out_of_memory(A.shape[0]) from error
 
 
 class SuperLUSolver(BodySolver):

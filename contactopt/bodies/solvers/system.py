@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from contactopt.errors import InputError
 from contactopt.linear.operators import Product
 
-COLUMNS = 64  # unit loads that are solved for at a time, which bounds the memory that they take
+COLUMNS = 64  # of the inverse that are made at a time, which bounds the memory beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,14 @@ class Iteration(NamedTuple):
     cycle: Callable[[np.ndarray], np.ndarray]
 
 
+def out_of_memory(n: int) -> MemoryError:
+    """What to raise where the factors of a body of n unknowns do not fit."""
+    return MemoryError(
+        f"the factors of a body of {n:,} unknowns do not fit into memory; take a coarser mesh, or"
+        " the solver 'multigrid'."
+    )
+
+
 class BodySolver(ABC):
     """Solves A x = b. Several solvers may work at the same time in different threads.
 
@@ -117,8 +125,9 @@ class BodySolver(ABC):
 
     @property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
-        complement of the others in these places. None where there is none without a solve.
+        """R (m, m) lower triangular, zeros above, and the place (m,) of each of `trailing`: R R' is
+        the Schur complement of the others in these places. None where there is none without a
+        solve.
         """
         return None
 
@@ -136,9 +145,12 @@ class BodySolver(ABC):
         at, triangle = self._asked(), self.trailing_triangle
         if triangle is not None:
             R, place = triangle
-            C, _ = la.lapack.dpotri(R, lower=True)  # its lower triangle
-            C = np.tril(C) + np.tril(C, -1).T
-            return np.asarray(C[np.ix_(place, place)])
+            C = la.lapack.dpotri(R, lower=True)[0] if R.size else R.copy()  # its lower triangle
+            for start in range(0, len(C), COLUMNS):  # now its upper triangle
+                here, after = slice(start, start + COLUMNS), slice(start + COLUMNS, None)
+                C[here, after] = C[after, here].T
+                C[here, here] += np.tril(C[here, here], -1).T
+            return C if np.all(np.diff(place) == 1) else np.asarray(C[place][:, place])
         C = np.empty((len(at), len(at)))
         for start in range(0, len(at), COLUMNS):
             chosen = at[start : start + COLUMNS]
