@@ -11,6 +11,9 @@ from math import fsum, hypot
 
 import numpy as np
 
+CONDITIONS = ("penetration", "tension", "complementarity", "friction bound")
+CONDITIONS += ("slip", "direction", "balance")
+
 
 def violations(Q, q, mu, V, s, r, lam) -> dict[str, float]:  # type: ignore[no-untyped-def]
     """The largest violation of each condition, forces over a force scale and displacements over a
@@ -42,18 +45,7 @@ def violations(Q, q, mu, V, s, r, lam) -> dict[str, float]:  # type: ignore[no-u
     plates = [abs(s[j]) / max(abs(V[:, j])) for j in range(len(s)) if max(abs(V[:, j])) > 0]
     natural = max([length / mean if mean > 0 else 0.0, *plates])
     scale = max(min(top, natural), 1e-5 * natural) if natural > 0 else top
-    out = dict.fromkeys(
-        (
-            "penetration",
-            "tension",
-            "complementarity",
-            "friction bound",
-            "slip",
-            "direction",
-            "balance",
-        ),
-        0.0,
-    )
+    out = dict.fromkeys(CONDITIONS, 0.0)
     small = 1e-300
     for i in range(k):
         u_n, u_t = moved[i][0] + rest[i][0], [moved[i][a] + rest[i][a] for a in range(1, d)]

@@ -127,12 +127,8 @@ class Blocks:
 
         def build(level: int) -> Scene:
             def mesh(block: Block) -> Any:
-                h = (
-                    self.size
-                    * shares[block.name]
-                    * (1.5 if locking else 1.0)
-                    / (2.0 if depth is None else 1.4) ** level
-                )
+                h = self.size * shares[block.name] * (1.5 if locking else 1.0)
+                h /= (2.0 if depth is None else 1.4) ** level
                 if depth is None:
                     return block.free(h)
                 own = [x for side, *x in block.touch.values() if side in ("top", "bottom")]
@@ -201,9 +197,8 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     made = []
     for i, own in enumerate(corners):
         touch = {"under": ("bottom", own[0][0], own[1][0])} if i else {}
-        touch |= (
-            {"over": ("top", corners[i + 1][0][0], corners[i + 1][1][0])} if i < layers - 1 else {}
-        )
+        if i < layers - 1:
+            touch["over"] = ("top", corners[i + 1][0][0], corners[i + 1][1][0])
         held = (() if i else (Support("bottom"),)) + (top if i == layers - 1 else ())
         loads = carried if i == layers - 1 and kind != "moved" else ()
         made.append(Block(f"body {i}", own, material(rng), touch, held, loads))

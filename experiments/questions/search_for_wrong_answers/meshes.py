@@ -14,9 +14,8 @@ import numpy as np
 from contactopt import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, load_mesh
 from contactopt.meshes.structured import tensor_mesh
 
-Corner = tuple[
-    float, float, float, str
-]  # a corner of an outline, the size of triangles there, the name of the next side
+# a corner of an outline, the size of triangles there, the name of the next side
+Corner = tuple[float, float, float, str]
 
 
 def ticks(places: list[float], size: float) -> np.ndarray:
@@ -185,21 +184,18 @@ class Move:
             else:
                 factor = S / L if isinstance(load, BodyForce) else S
                 loads.append(replace(load, value=tuple(self.R @ np.array(load.value) * factor)))
-        supports = tuple(
-            (
-                held
-                if held.displacement is None
-                else replace(held, displacement=self.vector(held.displacement, names, L))
-            )
-            for held in part.supports
-        )
+        supports = list(part.supports)
+        for i, held in enumerate(supports):
+            if held.displacement is not None:
+                shift = self.vector(held.displacement, names, L)
+                supports[i] = replace(held, displacement=shift)
         curves = {name: self._curve(own) for name, own in (part.curve or {}).items()} or None
         material = replace(part.material, E=part.material.E * S)
         return replace(
             part,
             mesh=self.mesh(part.mesh),
             material=material,
-            supports=supports,
+            supports=tuple(supports),
             loads=tuple(loads),
             curve=curves,
         )
@@ -236,25 +232,11 @@ def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -
     elif scene.kind == "axisymmetric":
         R = np.diag([1.0, rng.choice([-1.0, 1.0])])
     else:
-        given = [
-            support.displacement
-            for part in scene.bodies
-            if isinstance(part, Part)
-            for support in part.supports
-        ]
-        given += [
-            load.force
-            for part in scene.bodies
-            if isinstance(part, Part)
-            for load in part.loads
-            if isinstance(load, Plate)
-        ]
-        given += [
-            value
-            for part in scene.bodies
-            if isinstance(part, Rigid)
-            for value in (part.force, part.displacement)
-        ]
+        parts = [part for part in scene.bodies if isinstance(part, Part)]
+        given = [support.displacement for part in parts for support in part.supports]
+        given += [own.force for part in parts for own in part.loads if isinstance(own, Plate)]
+        rigid = [part for part in scene.bodies if isinstance(part, Rigid)]
+        given += [values for part in rigid for values in (part.force, part.displacement)]
         R = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * rng.choice([-1.0, 1.0], dim)
         if not all(values is None or len(values) == dim for values in given):
             R = np.eye(dim)[rng.permutation(dim)] * rng.choice([-1.0, 1.0], dim)
