@@ -20,11 +20,11 @@ AGAIN = 2.0  # factor on the cost of the coupled way where factors would serve m
 
 # (way, solver of the bodies) -> seconds per unit of each of `terms`, on one core
 COSTS: dict[tuple[str, str], tuple[float, ...]] = {
-    ("dense", "superlu"): (7.09e-02, 6.12e-07, 3.39e-10, 1.52e-10),
-    ("dense", "pardiso"): (7.55e-02, 8.23e-07, 8.27e-12, 1.45e-10),
-    ("products", "superlu"): (1.24e-01, 1.60e-07, 1.94e-10, 4.19e-07, 6.48e-04, 2.10e-06),
-    ("products", "pardiso"): (1.87e-01, 9.42e-07, 1.76e-10, 0.0, 8.11e-04, 1.85e-06),
-    ("coupled", "multigrid"): (1.83e-01, 1.70e-06, 1.19e-03, 7.87e-07),
+    ("dense", "superlu"): (5.78e-02, 8.03e-07, 2.82e-10, 1.61e-10),
+    ("dense", "pardiso"): (5.52e-02, 7.51e-07, 6.70e-12, 1.02e-10),
+    ("products", "superlu"): (1.10e-01, 1.47e-07, 1.77e-10, 4.44e-07, 6.19e-04, 1.46e-06),
+    ("products", "pardiso"): (1.15e-01, 5.45e-07, 0.0, 8.84e-08, 8.31e-04, 1.06e-06),
+    ("coupled", "multigrid"): (1.58e-01, 1.72e-06, 9.96e-04, 3.40e-07),
 }
 FORM_OF = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
 
