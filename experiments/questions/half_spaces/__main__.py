@@ -54,8 +54,7 @@ own. "kB a point" is the growth of its memory, per point.
 
 The number of Newton's steps hardly grows. Their iterations and the products grow slowly. But
 without friction they grow by more than 30 % from 64 x 64 to 1024 x 1024 points. On the coarsest of
-these grids a wave has four points only. A likely cause of the growth is that the inverse of the
-symbol is cut off at the edges of the contacts.
+these grids a wave has four points only. The cause of this growth is not known.
 
 The next two tables have at most 64 waves along a side, without friction and with it. Newton's steps
 with friction went round in circles on 1024 x 1024 points of this surface, where the contacts of one
