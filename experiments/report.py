@@ -109,10 +109,15 @@ def measure(
 def merged(
     name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    """The committed table with these rows in place of those with the same `keys`."""
+    """The committed table with these rows in place of those with the same `keys`.
+
+    A column that only the committed or only the new rows have is empty in the others.
+    """
     new = {tuple(str(row[key]) for key in keys): row for row in rows}
     kept = stored(name, table)
-    return [new.pop(tuple(str(row[key]) for key in keys), row) for row in kept] + list(new.values())
+    out = [new.pop(tuple(str(row[key]) for key in keys), row) for row in kept] + list(new.values())
+    columns = dict.fromkeys(column for row in rows + kept for column in row)
+    return [{column: row.get(column, "") for column in columns} for row in out]
 
 
 def number(text: str) -> Any:
