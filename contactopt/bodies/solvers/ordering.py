@@ -75,7 +75,7 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
     Of the median planes across the axes the one with the fewest separating nodes cuts the nodes at
     points (dim, n), whose graph (n, n) is a symmetric pattern.
     """
-    blocks = [block for block, _ in _dissected(graph, points, LEAF)]
+    blocks = list(_dissected(graph, points))
     return np.concatenate(blocks[::-1]) if blocks else np.zeros(0, dtype=np.intp)
 
 
@@ -87,7 +87,7 @@ def elimination_work(
     When the separator of a piece is eliminated, it fills a front with itself and with the nodes
     around the piece. With s and b nodes these are s^2 / 2 + s b entries and s^3 / 3 + s^2 b + s b^2
     operations. Pieces that are not cut any further are left out, for their work grows with the
-    number of nodes alone.
+    number of nodes alone. All pieces of one size are cut at once.
 
     Parameters
     ----------
@@ -99,45 +99,77 @@ def elimination_work(
     -------
     The entries of the factors and the multiplications that make them, of scalars.
     """
-    dim = len(points)
-    outside = np.ones(graph.shape[0], dtype=bool)
-    inside = np.setdiff1d(np.arange(graph.shape[0]), kept)
-    entries, operations = 0.0, 0.0
-    for block, piece in _dissected(graph[inside][:, inside], points[:, inside], COARSE_LEAF):
-        if len(block) == len(piece):
-            continue
-        own, s = inside[piece], float(len(block))
-        outside[own] = False
-        around = np.unique(graph[own].indices)
-        b = float(np.count_nonzero(outside[around]))
-        outside[own] = True
-        entries += s**2 / 2 + s * b
-        operations += s**3 / 3 + s**2 * b + s * b**2
+    dim, n = points.shape
+    rank = np.empty((dim, n), dtype=np.int32)  # places along each axis
+    order = np.argsort(points, axis=1, kind="stable")
+    np.put_along_axis(rank, order, np.arange(n, dtype=np.int32)[None], axis=1)
+    furthest = [np.maximum.reduceat(r[graph.indices], graph.indptr[:-1]) for r in rank]
+    piece = np.zeros(n, dtype=np.int64)  # of each node; -1 for those that are dealt with
+    piece[kept] = -1
+    live, gone, links = np.flatnonzero(piece == 0), kept, np.zeros((2, 0), dtype=np.int64)
+    entries = operations = 0.0
+    while len(live):
+        degree = graph.indptr[gone + 1] - graph.indptr[gone]
+        links = np.hstack([links, [graph[gone].indices, np.repeat(gone, degree)]])
+        links = links[:, piece[links[0]] >= 0]  # from a node of a piece to one around it
+        own = piece[live]
+        around = np.unique(piece[links[0]] * n + links[1]) // n
+        b = np.bincount(around, minlength=own.max() + 1).astype(float)
+        separator, right = _cuts(own, [(r[live], far[live]) for r, far in zip(rank, furthest)])
+        s = np.bincount(own, separator)
+        s[s == np.bincount(own)] = 0  # no plane cuts this piece
+        entries += float(np.sum(s**2 / 2 + s * b))
+        operations += float(np.sum(s**3 / 3 + s**2 * b + s * b**2))
+        half = 2 * own + right
+        large = np.bincount(half[~separator], minlength=2 * len(b)) > COARSE_LEAF
+        stays = ~separator & large[half]
+        gone, piece[live] = live[separator], -1
+        live = live[stays]
+        piece[live] = (np.cumsum(large) - 1)[half[stays]]
     m = float(len(kept))
     return dim**2 * (entries + m**2 / 2), dim**3 * (operations + m**3 / 3)
 
 
-def _dissected(
-    graph: sp.csr_matrix, points: np.ndarray, leaf: int
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Separators with the pieces that they cut, from the whole mesh on; a piece of at most `leaf`
-    nodes, and one that no plane cuts, is its own separator.
+def _cuts(
+    piece: np.ndarray, axes: list[tuple[np.ndarray, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (k,) of the separators of all pieces, and of the nodes to the right of each cut.
+
+    piece (k,) numbers the piece of each node. For each axis come the places of the nodes along it,
+    and those of their furthest neighbours. A piece is cut at its mean place on the axis on which
+    the fewest nodes touch the right from the left.
     """
+    size = np.bincount(piece)
+    fewest = size + 1.0
+    separator, right = np.zeros((2, len(piece)), dtype=bool)
+    for place, furthest in axes:
+        middle = (np.bincount(piece, place) / size)[piece]
+        above = place > middle
+        touches = ~above & (furthest > middle)
+        count = np.bincount(piece, touches)
+        better = (count < fewest)[piece]
+        fewest = np.minimum(fewest, count)
+        separator, right = np.where(better, touches, separator), np.where(better, above, right)
+    return separator, right
+
+
+def _dissected(graph: sp.csr_matrix, points: np.ndarray) -> Iterator[np.ndarray]:
+    """Separators from the whole mesh on; a small piece, and one that no plane cuts, is its own."""
     graph = sp.csr_matrix((np.ones(graph.nnz, np.int8), graph.indices, graph.indptr), graph.shape)
     stack = [(graph, np.arange(graph.shape[0]))]
     while stack:
         piece, nodes = stack.pop()
-        if len(nodes) <= leaf:
-            yield nodes, nodes
+        if len(nodes) <= LEAF:
+            yield nodes
             continue
         left, separator = min(
             (_cut(piece, x) for x in points[:, nodes]), key=lambda cut: int(cut[1].sum())
         )
         right = ~(left | separator)
         if separator.sum() in (0, len(nodes)) and not (left.any() and right.any()):
-            yield nodes, nodes
+            yield nodes
             continue
-        yield nodes[separator], nodes
+        yield nodes[separator]
         stack += [(piece[part][:, part], nodes[part]) for part in (left, right)]
 
 
