@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import Weight, weight_at
+from contactopt.bodies.elements import Weight, forget, weight_at
 
 PIECE = 2**20  # entries of element matrices that are held at the same time
 
@@ -63,6 +63,7 @@ def isotropic_stiffness(
         place = dim * dim * pair[:, :, None, :, None] + within[:, None, :]
         K = _element_matrices(basis, piece, constants, weight)  # (element, i, a, j, b)
         np.add.at(data.reshape(-1), place.ravel(), K.ravel())
+        forget(basis.mapping)
     return Stiffness((data, graph.indices, graph.indptr), (basis.N, basis.N))
 
 

@@ -17,6 +17,8 @@ fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for 
 
 from __future__ import annotations
 
+import ctypes
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Lock
 from typing import NamedTuple
@@ -139,6 +141,7 @@ class VCycle:
             products = SparseProduct(P, crew), SparseProduct(P.T, crew)
             self.levels.append(Level(level, SINGLE(_largest_eigenvalue(level)), *products))
             blocks, scale = coarse, beyond
+            _give_back()
         dense = blocks.toarray() * scale * scale[:, None]
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
 
@@ -350,6 +353,12 @@ def nodal_blocks(
     indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
     data = np.concatenate([piece.data for piece in pieces])
     return sp.bsr_matrix((data, indices, indptr), (size, size)), place, present
+
+
+def _give_back() -> None:
+    """Let the C library return what was freed to the system; glibc alone keeps so much of it."""
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:

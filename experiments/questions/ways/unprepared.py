@@ -64,22 +64,22 @@ class Case:
 
 # kind, source, degree, matching -> sizes of the fit, sizes of the judges
 SIZES = {
-    ("plane-strain", "gmsh", 1, False): ((0.04, 0.015, 0.005, 0.0025), (0.02, 0.006, 0.003)),
+    ("plane-strain", "gmsh", 1, False): ((0.04, 0.015, 0.005, 0.0025), (0.02, 0.006, 0.003, 4e-4)),
     ("plane-strain", "gmsh", 2, True): ((0.03, 0.008), (0.01, 0.005)),
-    ("plane-strain", "shaken", 1, True): ((0.02, 0.005), (0.015, 0.004)),
+    ("plane-strain", "shaken", 1, True): ((0.02, 0.005), (0.015, 0.004, 6e-4)),
     ("plane-strain", "shaken", 2, False): ((), (0.02, 0.006)),
     ("axisymmetric", "gmsh", 1, False): ((0.03, 0.006), (0.012, 0.004)),
     ("axisymmetric", "gmsh", 2, True): ((), (0.012, 0.005)),
-    ("axisymmetric", "shaken", 2, False): ((0.03, 0.008), (0.02, 0.006)),
+    ("axisymmetric", "shaken", 2, False): ((0.03, 0.008), (0.02, 0.006, 0.0015)),
     ("plane-strain", "regular", 1, True): ((0.02, 0.006), (0.01, 0.004)),
-    ("solid", "regular", 1, True): ((0.1, 0.06, 0.04), (0.08, 0.05)),
+    ("solid", "regular", 1, True): ((0.1, 0.06, 0.04), (0.08, 0.05, 0.022)),
     ("solid", "gmsh", 1, False): ((0.12, 0.07, 0.045), (0.1, 0.06, 0.05, 0.04)),
-    ("solid", "gmsh", 1, True): ((0.1, 0.05), (0.07, 0.045)),
+    ("solid", "gmsh", 1, True): ((0.1, 0.05), (0.07, 0.045, 0.015)),
     ("solid", "gmsh", 2, False): ((0.2, 0.11), (0.18, 0.12)),
     ("solid", "gmsh", 2, True): ((), (0.15,)),
-    ("solid", "shaken", 1, True): ((0.12, 0.07, 0.045), (0.09, 0.05)),
+    ("solid", "shaken", 1, True): ((0.12, 0.07, 0.045), (0.09, 0.05, 0.025)),
     ("solid", "shaken", 1, False): ((), (0.08, 0.06)),
-    ("solid", "shaken", 2, False): ((0.25, 0.125), (0.17, 0.1)),
+    ("solid", "shaken", 2, False): ((0.25, 0.125), (0.17, 0.1, 0.05)),
 }
 
 
