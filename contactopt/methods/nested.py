@@ -38,6 +38,7 @@ logger = logging.getLogger(__name__)
 # residual over the size of the forces, from which on iterates of the finest grid are shown to the
 # driver
 NEAR = 1e-8
+ENOUGH = 0.5  # of NEAR that a step aims at, for linear systems are not solved in its norm
 
 
 @dataclass(frozen=True)
@@ -79,14 +80,15 @@ class Nested(Method):
                 (given, other) if other.residual < constants.CLOSER * at.residual else (point, at)
             )
         while True:
-            if (
-                at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0])))
-                or at.residual > 0.5 * last
-            ):
+            near = NEAR * max(1.0, float(np.linalg.norm(point[0])))
+            if at.residual <= near or at.residual > 0.5 * last:
                 yield (_whole(problem, point[0] + at.error), point[1]), at.residual
             if at.residual > constants.SLOW * last:
                 point, at = eliminated(finest, point, at)
-            change, count = step(finest, at, _worth(at.residual, last))
+            worth = _worth(at.residual, last)
+            if at.residual > near:  # no step need come further than that
+                worth = max(worth, min(ENOUGH * near / at.residual, constants.NESTED_LOOSEST))
+            change, count = step(finest, at, worth)
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
             at = finest.evaluate(*point)
