@@ -41,7 +41,7 @@ from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
 from contactopt.coupling.problem_of_bodies import problem_of, signed_map
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
-from contactopt.linear.concurrency import each, one_blas_thread
+from contactopt.linear.concurrency import each, give_back, one_blas_thread
 from contactopt.linear.operators import (
     FORMS,
     NOISE,
@@ -309,6 +309,7 @@ def reduce_bodies(
         check_dense(round(filling(maps) ** 0.5))
     with one_blas_thread() if iterate else nullcontext():
         bodies = each(lambda body: body.prepare(solver, not implicit), assembled)
+        give_back()
     times.append(time.perf_counter())
 
     made = compliance(bodies, maps, couplings, implicit)

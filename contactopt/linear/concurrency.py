@@ -1,14 +1,15 @@
-"""Cores, the threads of BLAS, and the one place where threads share work: bodies beside each other,
-and the pieces of one large product.
+"""Cores, memory, the threads of BLAS, and the one place where threads share work: bodies beside each
+other, and the pieces of one large product.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -42,6 +43,15 @@ def one_blas_thread() -> Iterator[None]:
     """
     with threadpool_limits(1, user_api="blas"):
         yield
+
+
+def give_back() -> None:
+    """Return the memory that was freed to the system.
+
+    The C library of GNU keeps much of it for the thread that freed it; with others nothing happens.
+    """
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def each(

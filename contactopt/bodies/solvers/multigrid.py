@@ -17,8 +17,6 @@ fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for 
 
 from __future__ import annotations
 
-import ctypes
-from contextlib import suppress
 from dataclasses import dataclass
 from threading import Lock
 from typing import NamedTuple
@@ -34,7 +32,7 @@ from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduc
 from contactopt.bodies.solvers.system import Block, BodySolver, Iteration, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.linear.concurrency import Crew
+from contactopt.linear.concurrency import Crew, give_back
 
 SINGLE = np.float32
 IMPORTING = Lock()  # of two threads that import pyamg at once one may see half of it
@@ -133,6 +131,7 @@ class VCycle:
         scale = _inverse_root(blocks.diagonal())
         while points.shape[1] > COARSEST:
             P, modes, points = _coarsen(blocks, modes, points)
+            give_back()
             coarse = galerkin(P, blocks, crew)
             beyond = _inverse_root(coarse.diagonal())
             _scale(blocks, scale, scale)
@@ -141,7 +140,7 @@ class VCycle:
             products = SparseProduct(P, crew), SparseProduct(P.T, crew)
             self.levels.append(Level(level, SINGLE(_largest_eigenvalue(level)), *products))
             blocks, scale = coarse, beyond
-            _give_back()
+            give_back()
         dense = blocks.toarray() * scale * scale[:, None]
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
 
@@ -259,6 +258,7 @@ def _smoothed(
     values *= np.divide(4 / 3, sizes, out=np.zeros_like(sizes), where=sizes > 0)[row][:, :, None]
     F = sp.bsr_matrix((values, A.indices[near], indptr), A.shape)
     U = (F @ tentative.astype(A.dtype)).astype(float)
+    del F, values, row, sizes  # which take more than what follows
     satisfy_constraints(U, modes, compute_BtBinv(modes, U))
     return sp.bsr_matrix(tentative - U).astype(A.dtype)
 
@@ -353,12 +353,6 @@ def nodal_blocks(
     indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
     data = np.concatenate([piece.data for piece in pieces])
     return sp.bsr_matrix((data, indices, indptr), (size, size)), place, present
-
-
-def _give_back() -> None:
-    """Let the C library return what was freed to the system; glibc alone keeps so much of it."""
-    with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:
