@@ -1,5 +1,5 @@
-"""Cores, memory, the threads of BLAS, and the one place where threads share work: bodies beside each
-other, and the pieces of one large product.
+"""Cores, memory, the threads of BLAS, and the one place where threads share work: bodies side by
+side, and the pieces of one large product.
 """
 
 from __future__ import annotations
