@@ -106,6 +106,15 @@ class Sensitivity:
         return coulomb_equations(self._scaled[0])
 
     @property
+    def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What M and its right sides are made of, in the problem's units: D and D rho
+        [force / length], (k, dim, dim), and P_mu (k, dim) [force].
+        """
+        D = self.tangent.D
+        by_parameter = np.broadcast_to(self._by_parameter, self._point.shape)
+        return D, D * (self._rho[:, None] * self._moves)[:, None, :], by_parameter
+
+    @property
     def _rho(self) -> np.ndarray:
         """(k,) [force / length]."""
         scales = self._scaled[1]
@@ -231,11 +240,31 @@ class Sensitivity:
     ) -> tuple[np.ndarray, np.ndarray]:
         """dr and dlambda on the piece of P at which the solver ended."""
         _, scales = self._scaled
-        error = -self.tangent.slope((self._moves * du).ravel() / scales.length)
+        slope = self.tangent.slope((self._moves * du).ravel() / scales.length)
+        error = -scales.force * slope.reshape(du.shape)
         if dmu is not None:
-            error += (self._by_parameter * dmu[:, None]).ravel() / scales.force
-        balance = -ds * scales.multipliers / (scales.force * scales.length)
-        return self._unscaled(*self.tangent.solve(error, balance))
+            error += self._by_parameter * dmu[:, None]
+        return self.step(error, -ds)
+
+    def step(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dr (k, dim) [force] and dlambda (p,) of M (dr, dlambda) = (error, balance), both given
+        in units of force.
+        """
+        _, scales = self._scaled
+        right = balance * scales.multipliers / (scales.force * scales.length)
+        return self._unscaled(*self.tangent.solve(error.ravel() / scales.force, right))
+
+    def step_transposed(
+        self, by_reactions: np.ndarray, by_multipliers: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """a (k, dim) and b (p,) of M' (a, b) = (by_reactions, by_multipliers)."""
+        _, scales = self._scaled
+        right = (scales.force * by_reactions).ravel(), scales.multipliers * by_multipliers
+        z, b = self.tangent.solve_transposed(*right)
+        a = self.tangent.multipliers(right[0], z, b) / scales.force
+        return a.reshape(by_reactions.shape), b * scales.multipliers / (
+            scales.force * scales.length
+        )
 
     def _unscaled(self, dr: np.ndarray, dlam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self._scaled[1].to_physical(dr.reshape(self.problem.q.shape), dlam)
