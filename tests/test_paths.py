@@ -1,6 +1,9 @@
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 
+import meshio
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import MATERIAL, block, two_blocks
 
@@ -234,7 +237,7 @@ def test_bad_paths_are_refused():
 def test_files_of_a_path(cycle, tmp_path):
     cycle.write(tmp_path / "new")
     assert {p.name for p in (tmp_path / "new").iterdir()} == {"history.csv", "path.npz"}
-    table = np.genfromtxt(tmp_path / "new" / "history.csv", delimiter=",", names=True)
+    table = pd.read_csv(tmp_path / "new" / "history.csv")
     for name, column in cycle.history.items():
         np.testing.assert_allclose(table[name], column)
     data = np.load(tmp_path / "new" / "path.npz")
@@ -250,10 +253,32 @@ def test_run_follows_the_path_of_a_named_scene(tmp_path):
     assert {"history.csv", "path.npz", "path.png", "summary.json"} <= {
         p.name for p in tmp_path.iterdir()
     }
+    check_files_of_states(result, tmp_path)
     assert result.summary["states"] == len(result.path.states) == 11
     assert result.summary["shear_force"] == pytest.approx(20.0)
     assert result.summary["friction_work"] == result.path.history["friction_work"][-1] > 0
     assert run("punch-2d", elements=4).path is None
+
+
+def check_files_of_states(result, folder):
+    """Every state has its rows and its files, and the series names each of them once."""
+    count, (pair,) = len(result.path.states), result.problem.pairs
+    table = pd.read_csv(folder / f"contact-{pair.name}.csv")
+    assert list(table.state) == list(np.repeat(np.arange(1, count + 1), result.problem.contacts))
+    history = pd.read_csv(folder / "history.csv")
+    pushed = table["area [mm^2]"] * table["traction_x [MPa]"]
+    sums = pushed.groupby(table.state).sum().to_numpy()
+    np.testing.assert_allclose(sums, history[f"force:{pair.name}:x"], atol=1e-9)
+    np.testing.assert_allclose(history["force:upper:far:x"], -sums, atol=1e-6)  # what was applied
+    named = [
+        (own.get("timestep"), own.get("file"))
+        for own in ET.parse(folder / "states.pvd").iter("DataSet")
+    ]
+    files = {f.name for f in folder.glob("*-state*.vtu")}
+    assert {file for _, file in named} == files and len(named) == len(files) == 3 * count
+    last = meshio.read(folder / f"upper-state{count:04d}.vtu")
+    same = meshio.read(folder / "upper.vtu")
+    np.testing.assert_allclose(last.point_data["displacement"], same.point_data["displacement"])
 
 
 def test_animation(tmp_path):

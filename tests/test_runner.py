@@ -2,6 +2,7 @@ import json
 import os
 
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import two_blocks
 from skfem import MeshTri
@@ -39,6 +40,28 @@ KEYS = [
     "limits",
     "seconds",
 ]
+
+
+def check_tables(result, out):
+    """The forces of the tables balance the loads, and the units stand in the head."""
+    history = pd.read_csv(out / "history.csv")
+    for pair in result.problem.pairs:
+        table = pd.read_csv(out / f"contact-{pair.name}.csv")
+        last = table[table.state == table.state.max()]
+        length, stress = result.scene.units
+        area, axis = last[f"area [{length}^2]"], result.scene.components[-1]
+        force = (area * last[f"traction_{axis} [{stress}]"]).sum()
+        columns = f"force:{pair.name}:{axis}"
+        assert force == pytest.approx(history[columns].iloc[-1], rel=1e-9)
+        assert set(last.status) <= {"open", "stick", "slip"}
+        assert np.all(last[f"pressure [{stress}]"][last.status == "open"] == 0)
+        assert list(last[f"{result.scene.components[0]} [{length}]"]) == pytest.approx(
+            list(result.problem.coordinates[0][pair.contacts])
+        )
+    total = sum(history[name].iloc[-1] for name in history if name.startswith("force:body"))
+    assert np.isfinite(total)
+
+
 SMALL = {"punch-2d": 6, "punch-3d": 3, "sphere": 8}
 
 
@@ -52,9 +75,11 @@ def test_run_writes_everything(name, tmp_path):
         "deformed.png",
         "pressure.png",
         "interface.npz",
+        "history.csv",
         *(f"{n}.vtu" for n in names),
-        *(f"contact-{pair.name}.vtu" for pair in result.problem.pairs),
+        *(f"contact-{pair.name}.{e}" for pair in result.problem.pairs for e in ("vtu", "csv")),
     }
+    check_tables(result, out)
     summary = json.loads((out / "summary.json").read_text())
     assert list(summary) == KEYS
     assert summary["status"] == "solved" and summary["residual"] <= 1e-8

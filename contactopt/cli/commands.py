@@ -132,7 +132,12 @@ def _print_result(result: Any, out: str) -> None:
         _print_estimate(result.estimate)
     phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
     print(f"{s['seconds']['total']:.1f} s: {phases}")
-    print(f"files in {out}: {', '.join(sorted(file.name for file in Path(out).iterdir()))}")
+    from contactopt.figures.output import SINGLE
+
+    names = sorted(file.name for file in Path(out).iterdir())
+    single = [name for name in names if SINGLE.search(name)]
+    listed = ", ".join(name for name in names if name not in single)
+    print(f"files in {out}: {listed}" + (f", {len(single)} of single states" if single else ""))
 
 
 def _print_estimate(estimate: Any) -> None:

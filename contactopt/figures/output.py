@@ -4,11 +4,14 @@ folder.
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -16,21 +19,25 @@ from contactopt.figures.style import FORMATS, save_figure
 from contactopt.outcome import Outcome, squeeze
 from contactopt.problem import alone, part_of
 from contactopt.problem.contact_status import contact_status
-from contactopt.readings.contact_fields import contact_fields, on_nodes
+from contactopt.readings.contact_fields import ContactFields, contact_fields, on_nodes
+from contactopt.solving.follow import state_of
+from contactopt.solving.paths import PathResult
+from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
     from contactopt.coupling.back_to_bodies import Fields
-    from contactopt.solving.paths import PathResult
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
-STATES = "states.npz"
+STATES, SERIES = "states.npz", "states.pvd"
+SINGLE = re.compile(r"-state\d{4}\.vtu$")  # names of the files of single states
+STATUS = ("open", "stick", "slip")
 # of the bodies at all states of a load path, above which only the last state is written
 MOST_NUMBERS = 3_000_000
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz", STATES,
+    PAGE, "interface.npz", "history.csv", "path.npz", STATES, SERIES,
 )  # fmt: skip
 
 
@@ -62,9 +69,9 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
 
 
 def write(result: Outcome, folder: Path, states: bool) -> None:
-    """Write the fields of a result as VTU files, its contact forces and its load path as arrays,
-    into a folder. With `states` also the bodies at all states of the path, for a page on which they
-    move.
+    """Write the fields of a result as VTU files, its contacts and states as tables, and its contact
+    forces and load path as arrays, into a folder. With `states` also the bodies at all states of
+    the path, for a page on which they move.
     """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
@@ -88,10 +95,58 @@ def write(result: Outcome, folder: Path, states: bool) -> None:
         ),  # of friction [stress]
         status=status.stick + 2 * status.slip,  # 0 open, 1 stick, 2 slip
     )
-    if result.path is not None:
-        result.path.write(folder)
-        if states and (found := body_states(result.path, result.fields)):
+    path = result.path
+    if path is None:
+        only = state_of(Solved(result.reduction, result.solution))[0]
+        PathResult((only,), result.reduction).write_history(folder / "history.csv")
+    else:
+        path.write(folder)
+        write_series(path, result.fields, folder)
+        if states and (found := body_states(path, result.fields)):
             np.savez(folder / STATES, **found)
+    write_tables(result, surfaces, folder)
+
+
+def write_tables(result: Outcome, surfaces: Sequence[ContactFields], folder: Path) -> None:
+    """Write contact-PAIR.csv for every pair: one row per contact and state, units in the head.
+
+    Of a path with more than MOST_NUMBERS contacts in all states the last state alone is written.
+    """
+    scene, problem, states = result.scene, result.problem, [surfaces]
+    if result.path is not None and problem.contacts * len(result.path.states) <= MOST_NUMBERS:
+        steps = range(len(result.path.states))
+        states = [contact_fields(*result.path.at(step)) for step in steps]
+    for number, pair in enumerate(problem.pairs):
+        with open(folder / f"contact-{pair.name}.csv", "w", newline="") as file:
+            rows = csv.writer(file)
+            for step, found in enumerate(states, 1 + result.summary.get("states", 1) - len(states)):
+                head, values = found[number].rows(scene.components, scene.units)
+                if file.tell() == 0:
+                    rows.writerow(["state", *head])
+                words = np.array(STATUS)[values[:, -1].astype(int)]
+                rows.writerows([step, *own[:-1], word] for own, word in zip(values.tolist(), words))
+
+
+def write_series(path: PathResult, last: tuple[Fields, ...], folder: Path) -> None:
+    """Write the bodies and surfaces at every state as VTU files, and states.pvd, which ParaView
+    plays; nothing where the path kept no displacements, or more than MOST_NUMBERS.
+    """
+    if not _fits(path, last):
+        return
+    lines = []
+    for step in range(len(path.states)):
+        surfaces = contact_fields(*path.at(step))
+        bodies = on_nodes(path.reduction, path.fields(step), surfaces)
+        made: list[tuple[Any, str]] = [(own, own.name) for own in bodies]
+        made += [(own, f"contact-{own.name}") for own in surfaces]
+        for part, (own, name) in enumerate(made):
+            file = f"{name}-state{step + 1:04d}.vtu"
+            own.write_vtu(folder / file)
+            lines.append(f'<DataSet timestep="{step + 1}" part="{part}" file={quoteattr(file)}/>')
+    body = "\n".join(lines)
+    (folder / SERIES).write_text(
+        f'<VTKFile type="Collection" version="0.1"><Collection>\n{body}\n</Collection></VTKFile>\n'
+    )
 
 
 def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
@@ -101,8 +156,7 @@ def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
     It is empty where there would be more than MOST_NUMBERS, or where the path kept no
     displacements.
     """
-    numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
-    if not path.states[-1].bodies or not 0 < numbers <= MOST_NUMBERS:
+    if not _fits(path, last):
         return {}
     made = {}
     for own in zip(*(path.fields(step) for step in range(len(path.states)))):
@@ -113,12 +167,18 @@ def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
     return made
 
 
+def _fits(path: PathResult, last: tuple[Fields, ...]) -> bool:
+    """Whether a path kept displacements, and not too many numbers for files."""
+    numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
+    return bool(path.states[-1].bodies) and 0 < numbers <= MOST_NUMBERS
+
+
 def earlier_files(folder: Path) -> set[str]:
     """Name the files that an earlier `contactopt run` wrote into a folder; none where none has run.
 
     A folder in which one has run holds its summary.json. Its other files have fixed names, but for
     a VTU file per body and per pair of surfaces, told from other people's by the fields in them,
-    and pictures of the pairs that the summary names.
+    and pictures and tables of the pairs that the summary names.
     """
     with suppress(OSError, ValueError, TypeError):
         summary = json.loads(_plain_text(folder / "summary.json"))
@@ -134,7 +194,8 @@ def earlier_files(folder: Path) -> set[str]:
                 for pair in summary.get("pairs", {})
                 for ending in FORMATS
             }
-            found |= {file.name for file in folder.glob("pressure-*") if file.name in pictures}
+            pictures |= {f"contact-{pair}.csv" for pair in summary.get("pairs", {})}
+            found |= {file.name for file in folder.iterdir() if file.name in pictures}
             return found | {name for name in RUN_FILES if (folder / name).exists()}
     return set()
 

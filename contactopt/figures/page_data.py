@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.figures.html import packed, packed_short
-from contactopt.figures.output import STATES
+from contactopt.figures.output import SINGLE, STATES
 from contactopt.figures.pieces import (
     mesh_lines,
     outline,
@@ -38,7 +38,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     """What the program of the page reads, from the files of a run; arrays are packed."""
     import meshio
 
-    meshes = {path.stem: meshio.read(path) for path in sorted(folder.glob("*.vtu"))}
+    files = [path for path in sorted(folder.glob("*.vtu")) if not SINGLE.search(path.name)]
+    meshes = {path.stem: meshio.read(path) for path in files}
     bodies = {name: mesh for name, mesh in meshes.items() if "von_mises" in mesh.point_data}
     interface = _arrays(folder / "interface.npz")
     path = _arrays(folder / "path.npz") if (folder / "path.npz").exists() else None

@@ -4,6 +4,7 @@ VTU files.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,6 +31,7 @@ class ContactFields:
     Forces are those on the upper body, vectors those of space.
 
     points, cells  (dim, k) positions; (v, c) contacts at the corners of the cells
+    areas          (k,) nodal areas [length^2]
     pressure       (k,) normal force over area [stress];  traction  (dim, k) whole contact force
                    over area [stress]
     gap            (k,) what remains of the gap [length];  slip  (dim, k) tangential motion of upper
@@ -40,6 +42,7 @@ class ContactFields:
     name: str
     points: np.ndarray
     cells: np.ndarray
+    areas: np.ndarray
     pressure: np.ndarray
     traction: np.ndarray
     gap: np.ndarray
@@ -56,6 +59,21 @@ class ContactFields:
             "contact_slip": _tall(self.slip),
             "contact_status": self.status.astype(float),
         }
+
+    def rows(self, axes: Sequence[str], units: tuple[str, str]) -> tuple[list[str], np.ndarray]:
+        """The head of a table, with units, and one row per contact; status as in `status`.
+
+        Parameters
+        ----------
+        axes : Names of the coordinates.
+        units : Of length and stress.
+        """
+        length, stress = units
+        head = [*(f"{axis} [{length}]" for axis in axes), f"area [{length}^2]"]
+        head += [f"pressure [{stress}]", *(f"traction_{axis} [{stress}]" for axis in axes)]
+        head += [f"gap [{length}]", *(f"slip_{axis} [{length}]" for axis in axes), "status"]
+        columns = [*self.points, self.areas, self.pressure, *self.traction]
+        return head, np.column_stack([*columns, self.gap, *self.slip, self.status])
 
     def write_vtu(self, path: Path) -> None:
         """The surface as a VTU file with its quantities at the contacts."""
@@ -87,6 +105,7 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
                 pair.name,
                 coupling.positions,
                 coupling.cells,
+                areas[own],
                 nodal_pressure(problem, solution)[own],
                 traction[:, own],
                 u[own, 0],

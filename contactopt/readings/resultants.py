@@ -4,6 +4,7 @@ space.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_zone, stick_width
 from contactopt.readings.peaks import nodal_pressure
-from contactopt.scenes.scene import COMPONENTS
+from contactopt.scenes.scene import COMPONENTS, BodyForce, Traction
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -122,6 +123,43 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
             f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, pair["force"])
         )
     return words
+
+
+def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
+    """One number for each load, motion, resultant and moment of a state, by names such as
+
+    force:punch:top:y, displacement:block:bottom:x  what a scene prescribes [force], [length],
+                                                     also traction and weight
+    motion:punch, plate 'top', y                     of plates and bodies that move freely, in
+                                                     the words of the problem's `motions`
+    force:PAIR:x, moment:PAIR:z                      on the upper body of a pair
+    force:body 'block', support 'bottom':x           of a support or plate on its body
+    """
+    scene, axes = reduction.scene, COMPONENTS[reduction.scene.kind]
+    found: dict[str, float] = {}
+    for part in scene.parts:
+        for item in (part, *getattr(part, "supports", ()), *getattr(part, "loads", ())):
+            for kind, given in _prescribed(item, axes).items():
+                place = [kind, part.name, getattr(item, "boundary", "")]
+                for axis, value in given.items():
+                    found[":".join([*filter(None, place), axis])] = float(value)
+    names = reduction.problem.motions or range(len(solution.multipliers))
+    found |= {f"motion:{name}": float(x) for name, x in zip(names, solution.multipliers)}
+    every = pair_resultants(reduction, solution) | holder_resultants(reduction, solution)
+    turns = axes if reduction.problem.dim == 3 else ("z",)
+    for name, own in every.items():
+        found |= {f"force:{name}:{c}": float(f) for c, f in zip(axes, own.force)}
+        found |= {f"moment:{name}:{c}": float(m) for c, m in zip(turns, own.moment)}
+    return found
+
+
+def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]]:
+    """What a support, a load or a rigid body prescribes: kind -> component -> value."""
+    if isinstance(item, Traction | BodyForce):
+        kind = "traction" if isinstance(item, Traction) else "weight"
+        return {kind: dict(zip(axes, item.value))}
+    kinds = ("force", "displacement")
+    return {kind: given for kind in kinds if (given := getattr(item, kind, None))}
 
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:

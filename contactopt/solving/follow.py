@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
+from contactopt.readings.resultants import columns
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult, State
 from contactopt.solving.solve_scene import Options, Solved, solve_loaded, solve_scene
@@ -65,7 +66,7 @@ def follow(
             solved = solve_scene(scene, elements, zone, options, once=once)
         else:
             solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
-        state, bodies = _state(solved, states[-1] if states else None, bodies)
+        state, bodies = state_of(solved, states[-1] if states else None, bodies)
         states.append(state)
         steps = count(state.solution.iterations, "iteration")
         options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
@@ -76,9 +77,19 @@ def follow(
     return PathResult(tuple(states), solved.reduction)
 
 
-def _state(solved: Solved, before: State | None, last: Forces | None) -> tuple[State, Forces]:
-    """What is kept of a state, given the one before it, and the state of the bodies: their
-    displacements U and the external forces F on them.
+def state_of(
+    solved: Solved, before: State | None = None, last: Forces | None = None
+) -> tuple[State, Forces]:
+    """Find what is kept of a state, given the one before it.
+
+    Parameters
+    ----------
+    solved : The state, reduced and solved.
+    before, last : What this function returned for the state before; none for the first one.
+
+    Returns
+    -------
+    The state, and for each body its displacements U and the external forces F on it.
     """
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
@@ -106,5 +117,6 @@ def _state(solved: Solved, before: State | None, last: Forces | None) -> tuple[S
         external=sum(float((F + F0) @ (own - U0)) for (own, F), (U0, F0) in steps) / 2,
         contact=-float(np.sum((r + r0) * (slip + earlier - u0))) / 2,
         bodies=U if here else (),
+        columns=columns(reduction, solution),
     )
     return state, now

@@ -23,7 +23,8 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -52,6 +53,8 @@ class State:
                    [force length]
     bodies         displacements (n,) of every body [length]; empty for large bodies, and for those
                    on other ranks
+    columns        name -> number: loads, motions, resultants
+                   (contactopt.readings.resultants.columns)
     """
 
     scene: Scene
@@ -65,6 +68,7 @@ class State:
     external: float
     contact: float
     bodies: tuple[np.ndarray, ...] = ()
+    columns: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def friction(self) -> float:
@@ -133,6 +137,7 @@ class PathResult:
         energy_error                 of that sum in this step, relative to the largest work or
                                      energy so far
         residual, iterations, seconds   of the solve
+        and the columns of the states: loads, motions, resultants and moments
         """
         rows = [_row(self.reduction.problem, state) for state in self.states]
         history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -154,6 +159,34 @@ class PathResult:
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
         return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
 
+    def write_history(self, file: Path) -> None:
+        """Write the history as comma-separated values, one row per state.
+
+        Parameters
+        ----------
+        file : The file.
+        """
+        with open(file, "w", newline="") as opened:
+            rows = csv.writer(opened)
+            rows.writerow(self.history)
+            rows.writerows(zip(*self.history.values()))
+
+    def at(self, step: int) -> tuple[Reduction, Solution]:
+        """Find the problem and the solution of a state.
+
+        Parameters
+        ----------
+        step : The number of the state, from 0 on.
+
+        Returns
+        -------
+        The reduction with the problem of the step, whose bodies carry the loads of the last state,
+        and the solution.
+        """
+        state = self.states[step]
+        reduction = replace(self.reduction, problem=self.problem(step), scene=state.scene)
+        return reduction, state.solution
+
     def write(self, out: str | Path) -> None:
         """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and
         displacements (n, k, dim).
@@ -169,10 +202,7 @@ class PathResult:
         forces = [state.solution.reactions for state in self.states]
         masks = [contact_status(problem, r) for r in forces]
         with whole_folder(out) as staging:
-            with open(staging / "history.csv", "w", newline="") as file:
-                rows = csv.writer(file)
-                rows.writerow(self.history)
-                rows.writerows(zip(*self.history.values()))
+            self.write_history(staging / "history.csv")
             np.savez(
                 staging / "path.npz",
                 coordinates=problem.coordinates,
@@ -208,4 +238,5 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
         "residual": float(state.solution.residual),
         "iterations": state.solution.iterations,
         "seconds": float(sum(state.solution.seconds[phase] for phase in ("solve", "certificate"))),
+        **state.columns,
     }
