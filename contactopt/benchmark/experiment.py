@@ -60,6 +60,7 @@ class Experiment:
 
     path     of the file
     skipped  why optional entries are left out
+    absent   methods among them, and why
     """
 
     name: str
@@ -82,6 +83,7 @@ class Experiment:
     columns: tuple[str, ...] = ()
     path: Path = Path()
     skipped: tuple[str, ...] = ()
+    absent: tuple[tuple[str, str], ...] = ()
 
     def runs(self, filters: Sequence[str] = ()) -> list[Run]:
         """All runs, those of a problem together; filters: COLUMN=PATTERN, all must match."""
@@ -145,7 +147,7 @@ def _check(table: Table) -> None:
     """Refuse unknown keys, values of the wrong type or size, and more runs than MOST_RUNS, before
     anything is expanded, built or run.
     """
-    data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped"}
+    data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped", "absent"}
     for key in data:
         if key not in known:
             raise table.fail(f"unknown key {key!r}.", key)
@@ -206,11 +208,13 @@ class _Reader:
     """Expands the problems and methods of one file whose other keys were checked.
 
     skipped  why optional entries are left out
+    absent   methods among them, and why
     """
 
     def __init__(self, table: Table, path: Path):
         self.table, self.path = table, path
         self.skipped: list[str] = []
+        self.absent: list[tuple[str, str]] = []
 
     def experiment(self) -> Experiment:
         data, folder = self.table.data, self.path.parent
@@ -234,7 +238,7 @@ class _Reader:
             key: tuple(value) if isinstance(value, list) else value for key, value in data.items()
         }
         values |= {"problems": tuple(problems), "methods": tuple(methods), "plugins": paths}
-        return Experiment(**values, path=self.path, skipped=tuple(self.skipped))
+        return Experiment(**values, path=self.path, skipped=tuple(self.skipped), absent=tuple(self.absent))
 
     def registry(self, paths: tuple[str, ...]) -> Registry:
         """What the plug-ins declare."""
@@ -268,6 +272,8 @@ class _Reader:
                         culprit = _blamed(message, entry, own[0])
                         raise self.table.fail(message, key, index, culprit) from error
                     self.skipped.append(str(error))
+                    if key == "methods":
+                        self.absent.append((MethodSpec(name, values).label, str(error)))
         if twice := _twice(spec.label for spec in made):
             raise self.table.fail(f"two {key} are called {twice!r}.", key)
         return made
