@@ -56,7 +56,11 @@ def test_every_page_is_on_the_list_of_how_tos():
 
 
 def test_every_key_of_an_experiment_file_is_explained_with_an_example_that_is_read():
-    assert set(EXPERIMENT) == {field.name for field in fields(Experiment)} - {"path", "skipped", "absent"}
+    assert set(EXPERIMENT) == {field.name for field in fields(Experiment)} - {
+        "path",
+        "skipped",
+        "absent",
+    }
     drawn = FIGURES | TABLES
     assert set(KINDS) == set(drawn)
     arguments = {name for draw in drawn.values() for name in inspect.signature(draw).parameters} - {
