@@ -20,7 +20,7 @@ from contactopt.benchmark.keys import COLUMNS
 from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
-from contactopt.benchmark.store import SCHEMA, UNKNOWN, pack
+from contactopt.benchmark.store import ABSENT, SCHEMA, UNKNOWN, pack
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Status, natural_map_residual
 from contactopt.problem.laws.associated import Associated
@@ -66,6 +66,24 @@ def blank(task: Task) -> dict[str, Any]:
         "residual": np.inf,
         "law_residual": np.inf,
         "history": "[]",
+        "versions": _versions(),
+        "machine": _machine(),
+        "time": _now(),
+    }
+
+
+def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
+    """A row that says why a method is not there."""
+    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
+    return unknown | {
+        "schema": SCHEMA,
+        "key": f"absent {method}",
+        "experiment": experiment,
+        "method": method,
+        "name": method.partition("(")[0],
+        "law": "coulomb",
+        "status": ABSENT,
+        "message": one_line(why),
         "versions": _versions(),
         "machine": _machine(),
         "time": _now(),

@@ -4,8 +4,8 @@ A peer is a plug-in file with three functions that the other Python runs. They i
 need, and use no name from outside themselves. `version()` returns the version of the solver.
 `prepare(problem, tol, settings)` makes what the solver takes of the problem, a mapping of arrays:
 Q in rows of blocks (3, 3), namely `indptr`, `indices` and `data`, and `q` (k, 3) and `mu` (k,). The
-normal component comes first. `solve(prepared)` returns the forces, whether the solver claims success, and its
-iterations. Only `solve` is timed.
+normal component comes first. `solve(prepared)` returns the forces, whether the solver claims
+success, and its iterations. Only `solve` is timed.
 """
 
 from __future__ import annotations

@@ -8,13 +8,14 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from typing import Any
 
 from contactopt.benchmark import worker
 from contactopt.benchmark.measure import Answer, Task, blank, judge
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.benchmark.process import KILLED, START, Ended, Process, one_line
+from contactopt.benchmark.runs import Run
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
@@ -24,6 +25,7 @@ WARM_UP = 30.0
 PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
 MARGIN, GRACE = 1.1, 0.5
+LONG = 1.0  # s of a run above which it is not repeated
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
 
@@ -203,18 +205,37 @@ class Shares:
             return task
 
 
-def run_locally(tasks: Sequence[Task], jobs: int) -> Generator[dict[str, Any]]:
+def group(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """What the repeats of a run have in common."""
+    return tuple(str(row[name]) for name in ("problem", "method", "setting", "start"))
+
+
+def _group_of(run: Run) -> tuple[str, ...]:
+    return run.problem.label, run.method.label, run.setting, run.start
+
+
+def run_locally(
+    tasks: Sequence[Task], jobs: int, slow: set[tuple[str, ...]] | None = None
+) -> Generator[dict[str, Any]]:
     """The row of each run as it is finished, made by `jobs` workers.
 
-    When the iteration is left, the workers are killed.
+    Runs of the groups `slow`, and of those that take more than LONG, are not repeated. When the
+    iteration is left, the workers are killed.
     """
+    slow = set() if slow is None else slow
     shares, rows, stop = Shares(tasks), queue.Queue[Any](), threading.Event()
     workers = [Worker() for _ in range(min(jobs, len(tasks)))]
 
     def serve(worker: Worker) -> None:
         try:
             while not stop.is_set() and (task := shares.take(worker)) is not None:
-                rows.put(worker.run(task))
+                if task.run.repeat and _group_of(task.run) in slow:
+                    rows.put(None)
+                    continue
+                row = worker.run(task)
+                if row["call_seconds"] > LONG:
+                    slow.add(_group_of(task.run))
+                rows.put(row)
         except BaseException as error:
             rows.put(error)
 
@@ -226,7 +247,8 @@ def run_locally(tasks: Sequence[Task], jobs: int) -> Generator[dict[str, Any]]:
             row = rows.get()
             if isinstance(row, BaseException):
                 raise row
-            yield row
+            if row is not None:
+                yield row
     finally:
         stop.set()
         for worker in workers:

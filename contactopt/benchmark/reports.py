@@ -113,7 +113,7 @@ def publish(experiment: Path, results: Path, reports: Path) -> None:
     drawn = {entry["kind"] for entry in layout.figures}
     left_out = set(LEFT_OUT) - ({"history"} if "convergence" in drawn else set())
     columns = [*layout.columns] or [name for name in COLUMNS if name not in left_out]
-    save(load(results), reports / layout.name / "rows.csv", columns)
+    save(load(results, absent=True), reports / layout.name / "rows.csv", columns)
 
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
