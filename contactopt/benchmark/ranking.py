@@ -166,3 +166,13 @@ def wall_over_cpu(table: pd.DataFrame) -> float:
     """The median of wall time over CPU time of the calls: above BUSY nothing is ranked."""
     timed = table[table["cpu_seconds"] > NOISE]
     return float((timed["call_seconds"] / timed["cpu_seconds"]).median())
+
+
+def warning(ratio: float) -> str:
+    """Say that nothing is ranked where the machine was busy; '' where it was not."""
+    if not ratio > BUSY:
+        return ""
+    return (
+        f"The median of wall time over CPU time is {ratio:.2f}, above {BUSY:g}: the machine was"
+        " busy, so nothing is ranked. The CPU times are shown as they are."
+    )

@@ -188,4 +188,6 @@ def _report(report: argparse.ArgumentParser) -> None:
         choices=("quick", "full"),
         help="make the runs first: all of them (full), or a few, into out/ (quick)",
     )
+    what = "add the rows of another campaign, also of another machine: a folder or a rows.csv"
+    report.add_argument("--merge", action="append", default=[], metavar="FILE", help=what)
     report.add_argument("--jobs", type=int, metavar="N", help=JOBS)

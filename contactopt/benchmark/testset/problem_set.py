@@ -108,6 +108,12 @@ def of_set(testset: str, folder: Path, tier: str = "", tags: str = "") -> list[P
     return found
 
 
+def set_tags(testset: str = "1") -> dict[str, dict[str, Any]]:
+    """Read the tags that the file of a set knows, with the tier, by the name of the problem."""
+    found = _read(HERE / f"set_{testset}.toml")
+    return {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in found}
+
+
 @lru_cache(maxsize=8)
 def _read(path: Path) -> tuple[Problem, ...]:
     if path.is_dir():
