@@ -12,7 +12,7 @@ def version():
     import siconos
     import siconos.numerics
 
-    return getattr(siconos, "__version__", "of Debian")
+    return siconos.version
 
 
 def prepare(problem, tol, settings):

@@ -2,7 +2,7 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const get = (id) => document.getElementById(id);
 const GREY = "#bbbbbb", MOST = 500;  // rows of a table at a time
 const runs = data.points.map((row) => ({...Object.fromEntries(data.columns.map((name, i) => [name, row[i]])), method: data.methods[row[1]], problem: data.problems[row[0]].name}));
-const short = (value) => value === null || value === undefined ? "-" : typeof value === "boolean" ? (value ? "yes" : "no") : typeof value === "number" ? (Number.isInteger(value) ? String(value) : value.toPrecision(3).replace(/(\.\d*?)0+(?=e|$)/, "$1").replace(/\.(?=e|$)/, "")) : String(value);
+const short = (value) => value === null || value === undefined ? "-" : typeof value === "boolean" ? (value ? "yes" : "no") : typeof value === "number" ? (Number.isInteger(value) ? String(value) : Math.abs(value) < 1e-3 ? value.toExponential(1) : value.toPrecision(3).replace(/(\.\d*?)0+(?=e|$)/, "$1").replace(/\.(?=e|$)/, "")) : String(value);
 const plainly = (value) => typeof value === "number" ? value.toExponential(0) : value;
 const leaders = () => data.leaders.find((one) => one.group === get("group").value && String(one.accuracy) === get("accuracy").value);
 const index = () => data.accuracies.findIndex((value) => String(value) === get("accuracy").value);
