@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.cards import count
+from contactopt.cli.test_set import problems
 from contactopt.errors import InputError
 from contactopt.methods.method import NATIVE
 from contactopt.readings.resultants import resultant_words
@@ -291,6 +292,7 @@ COMMANDS: dict[str, Command] = {
     "new": new,
     "bench": bench,
     "report": report,
+    "problems": problems,
     "list": listing,
     "completion": completion,
 }

@@ -44,11 +44,16 @@ def scene(name: str, **parameters: Any) -> Scene:
     return make_scene(name, **new, **parameters)
 
 
-def reduced(name: str, **parameters: Any) -> InterfaceProblem:
-    """The interface problem, with explicit Q, of a scene made by `scene`."""
+def problem_of(scene: Scene, Q: str = "explicit") -> InterfaceProblem:
+    """The interface problem of a scene, with Q in one of its forms."""
     from contactopt.coupling.reduction import reduce
 
-    return reduce(scene(name, **parameters), Q="explicit")
+    return reduce(scene, Q=Q)
+
+
+def reduced(name: str, **parameters: Any) -> InterfaceProblem:
+    """The interface problem, with explicit Q, of a scene made by `scene`."""
+    return problem_of(scene(name, **parameters))
 
 
 def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:
@@ -118,3 +123,19 @@ def in_units(
         areas=p.areas * length**2,
         coordinates=p.coordinates * length,
     )
+
+
+def by_products(of: str, **parameters: Any) -> InterfaceProblem:
+    """The scene `of`, with Q known by its products with vectors only."""
+    return problem_of(scene(of, **parameters), "implicit")
+
+
+def skewed(of: str, skew: float = 0.1, seed: int = 0, **parameters: Any) -> InterfaceProblem:
+    """The scene `of` with an unsymmetric Q, as of loads that follow the surface: D S D is added,
+    with S random and skew, D^2 the diagonal of Q, and norm |S| = skew. The energy r' Q r stays.
+    """
+    made = reduced(of, **parameters)
+    random = np.random.default_rng(seed).normal(size=made.Q.shape)
+    S = random - random.T
+    D = np.sqrt(np.diag(made.Q))
+    return replace(made, Q=made.Q + skew / np.linalg.norm(S, 2) * D[:, None] * S * D)
