@@ -14,7 +14,7 @@ from typing import Any
 
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
 from contactopt.benchmark.measure import Task, absent_row
-from contactopt.benchmark.pool import LONG, group, run_locally
+from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.process import end_orphans
 from contactopt.benchmark.reports import build, publish, read_layout
 from contactopt.benchmark.store import Store, lines, load, require, save, told
@@ -80,8 +80,7 @@ def run_campaign(
         tasks = [Task(run, e.name, e.plugins, *limits) for run in left]
         done = {"total": len(runs), "initial": len(runs) - len(tasks)}
         bar = tqdm(desc=e.name, unit="run", file=sys.stderr, disable=quiet, **done)
-        slow = {group(row) for row in lines(store.path) if row["call_seconds"] > LONG}
-        with closing(run_locally(tasks, jobs, slow)) as rows, bar:
+        with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar:
             _keep(rows, store, bar)
         save(load(store.path, absent=True), folder / "rows.parquet")
     return folder

@@ -8,7 +8,7 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any
 
 from contactopt.benchmark import worker
@@ -66,8 +66,8 @@ class Worker:
         self.builder.interrupt()
         self.solver.interrupt()
 
-    def run(self, task: Task) -> dict[str, Any]:
-        """The row of this run, whatever happens to the processes."""
+    def run(self, task: Task, hopeless: bool = False) -> dict[str, Any]:
+        """The row of this run, whatever happens to the processes; a `hopeless` one is not made."""
         row = blank(task)
         try:
             self._build(task)
@@ -78,6 +78,9 @@ class Worker:
             row["backend"] = task.run.method.backends(self.problem.dim)
         except InputError as error:
             return row | {"status": "refused", "message": one_line(error)}
+        if hopeless:
+            words = "not made: a looser tolerance already took more than the time limit"
+            return row | {"status": "time_limit", "message": words, "call_seconds": task.time_limit}
         begin = time.perf_counter()
         try:
             row |= judge(task, self.problem, self._answer(task))
@@ -205,36 +208,58 @@ class Shares:
             return task
 
 
-def group(row: Mapping[str, Any]) -> tuple[str, ...]:
-    """What the repeats of a run have in common."""
-    return tuple(str(row[name]) for name in ("problem", "method", "setting", "start"))
+class History:
+    """What earlier runs say of later ones.
 
+    A run that took more than LONG is not repeated. Where one was ended at its limit of time, so
+    would be those of tighter tolerances, which are not made.
+    """
 
-def _group_of(run: Run) -> tuple[str, ...]:
-    return run.problem.label, run.method.label, run.setting, run.start
+    def __init__(self, rows: Iterable[Mapping[str, Any]] = ()):
+        self.slow: set[tuple[str, ...]] = set()
+        self.ended: dict[tuple[str, ...], float] = {}  # -> the tolerance
+        for row in rows:
+            self.add(row)
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Take a row into account."""
+        key = row["problem"], row["method"], row["start"]
+        if row["call_seconds"] > LONG:
+            self.slow.add((*key, row["setting"]))
+        if row["status"] in ("time_limit", "killed"):
+            self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))
+
+    def repeated(self, run: Run) -> bool:
+        """Whether a run is a repeat of a slow one."""
+        key = run.problem.label, run.method.label, run.start, run.setting
+        return run.repeat > 0 and key in self.slow
+
+    def hopeless(self, run: Run) -> bool:
+        """Whether the same method had not enough time for a looser tolerance."""
+        key = run.problem.label, run.method.label, run.start
+        return run.tolerance < self.ended.get(key, 0.0)
 
 
 def run_locally(
-    tasks: Sequence[Task], jobs: int, slow: set[tuple[str, ...]] | None = None
+    tasks: Sequence[Task], jobs: int, history: History | None = None
 ) -> Generator[dict[str, Any]]:
     """The row of each run as it is finished, made by `jobs` workers.
 
-    Runs of the groups `slow`, and of those that take more than LONG, are not repeated. When the
-    iteration is left, the workers are killed.
+    `history` knows the rows that were made before. When the iteration is left, the workers are
+    killed.
     """
-    slow = set() if slow is None else slow
+    known = history or History()
     shares, rows, stop = Shares(tasks), queue.Queue[Any](), threading.Event()
     workers = [Worker() for _ in range(min(jobs, len(tasks)))]
 
     def serve(worker: Worker) -> None:
         try:
             while not stop.is_set() and (task := shares.take(worker)) is not None:
-                if task.run.repeat and _group_of(task.run) in slow:
+                if known.repeated(task.run):
                     rows.put(None)
                     continue
-                row = worker.run(task)
-                if row["call_seconds"] > LONG:
-                    slow.add(_group_of(task.run))
+                row = worker.run(task, known.hopeless(task.run))
+                known.add(row)
                 rows.put(row)
         except BaseException as error:
             rows.put(error)

@@ -13,6 +13,7 @@ from typing import Any
 
 from contactopt.benchmark.entries import Entries
 from contactopt.benchmark.problems import KINDS, ProblemSpec, named
+from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.toml_table import read_table
 from contactopt.problem import InterfaceProblem
@@ -88,19 +89,24 @@ def problems(
     return [one for one in found if all(_holds(one, *each) for each in conditions)]
 
 
-def of_set(testset: str, folder: Path, tier: str = "", tags: str = "") -> list[Problem]:
+def of_set(
+    testset: str, folder: Path, tier: str = "", tags: str = "", every: int = 1
+) -> list[Problem]:
     """Find the problems that an entry `testset = ...` of an experiment file means.
 
     Parameters
     ----------
     testset, folder, tier : as for `problems`
     tags : conditions, with commas between them
+    every : only each so-manieth problem is taken, for a quick look at the whole set
 
     Returns
     -------
     The problems. InputError if there are none.
     """
+    check_count("every", every)
     found = problems(tier, [text for text in tags.split(",") if text.strip()], testset, folder)
+    found = found[::every]
     if not found:
         raise InputError(
             f"no problem of the test set '{testset}' has tier '{tier}', tags '{tags}'."
