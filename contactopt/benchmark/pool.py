@@ -25,6 +25,7 @@ WARM_UP = 30.0
 PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
 MARGIN, GRACE = 1.1, 0.5
+PEER_GRACE = 30.0  # s for a peer, which ends itself, to start and to take over the problem
 LONG = 1.0  # s of a run above which it is not repeated
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
@@ -134,6 +135,7 @@ class Worker:
             try:
                 self._prepare(task)
                 hard = MARGIN * task.time_limit + GRACE
+                hard += PEER_GRACE if task.run.method.peer else 0.0
                 answer = self.solver.ask(hard, "solve", worker.execute, task)
                 if answer is None:
                     self._forget()
