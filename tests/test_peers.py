@@ -12,7 +12,7 @@ from contactopt.problem.laws.coulomb import Coulomb
 from experiments.peers import pinocchio_admm, siconos_numerics
 from tests.test_benchmark import run, written
 
-TOY = '''
+TOY = """
 import sys
 from contactopt.benchmark import Peer, method
 
@@ -53,7 +53,7 @@ def toy(problem, tol=1e-8, time_limit=1.0, trouble=""):
 @method(peer=GONE)
 def gone(problem, tol=1e-8, time_limit=1.0):
     return GONE.answer(problem, tol, time_limit)
-'''
+"""
 
 SEPARATE = """
 from contactopt.benchmark import problem

@@ -16,7 +16,8 @@ from contactopt.benchmark.experiment import Experiment, NothingToRun, read_exper
 from contactopt.benchmark.measure import Task, absent_row
 from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.process import end_orphans
-from contactopt.benchmark.reports import build, publish, read_layout
+from contactopt.benchmark.report_page import report_campaign
+from contactopt.benchmark.reports import build, has_table, publish, read_layout
 from contactopt.benchmark.store import Store, lines, load, require, save, told
 from contactopt.checks import check_count
 from contactopt.errors import InputError
@@ -145,7 +146,13 @@ def run_reports(
         for path in paths:
             if path.stem in names or not names:
                 _renew(path, version == "quick", work, target, jobs)
-    return build(paths, target)
+    page = build(paths, target)
+    for path in paths:
+        layout = read_layout(path)
+        ranked = any(entry["kind"] == "leader_table" for entry in layout.figures)
+        if ranked and has_table(target / layout.name):
+            report_campaign(target / layout.name, path)
+    return page
 
 
 def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
