@@ -153,3 +153,52 @@ def missing():
     import no_such_package
 
     return no_such_package.__version__
+
+
+SLOW = """
+import time
+from contactopt.benchmark import method
+
+@method
+def slow(problem, tol=1e-8):
+    time.sleep(1.1)
+    return 0 * problem.q
+
+@method
+def late(problem, tol=1e-8):
+    time.sleep(60)
+
+@method
+def swift(problem, tol=1e-8):
+    return 0 * problem.q
+"""
+
+
+def alone(folder, text, **options):
+    path, out = written(folder, text), folder / "out"
+    return benchmark.load(benchmark.run_campaign(path, out, jobs=1, quiet=True, **options))
+
+
+def test_slow_runs_are_not_repeated_and_hopeless_ones_are_not_made(tmp_path):
+    written(tmp_path, SLOW, "slow.py")
+    written(tmp_path, SEPARATE, "separate.py")
+    text = """
+        name = "slow"
+        plugins = ["slow.py", "separate.py"]
+        settings = [1e-3, 1e-6]
+        repeats = 2
+        time_limit = 2.0
+        [[problems]]
+        family = "separate"
+        [[methods]]
+        method = ["slow", "late", "swift"]
+        """
+    table = alone(tmp_path, text)
+    counts = table.groupby(["method", "setting"]).size().to_dict()
+    assert {key[0]: n for key, n in counts.items()} == {"slow": 1, "late": 1, "swift": 2}
+    late = table[table["method"] == "late"].set_index("setting")
+    assert late.loc["0.001", "status"] == "killed"
+    assert late.loc["1e-06", "status"] == "time_limit"
+    assert "not made" in late.loc["1e-06", "message"]
+    again = alone(tmp_path, text, resume=True)
+    assert len(again) == len(table) and set(again["key"]) == set(table["key"])

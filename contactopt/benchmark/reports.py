@@ -3,7 +3,8 @@ reports. Solves nothing.
 
 An experiment file lists its figures and tables in order (`contactopt.benchmark.keys.FIGURE` has the
 keys). A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its
-table REPORTS/NAME/rows.csv, or rows.parquet if it is long; all reports together are REPORTS/benchmarks.html.
+table REPORTS/NAME/rows.csv, or rows.parquet if it is long. All reports together are
+REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations

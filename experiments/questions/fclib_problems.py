@@ -118,7 +118,8 @@ TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of th
 medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the
 published measure, which depends on units. The last columns are the seconds of Siconos' solvers in
 the same run, on the problem without units; - where they do not claim 1e-8 in {limit:g} s. The
-shifted geometric means (1 ms) compare the default method with the best of these solvers for each file.
+shifted geometric means (1 ms) compare the default method with the best of these solvers for each
+file.
 
 {{means}}
 
