@@ -175,9 +175,10 @@ def _tau(own: pd.DataFrame, found: pd.DataFrame) -> str:
 
 
 def _tags(row: pd.Series) -> dict[str, Any]:
-    """What is known of a problem: the tags of the test set, else the columns of its runs."""
-    known = set_tags().get(str(row["problem"]).partition(", warm start")[0])
-    return known or {name: _plain(row[name]) for name in ("family", "dim", "contacts", "plates")}
+    """What is known of a problem: some columns of its runs, and the tags of the test set."""
+    own = {name: _plain(row[name]) for name in ("family", "dim", "contacts")}
+    own["plates"] = bool(row["plates"])
+    return own | set_tags().get(str(row["problem"]).partition(", warm start")[0], {})
 
 
 def _groups(

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactopt.benchmark.keys import COLUMNS
+from contactopt.benchmark.ranking import BUSY, wall_over_cpu
 from contactopt.benchmark.report_figures import FIGURES
 from contactopt.benchmark.store import load, require, save
 from contactopt.benchmark.tables import TABLES, select
@@ -57,6 +58,7 @@ USUAL = (
 )
 # of a figure; all others are arguments of its function
 OWN_KEYS = ("kind", "caption", "where", "optional")
+WITH_HISTORY = {"convergence", "leader_table"}  # kinds whose reports draw convergence
 LEFT_OUT = ("key", "label", "history")  # of a report's table
 TABLE_FILES = ("csv", "parquet")
 MOST_LINES = 2000  # of a table that is kept as text
@@ -114,9 +116,10 @@ def publish(experiment: Path, results: Path, reports: Path) -> None:
     """Take the small table of a campaign over into REPORTS/NAME."""
     layout = read_layout(experiment)
     drawn = {entry["kind"] for entry in layout.figures}
-    left_out = set(LEFT_OUT) - ({"history"} if "convergence" in drawn else set())
+    left_out = set(LEFT_OUT) - ({"history"} if drawn & WITH_HISTORY else set())
     columns = [*layout.columns] or [name for name in COLUMNS if name not in left_out]
     table, folder = load(results, absent=True), reports / layout.name
+    table["history"] = table["history"].where(table["repeat"] == 0, "[]")
     remove_files(folder, [f"rows.{kind}" for kind in TABLE_FILES])
     kind = TABLE_FILES[len(table) > MOST_LINES]
     save(table, folder / f"rows.{kind}", columns)
@@ -229,7 +232,7 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     failures = int((~table["success"]).sum())
     backends = {name for text in table["backend"] for name in str(text).split(", ")}
     backends -= {"native", "nan"}
-    busy = (table["call_seconds"] / table["cpu_seconds"]).median()
+    busy = wall_over_cpu(table)
     link = Path(os.path.relpath(layout.path, folder)).as_posix()
     files = (f"rows.{kind}" for kind in reversed(TABLE_FILES))
     name = next((file for file in files if (folder / file).exists()), "rows.jsonl")
@@ -244,8 +247,9 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     lines = [
         f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a"
         " certificate recomputed from the problem.",
-        f"The median of wall time over CPU time of the calls is {busy:.1f}. More than 1 means a"
-        " busy machine. CPU times are compared, and time limits are wall times.",
+        f"The median of wall time over CPU time of the calls is {busy:.2f}. More than 1 means a"
+        f" busy machine, and above {BUSY:g} nothing is ranked. CPU times are compared, and time"
+        " limits are wall times.",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
         f"Made by {made}.",
         _one_line(f"Environment: {machines}. {versions}. One BLAS thread."),
