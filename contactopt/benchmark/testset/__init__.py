@@ -14,6 +14,6 @@ An experiment file takes problems of a set by `[[problems]]`, `testset = "1"`, `
 """
 
 from contactopt.benchmark.testset.problem_set import TIERS, Problem, of_set, problems
-from contactopt.benchmark.testset.tags import tags_of
+from contactopt.benchmark.testset.tags import TAGS, tags_of
 
-__all__ = ["TIERS", "Problem", "of_set", "problems", "tags_of"]
+__all__ = ["TAGS", "TIERS", "Problem", "of_set", "problems", "tags_of"]
