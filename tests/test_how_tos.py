@@ -22,6 +22,7 @@ PAGES = (
     "certificate",
     "which_method",
     "experiment_files",
+    "test_set",
     "your_solver",
     "figures_for_a_paper",
     "from_calculix",

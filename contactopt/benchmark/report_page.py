@@ -10,7 +10,7 @@ import html
 import json
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +31,7 @@ from contactopt.benchmark.ranking import (
 )
 from contactopt.benchmark.reports import Layout, read_layout, rendered, write_report
 from contactopt.benchmark.store import ABSENT, load, require
-from contactopt.benchmark.testset import set_tags
+from contactopt.benchmark.testset import problems
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
 
@@ -123,7 +123,8 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
     own = _with_starts(own if len(own) else table)
     found = points(own)
     names, methods = list(dict.fromkeys(own["problem"])), sorted(set(own["method"]))
-    tags = {name: _tags(rows.iloc[0]) for name, rows in own.groupby("problem")}
+    of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in problems()}
+    tags = {name: _tags(rows.iloc[0], of_set) for name, rows in own.groupby("problem")}
     accuracies = _accuracies(found)
     times = [achieved(found, a).droplevel("start").reindex(names)[methods] for a in accuracies]
     first = ranking(found, accuracies[len(accuracies) // 2])["method"]
@@ -150,7 +151,7 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
         "cards": _cards(table),
         "busy": warning(ratio),
         "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(own, found)),
-        "colours": COLOURS[:8],
+        "colours": COLOURS[:7],
     }
 
 
@@ -174,11 +175,11 @@ def _tau(own: pd.DataFrame, found: pd.DataFrame) -> str:
     return f"Kendall's tau of the ranks of the even and of the odd repeats is {tau:.2f}."
 
 
-def _tags(row: pd.Series) -> dict[str, Any]:
+def _tags(row: pd.Series, of_set: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     """What is known of a problem: some columns of its runs, and the tags of the test set."""
     own = {name: _plain(row[name]) for name in ("family", "dim", "contacts")}
     own["plates"] = bool(row["plates"])
-    return own | set_tags().get(str(row["problem"]).partition(", warm start")[0], {})
+    return own | of_set.get(str(row["problem"]).removesuffix(", warm start"), {})
 
 
 def _groups(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from collections import Counter
+from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,7 +30,7 @@ EPILOG = """Examples:
 
 A NAME may be a pattern with * and ?. Tags: dim, contacts, motions (columns of V), law, mu,
 form (dense, sparse, products), symmetric, feasible, rank, condition, unique_below and several_from
-(thresholds of friction), solutions (where all of them are listed)."""
+(thresholds of friction), solutions (their number, where all of them were listed)."""
 
 
 def problems(options: argparse.Namespace) -> int:
@@ -110,35 +112,37 @@ def _print_proof(problem: InterfaceProblem) -> None:
 
 
 def _write(found: list[Problem], options: argparse.Namespace) -> None:
-    from contactopt import fclib, solve
-    from contactopt.benchmark.testset.programs import (
-        PROGRAMS,
-        convex_program,
-        write_cbf,
-        write_npz,
-    )
-
     out = Path(options.out)
-    writers: dict[str, Any] = {"npz": write_npz, "cbf": write_cbf}
+    out.mkdir(parents=True, exist_ok=True)
     for one in found:
-        problem = one.load()
-        stem = re.sub(r"[^\w.-]+", "_", one.name).strip("_")
-        if options.format == "fclib":
-            out.mkdir(parents=True, exist_ok=True)
-            fclib.write(problem.explicit(), out / f"{stem}.hdf5", one.name)
-            print(out / f"{stem}.hdf5")
-            continue
-        answer = solve(problem, tol=TOL)
-        if not answer.solved:
-            print(f"{one.name}: left out, because it was not solved ({answer.status})")
-            continue
-        for kind in options.program or PROGRAMS:
-            if options.format == "npz" and problem.dim == 3 and kind != "normal":
-                continue  # no quadratic program
-            out.mkdir(parents=True, exist_ok=True)
-            path = out / f"{stem}_{kind}.{options.format}"
-            writers[options.format](convex_program(problem, kind, answer.reactions), path)
-            print(path)
+        stem = out / re.sub(r"[^\w.-]+", "_", one.name).strip("_")
+        try:
+            for path in _written(one, stem, options.format, options.program):
+                print(path)
+        except InputError as error:
+            print(f"left out: {one.name}: {error}", file=sys.stderr)
+
+
+def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> Iterator[Path]:
+    """The files of one problem, written."""
+    from contactopt import fclib, solve
+    from contactopt.benchmark.testset import programs
+
+    problem, writers = one.load(), {"npz": programs.write_npz, "cbf": programs.write_cbf}
+    if form == "fclib":
+        path = stem.with_name(f"{stem.name}.hdf5")
+        fclib.write(problem.explicit(), path, one.name)
+        yield path
+        return
+    answer = solve(problem, tol=TOL)
+    if not answer.solved:
+        raise InputError(f"it was not solved ({answer.status}).")
+    for kind in kinds or PROGRAM_NAMES:
+        if form == "npz" and problem.dim == 3 and kind != "normal" and not kinds:
+            continue  # no quadratic program
+        path = stem.with_name(f"{stem.name}_{kind}.{form}")
+        writers[form](programs.convex_program(problem, kind, answer.reactions), path)
+        yield path
 
 
 ACTIONS = {"list": _list, "show": _show, "write": _write}

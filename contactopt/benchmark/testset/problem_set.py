@@ -13,6 +13,7 @@ from typing import Any
 
 from contactopt.benchmark.entries import Entries
 from contactopt.benchmark.problems import KINDS, ProblemSpec, named
+from contactopt.benchmark.testset.tags import TAGS, tags_of
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.toml_table import read_table
@@ -45,8 +46,6 @@ class Problem:
     @cached_property
     def tags(self) -> dict[str, Any]:
         """What the problem is like; computed, where the set's file does not say it."""
-        from contactopt.benchmark.testset.tags import tags_of
-
         return dict(self.known.get("tags") or tags_of(self.load()))
 
     @property
@@ -85,7 +84,7 @@ def problems(
     path = HERE / f"set_{testset}.toml"
     path = path if path.exists() else folder / testset
     conditions = [_condition(text) for text in tags]
-    found = [one for one in _read(path) if tier in ("", one.tier)]
+    found = [one for one in read_set(path) if tier in ("", one.tier)]
     return [one for one in found if all(_holds(one, *each) for each in conditions)]
 
 
@@ -114,14 +113,9 @@ def of_set(
     return found
 
 
-def set_tags(testset: str = "1") -> dict[str, dict[str, Any]]:
-    """Read the tags that the file of a set knows, with the tier, by the name of the problem."""
-    found = _read(HERE / f"set_{testset}.toml")
-    return {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in found}
-
-
 @lru_cache(maxsize=8)
-def _read(path: Path) -> tuple[Problem, ...]:
+def read_set(path: Path) -> tuple[Problem, ...]:
+    """The problems of a file or of a folder, read once."""
     if path.is_dir():
         return tuple(Problem(spec, "small", {}) for spec in named("fclib", str(path), {}, Path()))
     table = read_table(path, "test set")
@@ -163,8 +157,8 @@ def _condition(text: str) -> tuple[str, str, Any]:
 
 
 def _holds(problem: Problem, name: str, sign: str, value: Any) -> bool:
-    if name not in problem.tags:
-        raise InputError(f"there is no tag {name!r}; the tags are {', '.join(problem.tags)}.")
+    if name not in TAGS:
+        raise InputError(f"there is no tag {name!r}; the tags are {', '.join(TAGS)}.")
     own = problem.tags[name]
     try:
         return own is not None and bool(COMPARE[sign](own, value))

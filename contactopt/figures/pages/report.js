@@ -7,8 +7,8 @@ const plainly = (value) => typeof value === "number" ? value.toExponential(0) : 
 const leaders = () => data.leaders.find((one) => one.group === get("group").value && String(one.accuracy) === get("accuracy").value);
 const index = () => data.accuracies.findIndex((value) => String(value) === get("accuracy").value);
 
-function colour(method) {  // the first eight of the leaders have a colour, the others are grey
-  const place = data.order.indexOf(method);
+function colour(method) {  // the first leaders of these problems have a colour, the others are grey
+  const place = leaders().rows.findIndex((row) => row.method === method);
   return place < data.colours.length ? data.colours[place] : GREY;
 }
 
@@ -62,7 +62,7 @@ function chart(id, lines, across, up, options = {}) {  // lines: {name, x, y, do
   const xs = seen.flatMap((line) => line.at.map(([x]) => Math.log10(x))), ys = options.share ? [0, 1] : seen.flatMap((line) => line.at.map(([, y]) => Math.log10(y)));
   const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs) + 1e-3, Math.min(...ys), Math.max(...ys) + 1e-3];
   const X = (x) => L + (W - L - R) * (Math.log10(x) - x0) / (x1 - x0), Y = (y) => H - B - (H - B - T) * ((options.share ? y : Math.log10(y)) - y0) / (y1 - y0);
-  const power = (k) => `1e${k}`.replace(/^1e0$/, "1");
+  const power = (k) => k >= 0 && k < 4 ? String(10 ** k) : `1e${k}`;
   const step = (low, high) => Math.max(1, Math.ceil((high - low) / 7));
   for (let k = Math.ceil(x0); k <= x1; k += step(x0, x1)) picture.append(svg("path", {d: `M${X(10 ** k)} ${T}V${H - B}`, stroke: "#ddd"}), svg("text", {x: X(10 ** k), y: H - B + 16, "text-anchor": "middle"}, power(k)));
   const marks = options.share ? [0, 0.25, 0.5, 0.75, 1] : [];
