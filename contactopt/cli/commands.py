@@ -232,9 +232,7 @@ def report(options: argparse.Namespace) -> int:
             print(f"report: {report_campaign(folder, others=options.merge)}")
         return 0
     if options.merge:
-        raise InputError(
-            "--merge adds rows to the folder of a campaign; name this folder first."
-        )
+        raise InputError("--merge adds rows to the folder of a campaign; name this folder first.")
     paths = sorted(Path(options.experiments).glob("*.toml"))
     page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
     print(f"reports in {page.parent}, all of them in {page}")
