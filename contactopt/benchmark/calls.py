@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.measure import Answer, Task
+from contactopt.benchmark.measure import Task
+from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.plugins import PASSED, Registry
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.store import STATUSES

@@ -12,7 +12,8 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any
 
 from contactopt.benchmark import worker
-from contactopt.benchmark.measure import Answer, Task, blank, judge
+from contactopt.benchmark.measure import Task, blank, judge
+from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.benchmark.process import KILLED, START, Ended, Process, one_line
 from contactopt.benchmark.runs import Run

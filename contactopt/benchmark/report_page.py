@@ -171,7 +171,8 @@ def _tau(own: pd.DataFrame, found: pd.DataFrame) -> str:
     """Say how two reruns of the table agree."""
     if own["repeat"].max() == 0:
         return "Each run was made once, so nothing is known of a rerun."
-    tau = agreement(*map(points, reruns(own)), _accuracies(found)[-1])
+    even, odd = map(points, reruns(own))
+    tau = agreement(even, odd, _accuracies(found)[-1])
     return f"Kendall's tau of the ranks of the even and of the odd repeats is {tau:.2f}."
 
 

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from contactopt.benchmark.calls import call, measure
-from contactopt.benchmark.measure import Answer, Task
+from contactopt.benchmark.measure import Task
+from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
