@@ -9,11 +9,11 @@ import qpsolvers
 import scipy.sparse as sp
 
 from contactopt import all_solutions, fclib, natural_map_residual, solve
-from contactopt.__main__ import main
 from contactopt.benchmark import read_experiment, testset
-from contactopt.benchmark.families import FAMILIES
+from contactopt.benchmark.problems import FAMILIES
 from contactopt.benchmark.testset.invariants import invariants
 from contactopt.benchmark.testset.programs import PROGRAMS, convex_program, write_cbf, write_npz
+from contactopt.cli import main
 from contactopt.cli import test_set as command
 from contactopt.errors import InputError
 from contactopt.problem import infeasibility

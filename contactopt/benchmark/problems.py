@@ -11,11 +11,36 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from contactopt.benchmark.families import FAMILIES, reduced, scene
+from contactopt.benchmark.families.half_planes import half_plane
+from contactopt.benchmark.families.meshed_blocks import meshed_blocks
+from contactopt.benchmark.families.of_scenes import (
+    by_products,
+    in_units,
+    reduced,
+    redundant,
+    scene,
+    skewed,
+    tangential,
+)
+from contactopt.benchmark.families.packings import packing
+from contactopt.benchmark.families.random_frames import rigid_bodies
+from contactopt.benchmark.families.rigid_blocks import rigid_blocks
+from contactopt.benchmark.families.springs import springs
+from contactopt.benchmark.families.unsolvable import dragged, squeezed, toppled
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
 KINDS = ("scene", "fclib", "family")
+
+
+# families by name, one line for each file of contactopt.benchmark.families
+_RIGID = (rigid_bodies, packing, rigid_blocks)
+_ELASTIC = (half_plane, meshed_blocks, springs)
+_OF_SCENES = (by_products, tangential, redundant, in_units, skewed)
+_UNSOLVABLE = (dragged, toppled, squeezed)
+FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
+    make.__name__: make for make in (*_RIGID, *_ELASTIC, *_OF_SCENES, *_UNSOLVABLE)
+}
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def _print_solutions(one: Problem) -> None:
     if not tags["feasible"]:
         _print_proof(one.load())
     elif (tags.get("solutions") or 0) > 1 and tags["contacts"] <= SHOWN:
-        from contactopt import all_solutions
+        from contactopt.methods.enumeration import all_solutions
 
         for number, solution in enumerate(all_solutions(one.load()), 1):
             forces = np.array2string(solution.reactions.ravel(), precision=6, suppress_small=True)
@@ -125,8 +125,9 @@ def _write(found: list[Problem], options: argparse.Namespace) -> None:
 
 def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> Iterator[Path]:
     """The files of one problem, written."""
-    from contactopt import fclib, solve
+    from contactopt import fclib
     from contactopt.benchmark.testset import programs
+    from contactopt.methods.driver import solve
 
     problem, writers = one.load(), {"npz": programs.write_npz, "cbf": programs.write_cbf}
     if form == "fclib":

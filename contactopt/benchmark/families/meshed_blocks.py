@@ -8,7 +8,11 @@ import numpy as np
 
 from contactopt.benchmark.families.of_scenes import problem_of
 from contactopt.errors import InputError
+from contactopt.material import Material
 from contactopt.problem import InterfaceProblem
+from contactopt.scenes.body_kinds import BodyForce, Part, Support
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import Scene
 
 
 def meshed_blocks(
@@ -29,8 +33,6 @@ def meshed_blocks(
     tied             the lowest two blocks are glued to each other
     unstructured     triangles of Delaunay over random nodes; else quadrilaterals
     """
-    from contactopt import BodyForce, Contact, Material, Part, Scene, Support
-
     if blocks < 2 or elements < 2:
         raise InputError("meshed_blocks needs at least two blocks and two elements.")
     rng = np.random.default_rng(seed)

@@ -23,8 +23,8 @@ def springs(
     joined  stiffness of the springs between neighbours
     """
     rng = np.random.default_rng(seed)
-    chain = 2 * np.eye(nodes) - np.eye(nodes, k=1) - np.eye(nodes, k=-1)
-    K = la.block_diag(*[NODE] * nodes) + joined * np.kron(chain, np.eye(2))
+    joints = np.diff(np.eye(nodes), axis=0)  # (nodes - 1, nodes)
+    K = la.block_diag(*[NODE] * nodes) + joined * np.kron(joints.T @ joints, np.eye(2))
     force = np.column_stack([-np.ones(nodes), np.full(nodes, push)])
     force *= 1 + 0.01 * rng.uniform(-1, 1, force.shape)
     Q = np.linalg.inv(K)

@@ -54,7 +54,12 @@ class Problem:
         return self.known.get("reference")
 
     def load(self) -> InterfaceProblem:
-        """Generate the problem, or read it from its file."""
+        """Generate the problem, or read it from its file.
+
+        Returns
+        -------
+        The interface problem. InputError where the row of the set or the file makes none.
+        """
         return self.spec.build({})
 
 

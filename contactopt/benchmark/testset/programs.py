@@ -83,7 +83,9 @@ def convex_program(problem: InterfaceProblem, kind: str, r: np.ndarray) -> Conve
     return PROGRAMS[kind](problem.explicit(), r)
 
 
-def _part(problem: InterfaceProblem, r: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, ...]:
+def _part(
+    problem: InterfaceProblem, r: np.ndarray, own: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """P, c, A, b of the components `own` where all other components are those of r."""
     Q = (problem.Q + problem.Q.T) / 2
     other = np.setdiff1d(np.arange(r.size), own)
