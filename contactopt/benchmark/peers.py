@@ -104,9 +104,12 @@ class Peer:
     process: subprocess.Popen[str] | None = field(default=None, init=False)
 
     def found(self) -> tuple[str, str]:
-        """The Python that can import the solver, and the solver's version.
+        """Find a Python that can import the solver.
 
-        InputError, with the line that installs it, if there is none.
+        Returns
+        -------
+        The Python, and the solver's version. InputError, with the line that installs it, if there
+        is none.
         """
         program = f"{inspect.getsource(self.version)}\nprint('VERSION', version())"
         for python in self.pythons:
@@ -117,9 +120,17 @@ class Peer:
     def answer(
         self, problem: InterfaceProblem, tol: float, time_limit: float, **settings: Any
     ) -> Answer:
-        """What the solver makes of a problem, which it gets in space and without units.
+        """Let the solver answer a problem, which it gets in space and without units.
 
-        InputError on a problem with plates.
+        Parameters
+        ----------
+        problem : With Q as a matrix, without plates; InputError on one with plates.
+        tol, time_limit : The solver's own tolerance [-], and the most that it may take [s].
+        settings : What `prepare` gets besides.
+
+        Returns
+        -------
+        The forces in the problem's units, with what the solver says of them and what was measured.
         """
         if len(problem.s):
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")
