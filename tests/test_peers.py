@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, benchmark, natural_map_residual, solve
-from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.peers import Peer
+from contactopt.benchmark.problems import FAMILIES
 from contactopt.problem.laws.coulomb import Coulomb
 from experiments.peers import pinocchio_admm, siconos_numerics
 from tests.test_benchmark import run, written
