@@ -372,7 +372,7 @@ class Mine:
         return Newton().iterate(problem, start)
 
 @problem
-def springs(contacts=2):
+def identity(contacts=2):
     return InterfaceProblem(np.eye(2 * contacts), -np.ones((contacts, 2)), np.full(contacts, 0.3))
 """,
         "mine.py",
@@ -382,7 +382,7 @@ def springs(contacts=2):
         plugins = ["mine.py"]
         starts = ["cold", "warm"]
         [[problems]]
-        family = "springs"
+        family = "identity"
         contacts = {from = 1, to = 100, steps = 3, scale = "log"}
         [[methods]]
         method = "Mine"
@@ -427,7 +427,7 @@ def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_p
         read_experiment(
             written(tmp_path, text.replace('"${SOME_FOLDER}"\noptional = true', '"${SOME_FOLDER}"'))
         )
-    fclib.write(problems.rigid_bodies(3, 4), tmp_path / "a.hdf5")
+    fclib.write(problems.FAMILIES["rigid_bodies"](3, 4), tmp_path / "a.hdf5")
     monkeypatch.setenv("SOME_FOLDER", str(tmp_path))
     table = run(tmp_path, text, filters=["problem=a"])
     assert set(table["problem"]) == {"a"} and set(table["status"]) == {"solved"}
@@ -492,7 +492,7 @@ def test_a_worker_stays_with_its_problem():
 
 
 def test_families_are_what_they_say():
-    rank_deficient = problems.rigid_bodies(4, 20, seed=1)
+    rank_deficient = problems.FAMILIES["rigid_bodies"](4, 20, seed=1)
     assert np.linalg.matrix_rank(rank_deficient.Q) <= 24
     line = problems.half_plane(400)
     solution = solve(line)

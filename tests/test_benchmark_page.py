@@ -1,5 +1,8 @@
 """The page of a campaign: all runs, escaped, and usable in a browser."""
 
+import re
+import shutil
+
 import pandas as pd
 import pytest
 from browser import CHROMIUM, Browser
@@ -21,16 +24,51 @@ def campaign(tmp_path_factory):
 
 
 def test_a_campaign_ends_with_a_page_of_all_its_runs(campaign):
-    rows, table = data_of(campaign / "report.html")["rows"], load(campaign)
-    assert len(rows) == len(table)
-    for row, (_, run) in zip(rows, table.iterrows()):
-        assert (row["method"], row["status"], row["success"]) == (
-            run["method"],
-            run["status"],
-            bool(run["success"]),
-        )
-        assert row["residual"] == pytest.approx(run["residual"], rel=1e-3)
-    assert any(len(row.get("history", ())) == 3 for row in rows)
+    data, table = data_of(campaign / "report.html"), load(campaign)
+    names = [problem["name"] for problem in data["problems"]]
+    rows = [dict(zip(data["columns"], point)) for point in data["points"]]
+    assert sum(row["repeats"] for row in rows) == len(table)
+    for row in rows:
+        runs = table[
+            (table["problem"] == names[row["problem number"]])
+            & (table["method"] == data["methods"][row["method number"]])
+        ]
+        assert row["cpu"] == pytest.approx(runs["cpu_seconds"].median(), rel=1e-3)
+        assert row["residual"] == pytest.approx(runs["residual"].max(), rel=1e-3)
+        assert row["low"] <= row["cpu"] <= row["high"] and row["claimed"] == runs["claimed"].all()
+    assert len(data["histories"]) == len(rows)
+    (leaders,) = data["leaders"]
+    means = [row["mean"] for row in leaders["rows"]]
+    assert means == sorted(means) and leaders["group"] == "all"
+
+
+def test_the_page_needs_no_network_and_no_other_file(campaign):
+    text = (campaign / "report.html").read_text()
+    assert "http://www.w3.org/2000/svg" in text and len(text) < 300_000
+    assert not re.search(r"(src|href)=.?https?:", text) and "default-src 'none'" in text
+
+
+def test_a_strangers_rows_join_with_their_own_card(campaign, tmp_path):
+    """Twice the times of another machine are taken out by the runs that both have made."""
+    shutil.copytree(campaign, tmp_path / "own")
+    table = load(campaign)
+    theirs = table[table["name"] == "auto"]
+    new = theirs.assign(method="mine", name="mine", cpu_seconds=0.25 * theirs["cpu_seconds"])
+    for rows in (theirs, new):
+        rows["machine"] = "a machine of others"
+    theirs = pd.concat([theirs.assign(cpu_seconds=2 * theirs["cpu_seconds"]), new])
+    save(theirs, tmp_path / "theirs.csv")
+    command = ["report", str(tmp_path / "own"), "--merge", str(tmp_path / "theirs.csv")]
+    assert main(command) == 0
+    data = data_of(tmp_path / "own" / "report.html")
+    assert set(data["methods"]) == {"auto", "nsgs", "auto (theirs)", "mine"}
+    (card,) = [card for card in data["cards"] if card["source"] == "theirs"]
+    assert card["times divided by"] == pytest.approx(2.0, rel=1e-3)
+    assert card["machine"] == "a machine of others" and card["runs"] == len(theirs)
+    means = {row["method"]: row["mean"] for row in data["leaders"][0]["rows"]}
+    assert means["auto (theirs)"] == pytest.approx(means["auto"], rel=1e-2)
+    assert data["order"][0] == "mine"
+    assert main(["report", "all", "--merge", str(tmp_path / "theirs.csv")]) == 2
 
 
 def test_names_of_a_campaign_are_text(campaign, tmp_path):
@@ -55,29 +93,31 @@ def test_every_reason_of_refusal_is_said_once_with_its_number():
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
-def test_a_browser_sorts_and_filters_the_runs_and_draws_one(campaign):
+def test_a_browser_sorts_and_filters_the_runs_and_follows_links(campaign):
     with Browser(campaign / "report.html", 400) as browser:
-        browser.wait("document.querySelectorAll('#convergence .main-svg').length > 0")
+        browser.wait("document.querySelectorAll('#convergence svg').length > 0")
         cells = (
             "[...document.querySelectorAll('#runs tbody tr')].map((row) =>"
             " row.children[{}].innerText)"
         )
         head = "[...document.querySelectorAll('#runs th button')].map((button) => button.innerText)"
-        column = browser.ask(head).index("cpu seconds")
+        column = browser.ask(head).index("CPU [s]")
         browser.ask(f"document.querySelectorAll('#runs th button')[{column}].click()")
         times = [float(text) for text in browser.ask(cells.format(column))]
-        assert times == sorted(times) and len(times) == len(load(campaign))
+        assert times == sorted(times) and len(times) == 6
         method = browser.ask("document.querySelector('#filter-method').options[1].value")
         browser.ask(
             "{const s = document.querySelector('#filter-method'); s.selectedIndex = 1;"
             " s.dispatchEvent(new Event('change'))}"
         )
         assert set(browser.ask(cells.format(browser.ask(head).index("method")))) == {method}
-        browser.ask("document.querySelector('#runs tbody tr').focus()")
-        browser.press("Enter")
-        assert browser.ask("document.querySelectorAll('tr.chosen').length") == 1
-        assert browser.ask("document.getElementById('convergence').data.length") <= 1
-        browser.ask("{const b = document.getElementById('log-x'); b.click()}")
-        assert browser.ask("document.getElementById('speed').layout.xaxis.type") == "linear"
+        browser.ask("document.querySelectorAll('#leaders tbody a')[1].click()")
+        browser.wait("location.hash.startsWith('#solver=')")
+        second = browser.ask("document.querySelectorAll('#leaders tbody a')[1].innerText")
+        assert browser.ask("document.getElementById('choose-solver').value") == second
+        browser.ask("document.querySelectorAll('#of-solver tbody a')[2].click()")
+        browser.wait("location.hash.startsWith('#problem=')")
+        assert browser.ask("document.getElementById('choose-problem').selectedIndex") == 1
+        assert browser.ask("document.querySelectorAll('#speed circle').length") == 2
         assert browser.ask("document.documentElement.scrollWidth <= window.innerWidth")
         assert not browser.faults

@@ -17,7 +17,7 @@ from contactopt import (
     reduce,
     solve,
 )
-from contactopt.benchmark.packings import packing
+from contactopt.benchmark.families.packings import packing
 from contactopt.problem import infeasibility
 
 KERNEL = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2))  # two contacts that squeeze the same body

@@ -22,6 +22,7 @@ PAGES = (
     "certificate",
     "which_method",
     "experiment_files",
+    "test_set",
     "your_solver",
     "figures_for_a_paper",
     "from_calculix",
@@ -46,7 +47,7 @@ def test_a_page_runs_as_it_stands(name, tmp_path, monkeypatch, capsys):
                 assert main(line.split()[1:]) == 0, capsys.readouterr().err
     if name == "experiment_files":
         report = Path("out/bench/friction/report.md").read_text()
-        assert report.count("*Table ") == 2 and report.count("*Figure ") == 5
+        assert report.count("*Table ") == 3 and report.count("*Figure ") == 5
         assert Path("out/bench/friction/report.html").exists()
 
 
@@ -56,7 +57,11 @@ def test_every_page_is_on_the_list_of_how_tos():
 
 
 def test_every_key_of_an_experiment_file_is_explained_with_an_example_that_is_read():
-    assert set(EXPERIMENT) == {field.name for field in fields(Experiment)} - {"path", "skipped"}
+    assert set(EXPERIMENT) == {field.name for field in fields(Experiment)} - {
+        "path",
+        "skipped",
+        "absent",
+    }
     drawn = FIGURES | TABLES
     assert set(KINDS) == set(drawn)
     arguments = {name for draw in drawn.values() for name in inspect.signature(draw).parameters} - {

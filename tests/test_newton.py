@@ -18,7 +18,8 @@ from contactopt import (
     solve,
     transfer,
 )
-from contactopt.benchmark.problems import rigid_bodies, tangential
+from contactopt.benchmark.families.of_scenes import tangential
+from contactopt.benchmark.families.random_frames import rigid_bodies
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.bonded import Bonded

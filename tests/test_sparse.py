@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
-from contactopt.benchmark.packings import packing
+from contactopt.benchmark.families.packings import packing
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
 from contactopt.methods.kernels.homotopy import Homotopy, homotopy_iterates

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, solve
-from contactopt.benchmark.packings import packing
+from contactopt.benchmark.families.packings import packing
 from contactopt.errors import BackendError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.methods import METHODS

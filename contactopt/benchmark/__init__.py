@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from contactopt.benchmark.campaign import run_campaign, run_reports  # noqa: F401
     from contactopt.benchmark.experiment import Experiment, read_experiment  # noqa: F401
     from contactopt.benchmark.keys import COLUMNS  # noqa: F401
+    from contactopt.benchmark.peers import Answer, Peer  # noqa: F401
     from contactopt.benchmark.plugins import method, problem  # noqa: F401
     from contactopt.benchmark.store import STATUSES, load, save  # noqa: F401
 
@@ -48,6 +49,7 @@ _HOMES = {
     "campaign": ("run_campaign", "run_reports"),
     "experiment": ("Experiment", "read_experiment"),
     "keys": ("COLUMNS",),
+    "peers": ("Answer", "Peer"),
     "plugins": ("method", "problem"),
     "store": ("STATUSES", "load", "save"),
 }

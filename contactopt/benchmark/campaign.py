@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
-from contactopt.benchmark.measure import Task
-from contactopt.benchmark.pool import run_locally
+from contactopt.benchmark.measure import Task, absent_row
+from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.process import end_orphans
-from contactopt.benchmark.reports import build, publish, read_layout
-from contactopt.benchmark.store import Store, load, require, save, told
+from contactopt.benchmark.report_page import report_campaign
+from contactopt.benchmark.reports import build, has_table, publish, read_layout
+from contactopt.benchmark.store import Store, lines, load, require, save, told
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.writing import remove_files, whole_file
@@ -73,13 +74,16 @@ def run_campaign(
             with whole_file(folder / "experiment.toml") as file:
                 file.write_bytes(e.path.read_bytes())
         finished = store.finished()
+        for row in (absent_row(e.name, *left) for left in e.absent):
+            if row["key"] not in finished:
+                store.append(row)
         left = [run for run in runs if run.key not in finished]
         tasks = [Task(run, e.name, e.plugins, *limits) for run in left]
         done = {"total": len(runs), "initial": len(runs) - len(tasks)}
         bar = tqdm(desc=e.name, unit="run", file=sys.stderr, disable=quiet, **done)
-        with closing(run_locally(tasks, jobs)) as rows, bar:
+        with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar:
             _keep(rows, store, bar)
-        save(load(store.path), folder / "rows.parquet")
+        save(load(store.path, absent=True), folder / "rows.parquet")
     return folder
 
 
@@ -142,7 +146,13 @@ def run_reports(
         for path in paths:
             if path.stem in names or not names:
                 _renew(path, version == "quick", work, target, jobs)
-    return build(paths, target)
+    page = build(paths, target)
+    for path in paths:
+        layout = read_layout(path)
+        ranked = any(entry["kind"] == "leader_table" for entry in layout.figures)
+        if ranked and has_table(target / layout.name):
+            report_campaign(target / layout.name, path)
+    return page
 
 
 def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:

@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from contactopt.benchmark.entries import Entries, size_of, twice_in
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run, method_spec
+from contactopt.benchmark.testset import of_set
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
@@ -43,7 +42,6 @@ WHOLE = {
     "max_iterations": (1, 10**9),
     "seed": (0, 2**32 - 1),
 }
-LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
 FILTERED = ("problem", "method", "setting", "start", "repeat")
 
 
@@ -60,6 +58,7 @@ class Experiment:
 
     path     of the file
     skipped  why optional entries are left out
+    absent   methods among them, and why
     """
 
     name: str
@@ -82,6 +81,7 @@ class Experiment:
     columns: tuple[str, ...] = ()
     path: Path = Path()
     skipped: tuple[str, ...] = ()
+    absent: tuple[tuple[str, str], ...] = ()
 
     def runs(self, filters: Sequence[str] = ()) -> list[Run]:
         """All runs, those of a problem together; filters: COLUMN=PATTERN, all must match."""
@@ -145,7 +145,7 @@ def _check(table: Table) -> None:
     """Refuse unknown keys, values of the wrong type or size, and more runs than MOST_RUNS, before
     anything is expanded, built or run.
     """
-    data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped"}
+    data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped", "absent"}
     for key in data:
         if key not in known:
             raise table.fail(f"unknown key {key!r}.", key)
@@ -181,14 +181,14 @@ def _check(table: Table) -> None:
                 raise table.fail(
                     f"unknown {key[:-1]} {value!r}; choose from {', '.join(choices)}{more}.", key
                 )
-        if twice := _twice(map(str, values)):
+        if twice := twice_in(map(str, values)):
             raise table.fail(f"'{key}' holds {twice} twice.", key)
     number = data.get("repeats", 1)
     for key in ("settings", "starts"):
         number *= len(data.get(key, ("default",)))
     for key in ("problems", "methods"):
         entries = [entry for entry in data[key] if isinstance(entry, dict)]
-        number *= max(1, sum(math.prod(map(_size_of, entry.values())) for entry in entries))
+        number *= max(1, sum(math.prod(map(size_of, entry.values())) for entry in entries))
     if number > MOST_RUNS:
         raise table.fail(
             f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or take"
@@ -197,20 +197,12 @@ def _check(table: Table) -> None:
         )
 
 
-def _twice(texts: Any) -> str:
-    """The first text that occurs twice, or none."""
-    return next((text for text, n in Counter(texts).items() if n > 1), "")
-
-
-class _Reader:
-    """Expands the problems and methods of one file whose other keys were checked.
-
-    skipped  why optional entries are left out
-    """
+class _Reader(Entries):
+    """Expands the problems and methods of one file whose other keys were checked."""
 
     def __init__(self, table: Table, path: Path):
-        self.table, self.path = table, path
-        self.skipped: list[str] = []
+        super().__init__(table)
+        self.path = path
 
     def experiment(self) -> Experiment:
         data, folder = self.table.data, self.path.parent
@@ -218,6 +210,8 @@ class _Reader:
         registry = self.registry(paths)
 
         def problem(kind: str, name: str, parameters: dict[str, Any]) -> list[ProblemSpec]:
+            if kind == "testset":
+                return [found.spec for found in of_set(name, folder=folder, **parameters)]
             found = named(kind, name, parameters, folder)
             for spec in found:
                 spec.check(registry.problems)
@@ -226,7 +220,7 @@ class _Reader:
         def method(kind: str, name: str, settings: dict[str, Any]) -> list[MethodSpec]:
             return [method_spec(name, settings, registry)]
 
-        problems = self.expanded("problems", KINDS, problem)
+        problems = self.expanded("problems", (*KINDS, "testset"), problem)
         methods = self.expanded("methods", ("method",), method)
         if not problems or not methods:
             raise NothingToRun(f"'{self.path}': nothing is left to run; " + " ".join(self.skipped))
@@ -234,7 +228,12 @@ class _Reader:
             key: tuple(value) if isinstance(value, list) else value for key, value in data.items()
         }
         values |= {"problems": tuple(problems), "methods": tuple(methods), "plugins": paths}
-        return Experiment(**values, path=self.path, skipped=tuple(self.skipped))
+        absent = tuple(
+            (MethodSpec(name, given).label, why)
+            for key, name, given, why in self.absent
+            if key == "methods"
+        )
+        return Experiment(**values, path=self.path, skipped=tuple(self.skipped), absent=absent)
 
     def registry(self, paths: tuple[str, ...]) -> Registry:
         """What the plug-ins declare."""
@@ -248,97 +247,3 @@ class _Reader:
                     "plugins",
                 )
         return found
-
-    def expanded(self, key: str, kinds: Sequence[str], make: Callable[..., list[Any]]) -> list[Any]:
-        """What `make(kind, name, values)` makes of every combination of the lists and ranges of the
-        entries below a key; `kinds` are the keys of which each entry needs one.
-        """
-        made: list[Any] = []
-        for index, entry in enumerate(self.table.data[key]):
-            own = [kind for kind in kinds if isinstance(entry, dict) and kind in entry]
-            if len(own) != 1:
-                what = f"one of {', '.join(kinds)}" if len(kinds) > 1 else f"the key '{kinds[0]}'"
-                raise self.table.fail(f"a {key[:-1]} needs {what}.", key, index)
-            for name, values in self.combinations(key, index, entry, own[0]):
-                try:
-                    made += make(own[0], name, values)
-                except (ValueError, TypeError, ArithmeticError) as error:  # InputError, too
-                    if not entry.get("optional"):
-                        message = f"{str(error).rstrip('.')}."
-                        culprit = _blamed(message, entry, own[0])
-                        raise self.table.fail(message, key, index, culprit) from error
-                    self.skipped.append(str(error))
-        if twice := _twice(spec.label for spec in made):
-            raise self.table.fail(f"two {key} are called {twice!r}.", key)
-        return made
-
-    def combinations(
-        self, table: str, index: int, entry: Mapping[str, Any], kind: str
-    ) -> Iterator[tuple[str, dict[str, Any]]]:
-        """(name, parameters) of every combination of the entry's lists and ranges."""
-        names = entry[kind] if isinstance(entry[kind], list) else [entry[kind]]
-        rest = {key: value for key, value in entry.items() if key not in (kind, "optional")}
-        choices = []
-        for key, value in rest.items():
-            with self.table.about(table, index, key):
-                choices.append(_values_of(key, value))
-        for name, *values in product(names, *choices):
-            if not isinstance(name, str):
-                raise self.table.fail(f"'{kind}' must be a name.", table, index, kind)
-            yield name, dict(zip(rest, values))
-
-
-def _blamed(message: str, entry: Mapping[str, Any], kind: str) -> str:
-    """The key of an entry that is wrong: the message names it, or its value, first."""
-    places = {}
-    for key, value in entry.items():
-        words = [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))]
-        found = [re.search(rf"\b{re.escape(word)}\b", message) for word in words]
-        starts = [match.start() for match in found if match]
-        if starts and key != kind:
-            places[key] = min(starts)
-    return min(places, key=places.__getitem__, default=kind)
-
-
-def _size_of(value: Any) -> int:
-    """How many values a list or a range stands for, without making them."""
-    if isinstance(value, dict):
-        steps = value.get("steps")
-        return steps if isinstance(steps, int) and steps > 0 else 1
-    return len(value) if isinstance(value, list) else 1
-
-
-def _values_of(name: str, value: Any) -> list[Any]:
-    """One value, a list of them, or a range {from, to, steps, scale = "linear" or "log"}."""
-    if isinstance(value, dict):
-        return _range_of(name, value)
-    if isinstance(value, list) and not value:
-        raise InputError(f"the list '{name}' is empty.")
-    values = value if isinstance(value, list) else [value]
-    for one in values:
-        large = isinstance(one, int) and abs(one) >= LARGEST_INTEGER
-        if not isinstance(one, str | int | float) or large:
-            raise InputError(
-                f"a value of '{name}' must be a text, a number, true or false; got {short(one)}."
-            )
-    return values
-
-
-def _range_of(name: str, value: Mapping[str, Any]) -> list[Any]:
-    if not {"from", "to", "steps"} <= set(value) <= {"from", "to", "steps", "scale"}:
-        raise InputError(f"the range '{name}' needs from, to, steps, and may have scale = \"log\".")
-    low, high, steps = value["from"], value["to"], value["steps"]
-    scale = value.get("scale", "linear")
-    if scale not in ("linear", "log") or not isinstance(steps, int) or steps < 1:
-        raise InputError(
-            f'the range \'{name}\' needs whole steps >= 1 and scale "linear" or "log".'
-        )
-    for key in ("from", "to"):
-        check_number(f"'{key}' of the range '{name}'", value[key])
-    if scale == "log" and not (low > 0 and high > 0):
-        raise InputError(f"the logarithmic range '{name}' needs bounds above 0.")
-    spaced = np.geomspace if scale == "log" else np.linspace
-    numbers = [float(f"{x:.6g}") for x in spaced(low, high, steps)]
-    if isinstance(low, int) and isinstance(high, int):
-        return list(dict.fromkeys(round(x) for x in numbers))
-    return numbers

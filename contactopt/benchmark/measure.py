@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from contactopt.benchmark.keys import COLUMNS
+from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
-from contactopt.benchmark.store import SCHEMA, UNKNOWN, pack
+from contactopt.benchmark.store import ABSENT, SCHEMA, UNKNOWN, pack
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Status, natural_map_residual
 from contactopt.problem.laws.associated import Associated
@@ -37,27 +38,6 @@ class Task:
     max_iterations: int
     seed: int
     diagnose: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What a worker says of a run.
-
-    `status` is the method's own word; `reactions` None where there is no answer.
-
-    measured  the columns call_seconds, cpu_seconds, peak_mb and base_mb, as far as they are known
-    history   residuals, seconds and iterations
-    """
-
-    status: str
-    message: str = ""
-    reactions: np.ndarray | None = None
-    multipliers: np.ndarray | None = None
-    label: str = ""
-    iterations: float = np.nan
-    seconds: float = np.nan
-    history: Any = None
-    measured: dict[str, float] = field(default_factory=dict)
 
 
 def blank(task: Task) -> dict[str, Any]:
@@ -86,6 +66,24 @@ def blank(task: Task) -> dict[str, Any]:
         "residual": np.inf,
         "law_residual": np.inf,
         "history": "[]",
+        "versions": _versions(),
+        "machine": _machine(),
+        "time": _now(),
+    }
+
+
+def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
+    """A row that says why a method is not there."""
+    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
+    return unknown | {
+        "schema": SCHEMA,
+        "key": f"absent {method}",
+        "experiment": experiment,
+        "method": method,
+        "name": method.partition("(")[0],
+        "law": "coulomb",
+        "status": ABSENT,
+        "message": one_line(why),
         "versions": _versions(),
         "machine": _machine(),
         "time": _now(),

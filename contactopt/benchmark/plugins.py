@@ -18,6 +18,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
+from contactopt.benchmark.peers import Peer
 from contactopt.errors import InputError
 from contactopt.methods import METHODS
 
@@ -30,12 +31,18 @@ PASSED = ("tol", "time_limit", "max_iterations", "start")
 @dataclass(frozen=True)
 class Plugin:
     """make: a function problem -> answer, or a class whose objects have `iterate`
-    (contactopt.methods.method.Method).
+    (contactopt.methods.method.Method). `peer` is the solver of others that it calls, if any.
     """
 
     name: str
     make: Callable[..., Any]
     law: str = "coulomb"
+    peer: Peer | None = None
+
+    @property
+    def version(self) -> str:
+        """Of its peer, '' without; InputError if the peer is not installed."""
+        return "" if self.peer is None else f"{self.peer.name} {self.peer.found()[1]}"
 
     @property
     def iterates(self) -> bool:
@@ -93,7 +100,9 @@ class Registry:
 _receiving: ContextVar[Registry | None] = ContextVar("receiving", default=None)
 
 
-def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -> Any:
+def method(
+    make: Any = None, *, name: str | None = None, law: str = "coulomb", peer: Peer | None = None
+) -> Any:
     """Declare a function or class as a method of the benchmark.
 
     The declaration counts where a campaign runs the file. Everywhere else the function or class is
@@ -102,8 +111,8 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
     A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s],
     `max_iterations` and `start` (a Solution or None) are passed if it has such arguments, `tol` not
     at the setting "default" if it has a default. It returns reactions (k, dim), or (reactions,
-    multipliers), or a Solution. Returning claims success; raising does not, and InputError means
-    that the problem is not one for this method.
+    multipliers), or a Solution, or an Answer. Returning forces claims success; raising does not,
+    and InputError means that the problem is not one for this method.
 
     Parameters
     ----------
@@ -111,6 +120,7 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
     name : The name of the method; by default that of the function.
     law : "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles
         compare within, one law.
+    peer : The solver of others that it calls, without which it is left out.
 
     Returns
     -------
@@ -124,7 +134,7 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
         raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
 
     def register(make: Any) -> Any:
-        plugin = Plugin(_name("method", make, name), make, law)
+        plugin = Plugin(_name("method", make, name), make, law, peer)
         if plugin.name in METHODS:
             raise InputError(
                 f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it."

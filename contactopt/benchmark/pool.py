@@ -8,13 +8,15 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any
 
 from contactopt.benchmark import worker
-from contactopt.benchmark.measure import Answer, Task, blank, judge
+from contactopt.benchmark.measure import Task, blank, judge
+from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.benchmark.process import KILLED, START, Ended, Process, one_line
+from contactopt.benchmark.runs import Run
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
@@ -24,6 +26,8 @@ WARM_UP = 30.0
 PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
 MARGIN, GRACE = 1.1, 0.5
+PEER_GRACE = 30.0  # s for a peer, which ends itself, to start and to take over the problem
+LONG = 1.0  # s of a run above which it is not repeated
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
 
@@ -64,8 +68,8 @@ class Worker:
         self.builder.interrupt()
         self.solver.interrupt()
 
-    def run(self, task: Task) -> dict[str, Any]:
-        """The row of this run, whatever happens to the processes."""
+    def run(self, task: Task, hopeless: bool = False) -> dict[str, Any]:
+        """The row of this run, whatever happens to the processes; a `hopeless` one is not made."""
         row = blank(task)
         try:
             self._build(task)
@@ -76,6 +80,9 @@ class Worker:
             row["backend"] = task.run.method.backends(self.problem.dim)
         except InputError as error:
             return row | {"status": "refused", "message": one_line(error)}
+        if hopeless:
+            words = "not made: a looser tolerance already took more than the time limit"
+            return row | {"status": "time_limit", "message": words, "call_seconds": task.time_limit}
         begin = time.perf_counter()
         try:
             row |= judge(task, self.problem, self._answer(task))
@@ -86,7 +93,9 @@ class Worker:
                 how = f"{end.status} while its warm start was sought: {end}"
                 row |= {"status": "not_built", "message": how}
             return row
-        if task.run.method.foreign and not row["success"] and row["status"] != "refused":
+        # a peer fails in its own process
+        alone = task.run.method.foreign and not task.run.method.peer
+        if alone and not row["success"] and row["status"] != "refused":
             self.doubted = task.run.method.label
         return row
 
@@ -127,6 +136,7 @@ class Worker:
             try:
                 self._prepare(task)
                 hard = MARGIN * task.time_limit + GRACE
+                hard += PEER_GRACE if task.run.method.peer else 0.0
                 answer = self.solver.ask(hard, "solve", worker.execute, task)
                 if answer is None:
                     self._forget()
@@ -201,18 +211,59 @@ class Shares:
             return task
 
 
-def run_locally(tasks: Sequence[Task], jobs: int) -> Generator[dict[str, Any]]:
+class History:
+    """What earlier runs say of later ones.
+
+    A run that took more than LONG is not repeated. Where one was ended at its limit of time, so
+    would be those of tighter tolerances, which are not made.
+    """
+
+    def __init__(self, rows: Iterable[Mapping[str, Any]] = ()):
+        self.slow: set[tuple[str, ...]] = set()
+        self.ended: dict[tuple[str, ...], float] = {}  # -> the tolerance
+        for row in rows:
+            self.add(row)
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Take a row into account."""
+        key = row["problem"], row["method"], row["start"]
+        if row["call_seconds"] > LONG:
+            self.slow.add((*key, row["setting"]))
+        if row["status"] in ("time_limit", "killed"):
+            self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))
+
+    def repeated(self, run: Run) -> bool:
+        """Whether a run is a repeat of a slow one."""
+        key = run.problem.label, run.method.label, run.start, run.setting
+        return run.repeat > 0 and key in self.slow
+
+    def hopeless(self, run: Run) -> bool:
+        """Whether the same method had not enough time for a looser tolerance."""
+        key = run.problem.label, run.method.label, run.start
+        return run.tolerance < self.ended.get(key, 0.0)
+
+
+def run_locally(
+    tasks: Sequence[Task], jobs: int, history: History | None = None
+) -> Generator[dict[str, Any]]:
     """The row of each run as it is finished, made by `jobs` workers.
 
-    When the iteration is left, the workers are killed.
+    `history` knows the rows that were made before. When the iteration is left, the workers are
+    killed.
     """
+    known = history or History()
     shares, rows, stop = Shares(tasks), queue.Queue[Any](), threading.Event()
     workers = [Worker() for _ in range(min(jobs, len(tasks)))]
 
     def serve(worker: Worker) -> None:
         try:
             while not stop.is_set() and (task := shares.take(worker)) is not None:
-                rows.put(worker.run(task))
+                if known.repeated(task.run):
+                    rows.put(None)
+                    continue
+                row = worker.run(task, known.hopeless(task.run))
+                known.add(row)
+                rows.put(row)
         except BaseException as error:
             rows.put(error)
 
@@ -224,7 +275,8 @@ def run_locally(tasks: Sequence[Task], jobs: int) -> Generator[dict[str, Any]]:
             row = rows.get()
             if isinstance(row, BaseException):
                 raise row
-            yield row
+            if row is not None:
+                yield row
     finally:
         stop.set()
         for worker in workers:

@@ -30,6 +30,7 @@ from contactopt.benchmark.figure_style import (
     short_tick,
     write_numbers,
 )
+from contactopt.benchmark.ranking import achieved, points
 from contactopt.benchmark.tables import INSTANCE, groups
 from contactopt.errors import InputError
 
@@ -92,23 +93,23 @@ def performance_profile(
     metric: str = "solve_seconds",
     by: str = "method",
     labels: Mapping[str, str] = NO_LABELS,
+    accuracy: float | None = None,
 ) -> Any:
     """Draw a profile: the share of the instances solved within a factor of the best method's time
     on each.
 
-    An instance is a problem at a setting and start. Times are medians over repeats, and a method
-    that fails once has failed.
+    An instance is a problem at a setting and start, or a problem and a start where `accuracy` is
+    the certificate at which methods are compared. Times are medians over repeats, and a method that
+    fails once has failed.
 
     Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math.
     Program. 91, 201-213.
     """
     figure, ax = make_figure()
-    timed = table.assign(_time=table[metric].where(table["success"], np.inf))
-    wide = (
-        timed.groupby([*INSTANCE, by])["_time"]
-        .agg(lambda t: t.median() if np.isfinite(t).all() else np.inf)
-        .unstack(by)
-    )
+    if accuracy is None:
+        wide = _at_settings(table, metric, by)
+    else:
+        wide = achieved(points(table), accuracy, "wall" if metric == "call_seconds" else "cpu")
     solvable = wide[np.isfinite(wide.min(axis=1))]
     ratio = solvable.div(solvable.min(axis=1), axis=0)
     largest = 1.3 * float(np.max(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0))
@@ -124,6 +125,16 @@ def performance_profile(
     ax.set(xlabel=f"ratio: {what} / the best method's [-]")
     ax.set(ylabel=f"share of the {len(wide)} instances solved")
     return add_legend(figure, ax, "method (solved)")
+
+
+def _at_settings(table: pd.DataFrame, metric: str, by: str) -> pd.DataFrame:
+    """The times of the instances, inf where a run did not keep its tolerance."""
+    timed = table.assign(_time=table[metric].where(table["success"], np.inf))
+    return (
+        timed.groupby([*INSTANCE, by])["_time"]
+        .agg(lambda t: t.median() if np.isfinite(t).all() else np.inf)
+        .unstack(by)
+    )
 
 
 def time_against_size(

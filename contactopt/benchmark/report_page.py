@@ -1,7 +1,7 @@
-"""The report of one finished campaign: figures and tables for papers, and a page to explore.
+"""The report of one finished campaign: figures and tables for papers, and a page to look things up.
 
-The page holds every run. Its charts and its table follow the same filters; a click on a run draws
-how its residual fell.
+The page begins with the leader table. It has a section for each solver and for each problem, which
+links lead to, and every run with its repeats in one row.
 """
 
 from __future__ import annotations
@@ -10,15 +10,28 @@ import html
 import json
 import math
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from contactopt.benchmark.figure_style import COLOURS
-from contactopt.benchmark.keys import COLUMNS
+from contactopt.benchmark.ranking import (
+    NOISE,
+    RESAMPLES,
+    achieved,
+    agreement,
+    points,
+    ranking,
+    reruns,
+    wall_over_cpu,
+    warning,
+)
 from contactopt.benchmark.reports import Layout, read_layout, rendered, write_report
-from contactopt.benchmark.store import load, require
+from contactopt.benchmark.store import ABSENT, load, require
+from contactopt.benchmark.testset import problems
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
 
@@ -26,26 +39,37 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PAGE = "report.html"
-SHOWN = (
-    "problem", "method", "setting", "start", "repeat", "status", "success", "iterations",
-    "residual", "tolerance", "error", "solve_seconds", "call_seconds", "cpu_seconds", "peak_mb",
-    "contacts", "family", "law", "backend", "message",
+ACCURACIES = (1e-3, 1e-6, 1e-8)  # certificates at which methods are ranked
+LEAST_PROBLEMS = 4  # of a group that has a leader table of its own
+MOST_POINTS = 30  # of a curve of convergence
+COLUMNS_SHOWN = (
+    "tolerance", "residual", "claimed", "status", "cpu", "low", "high", "wall", "memory", "repeats",
 )  # fmt: skip
-MOST_HISTORIES = 5000  # runs, above which the page leaves their convergence out
+PROTOCOL = (
+    "Methods are compared at the certificate that they reach, read off in logarithms between the"
+    " tolerances asked. A certificate is computed here from the problem and the answer; what a"
+    " method says of itself is in the column 'claimed'. CPU times are medians over the repeats."
+    " A failure counts as the time limit. Times below {noise:g} ms count as {noise:g} ms. Problems"
+    " that no method solves are left out of a ranking. The rank interval holds 95 % of {resamples}"
+    " bootstrap samples of the problems. {tau}"
+)
 
 
-def report_campaign(folder: str | Path, experiment: str | Path | None = None) -> Path:
+def report_campaign(
+    folder: str | Path, experiment: str | Path | None = None, others: Sequence[str | Path] = ()
+) -> Path:
     """Write the report of a finished campaign into its folder: report.md with figures, and
-    report.html to explore.
+    report.html to look things up, one file with everything in it.
 
     Parameters
     ----------
     folder : of the campaign, with rows.jsonl, rows.parquet or rows.csv
     experiment : its file; None: the copy in the folder, without which the usual figures are drawn
+    others : files or folders with rows of other people, which join those of the campaign
 
     Returns
     -------
-    Path : of report.html, or of report.md where plotly is not installed
+    Path : of report.html
 
     Raises
     ------
@@ -53,7 +77,8 @@ def report_campaign(folder: str | Path, experiment: str | Path | None = None) ->
     """
     require("markdown_it", "pandas")
     folder = Path(folder)
-    table = load(folder)
+    rows = joined(folder, others)
+    table = rows[rows["status"] != ABSENT].reset_index(drop=True)
     if table.empty:
         raise InputError(f"'{folder}' holds no runs, so there is nothing to report.")
     path = folder / "experiment.toml" if experiment is None else Path(experiment)
@@ -63,36 +88,172 @@ def report_campaign(folder: str | Path, experiment: str | Path | None = None) ->
     if not (path.parent / layout.findings).is_file():  # beside a copy there is none
         layout = replace(layout, findings="")
     text = write_report(layout, folder, table)
-    if find_spec("plotly") is None:
-        return folder / "report.md"
-    data = {
-        "rows": _rows(table),
-        "columns": {name: COLUMNS[name][1] for name in SHOWN if name in table},
-        "colours": COLOURS,
-    }
     body = filled("report.html", title=html.escape(layout.title), static=rendered(text, folder))
-    return write_html(folder / PAGE, layout.title, body, data, ["report.js"])
+    data = page_data(table) | {"absent": _absent(rows)}
+    return write_html(folder / PAGE, layout.title, body, data, ["report.js"], plotly=False)
 
 
-def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """One mapping per run with the columns that the page shows, and the residuals and seconds of
-    its iterations.
+def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
+    """The rows of a campaign and those of others, whose methods are told apart by their file.
+
+    Times of others come from another machine. Where both have made the same run of the same
+    method, the others' times are divided by the geometric mean of the ratios of these times.
     """
-    names = [name for name in SHOWN if name in table]
-    histories = "history" in table and len(table) <= MOST_HISTORIES
+    import pandas as pd
+
+    own = load(folder, absent=True).assign(source=folder.resolve().name, factor=1.0)
+    tables = [own]
+    for other in map(Path, others):
+        rows = load(other, absent=True)
+        pairs = own.merge(rows, on=["problem", "method", "setting", "start", "repeat"])
+        pairs = pairs[pairs["success_x"] & pairs["success_y"]]
+        ratios = pairs["cpu_seconds_y"] / pairs["cpu_seconds_x"]
+        factor = float(np.exp(np.log(ratios).mean())) if len(pairs) else 1.0
+        for column in ("cpu_seconds", "call_seconds", "solve_seconds"):
+            rows[column] = rows[column] / factor
+        known = rows["method"].isin(own["method"])
+        rows["method"] = rows["method"].where(~known, rows["method"] + f" ({other.stem})")
+        tables.append(rows.assign(source=other.stem, factor=factor))
+    return pd.concat(tables, ignore_index=True)
+
+
+def page_data(table: pd.DataFrame) -> dict[str, Any]:
+    """What the page shows of the runs under Coulomb's law, or of all if there are none."""
+    own = table[table["law"] == "coulomb"]
+    own = _with_starts(own if len(own) else table)
+    found = points(own)
+    names, methods = list(dict.fromkeys(own["problem"])), sorted(set(own["method"]))
+    of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in problems()}
+    tags = {name: _tags(rows.iloc[0], of_set) for name, rows in own.groupby("problem")}
+    accuracies = _accuracies(found)
+    times = [achieved(found, a).droplevel("start").reindex(names)[methods] for a in accuracies]
+    first = ranking(found, accuracies[len(accuracies) // 2])["method"]
+    number = {name: i for i, name in enumerate(names)}
+    shown = [
+        [number[p], methods.index(m), *(_plain(value) for value in rest)]
+        for p, m, *rest in found[["problem", "method", *COLUMNS_SHOWN]].itertuples(index=False)
+    ]
+    ratio = wall_over_cpu(own)
+    return {
+        "methods": methods,
+        "order": list(first) + [name for name in methods if name not in set(first)],
+        "problems": [{"name": name, "tags": tags[name]} for name in names],
+        "columns": ["problem number", "method number", *COLUMNS_SHOWN],
+        "points": shown,
+        "accuracies": accuracies,
+        "times": [[[_plain(t) for t in row] for row in seconds.to_numpy()] for seconds in times],
+        "leaders": [
+            {"group": group, "accuracy": a, "rows": _records(ranking(rows, a)), "problems": members}
+            for group, rows, members in _groups(found, tags, number)
+            for a in accuracies
+        ],
+        "histories": _histories(own, number, methods),
+        "cards": _cards(table),
+        "busy": warning(ratio),
+        "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(own, found)),
+        "colours": COLOURS[:7],
+    }
+
+
+def _with_starts(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with a warm start as a problem of its own."""
+    warm = table["start"] == "warm"
+    return table.assign(problem=table["problem"].where(~warm, table["problem"] + ", warm start"))
+
+
+def _accuracies(found: pd.DataFrame) -> list[float]:
+    """The certificates at which a table can be ranked: those between its tolerances."""
+    low, high = found["tolerance"].min(), found["tolerance"].max()
+    return [a for a in ACCURACIES if low <= a <= high] or [float(low)]
+
+
+def _tau(own: pd.DataFrame, found: pd.DataFrame) -> str:
+    """Say how two reruns of the table agree."""
+    if own["repeat"].max() == 0:
+        return "Each run was made once, so nothing is known of a rerun."
+    even, odd = map(points, reruns(own))
+    tau = agreement(even, odd, _accuracies(found)[-1])
+    return f"Kendall's tau of the ranks of the even and of the odd repeats is {tau:.2f}."
+
+
+def _tags(row: pd.Series, of_set: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """What is known of a problem: some columns of its runs, and the tags of the test set."""
+    own = {name: _plain(row[name]) for name in ("family", "dim", "contacts")}
+    own["plates"] = bool(row["plates"])
+    return own | of_set.get(str(row["problem"]).removesuffix(", warm start"), {})
+
+
+def _groups(
+    found: pd.DataFrame, tags: dict[str, dict[str, Any]], number: dict[str, int]
+) -> list[tuple[str, pd.DataFrame, list[int]]]:
+    """The groups of problems with a leader table: all, and those that share a tag that is no
+    number, each with the numbers of its problems.
+    """
+    groups = {"all": list(number)}
+    for name, known in tags.items():
+        for key, value in known.items():
+            if isinstance(value, str | bool) or key == "dim":
+                word = str(value).lower() if isinstance(value, bool) else value
+                groups.setdefault(f"{key} = {word}", []).append(name)
+    return [
+        (group, found[found["problem"].isin(members)], [number[name] for name in members])
+        for group, members in sorted(groups.items(), key=lambda pair: (pair[0] != "all", pair[0]))
+        if group == "all" or LEAST_PROBLEMS <= len(members) < len(number)
+    ]
+
+
+def _histories(own: pd.DataFrame, number: dict[str, int], methods: list[str]) -> list[list[Any]]:
+    """(problem, method, certificates, seconds) of the tightest run of each method."""
+    if "history" not in own:
+        return []
     made = []
-    for number, values in enumerate(table[names].itertuples(index=False, name=None)):
-        row = {name: _plain(value) for name, value in zip(names, values)}
-        if histories and (found := json.loads(table["history"].iloc[number] or "[]")):
-            row["history"] = [[_plain(x) for x in column] for column in found]
-        made.append(row)
+    kept = own[(own["repeat"] == 0) & (own["history"].str.len() > 2)].sort_values("tolerance")
+    for row in kept.drop_duplicates(["problem", "method"]).itertuples():
+        residuals, seconds, _ = json.loads(row.history)
+        chosen = np.unique(np.geomspace(1, len(residuals), MOST_POINTS).astype(int)) - 1
+        curves = [[_plain(curve[i]) for i in chosen] for curve in (residuals, seconds)]
+        made.append([number[row.problem], methods.index(row.method), *curves])
     return made
+
+
+def _cards(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Where rows come from: a card for each source, machine and set of versions."""
+    made = []
+    sources = table if "source" in table else table.assign(source="", factor=1.0)
+    for (source, machine, versions), rows in sources.groupby(["source", "machine", "versions"]):
+        backends = {name for text in rows["backend"].fillna("") for name in text.split(", ")}
+        made.append(
+            {
+                "source": source,
+                "runs": len(rows),
+                "machine": machine,
+                "times divided by": _plain(rows["factor"].iloc[0]),
+                "wall over CPU": _plain(wall_over_cpu(rows)),
+                "versions": versions,
+                "solvers of others": ", ".join(sorted(backends - {"", "native"})),
+                "tolerances asked": ", ".join(f"{t:g}" for t in sorted(set(rows["tolerance"]))),
+                "time limit [s]": ", ".join(f"{t:g}" for t in sorted(set(rows["time_limit"]))),
+                "from": rows["time"].min(),
+                "to": rows["time"].max(),
+            }
+        )
+    return made
+
+
+def _absent(rows: pd.DataFrame) -> list[tuple[str, str]]:
+    there = set(rows.loc[rows["status"] != ABSENT, "method"])
+    left = rows[(rows["status"] == ABSENT) & ~rows["method"].isin(there)]
+    return list(dict.fromkeys(zip(left["method"], left["message"])))
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    return [{key: _plain(v) for key, v in row.items()} for row in table.to_dict("records")]
 
 
 def _plain(value: Any) -> Any:
     """A value that JSON can hold: numbers with four digits, None where there is none."""
-    if isinstance(value, str | bool) or value is None:
-        return value
+    if isinstance(value, str | bool | np.bool_) or value is None:
+        return bool(value) if isinstance(value, np.bool_) else value
     number = float(value)
     if not math.isfinite(number):
         return None

@@ -3,7 +3,8 @@ reports. Solves nothing.
 
 An experiment file lists its figures and tables in order (`contactopt.benchmark.keys.FIGURE` has the
 keys). A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its
-table REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
+table REPORTS/NAME/rows.csv, or rows.parquet if it is long. All reports together are
+REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactopt.benchmark.keys import COLUMNS
+from contactopt.benchmark.ranking import BUSY, wall_over_cpu
 from contactopt.benchmark.report_figures import FIGURES
 from contactopt.benchmark.store import load, require, save
 from contactopt.benchmark.tables import TABLES, select
@@ -27,13 +29,18 @@ from contactopt.checks import check_name
 from contactopt.errors import InputError
 from contactopt.figures.html import filled
 from contactopt.files.toml_table import Table, read_table
-from contactopt.files.writing import whole_file, whole_folder
+from contactopt.files.writing import remove_files, whole_file, whole_folder
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # The report of an experiment that asks for no figures.
 USUAL = (
+    {
+        "kind": "leader_table",
+        "caption": "Leaders at the certificate 1e-6: shifted geometric means of the times in"
+        " seconds; a failure counts as the time limit.",
+    },
     {
         "kind": "success_table",
         "caption": "Runs that kept the tolerance, by setting; how the others ended.",
@@ -48,15 +55,13 @@ USUAL = (
         "caption": "CPU time against certified residual; hollow: the tolerance was missed.",
         "time": "cpu_seconds",
     },
-    {
-        "kind": "time_table",
-        "caption": "Shifted geometric means; a failure counts at the time limit.",
-        "metric": "cpu_seconds",
-    },
 )
 # of a figure; all others are arguments of its function
 OWN_KEYS = ("kind", "caption", "where", "optional")
-LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
+WITH_HISTORY = {"convergence", "leader_table"}  # kinds whose reports draw convergence
+LEFT_OUT = ("key", "label", "history")  # of a report's table
+TABLE_FILES = ("csv", "parquet")
+MOST_LINES = 2000  # of a table that is kept as text
 PAGE = "benchmarks.html"
 DPI, SHADES = 100, 160
 
@@ -108,12 +113,21 @@ def _check_figure(number: int, entry: Table) -> None:
 
 
 def publish(experiment: Path, results: Path, reports: Path) -> None:
-    """Take the small table of a campaign over into REPORTS/NAME/rows.csv."""
+    """Take the small table of a campaign over into REPORTS/NAME."""
     layout = read_layout(experiment)
     drawn = {entry["kind"] for entry in layout.figures}
-    left_out = set(LEFT_OUT) - ({"history"} if "convergence" in drawn else set())
+    left_out = set(LEFT_OUT) - ({"history"} if drawn & WITH_HISTORY else set())
     columns = [*layout.columns] or [name for name in COLUMNS if name not in left_out]
-    save(load(results), reports / layout.name / "rows.csv", columns)
+    table, folder = load(results, absent=True), reports / layout.name
+    table["history"] = table["history"].where(table["repeat"] == 0, "[]")
+    remove_files(folder, [f"rows.{kind}" for kind in TABLE_FILES])
+    kind = TABLE_FILES[len(table) > MOST_LINES]
+    save(table, folder / f"rows.{kind}", columns)
+
+
+def has_table(folder: Path) -> bool:
+    """Whether a report of the project has its table."""
+    return any((folder / f"rows.{kind}").exists() for kind in TABLE_FILES)
 
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
@@ -134,8 +148,8 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
                     f"'{path}': another experiment is called {layout.name!r} too; rename one."
                 )
             folder = page.parent / layout.name
-            if (folder / "rows.csv").exists():
-                text = write_report(layout, folder, load(folder / "rows.csv"))
+            if has_table(folder):
+                text = write_report(layout, folder, load(folder))
                 made[layout.name] = layout, rendered(text, folder)
         except InputError as error:
             errors.append(str(error))
@@ -218,22 +232,24 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     failures = int((~table["success"]).sum())
     backends = {name for text in table["backend"] for name in str(text).split(", ")}
     backends -= {"native", "nan"}
-    busy = (table["call_seconds"] / table["cpu_seconds"]).median()
+    busy = wall_over_cpu(table)
     link = Path(os.path.relpath(layout.path, folder)).as_posix()
-    name = "rows.parquet"
+    files = (f"rows.{kind}" for kind in reversed(TABLE_FILES))
+    name = next((file for file in files if (folder / file).exists()), "rows.jsonl")
     made = "`contactopt bench`; rebuilt from the table by `contactopt report` with this folder"
-    if (folder / "rows.csv").exists():  # a report of the project, not the folder of a campaign
-        name = "rows.csv"
+    if not (folder / "rows.jsonl").exists() and layout.path.parent != folder:
+        # a report of the project, not the folder of a campaign
         made = (
-            f"`contactopt report --run full {layout.path.stem}`; rebuilt from the table by"
-            " `contactopt report`"
+            f"`contactopt report --run full {layout.path.stem}` (`quick` for fewer problems);"
+            " rebuilt from the table by `contactopt report`"
         )
     machines, versions = ("; ".join(sorted(set(table[key]))) for key in ("machine", "versions"))
     lines = [
         f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a"
         " certificate recomputed from the problem.",
-        f"The median of wall time over CPU time of the calls is {busy:.1f}. More than 1 means a"
-        " busy machine. CPU times are compared, and time limits are wall times.",
+        f"The median of wall time over CPU time of the calls is {busy:.2f}. More than 1 means a"
+        f" busy machine, and above {BUSY:g} nothing is ranked. CPU times are compared, and time"
+        " limits are wall times.",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
         f"Made by {made}.",
         _one_line(f"Environment: {machines}. {versions}. One BLAS thread."),

@@ -25,11 +25,14 @@ OTHER_LAWS = {"relaxation": "associated"}
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method of contactopt, or a plug-in, with the settings given and the law that it solves."""
+    """A method of contactopt, or a plug-in, with the settings given, the law that it solves, and
+    name and version of the solver of others that it calls.
+    """
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     law: str = "coulomb"
+    peer: str = ""
 
     @property
     def label(self) -> str:
@@ -48,7 +51,7 @@ class MethodSpec:
         """Names and versions of the backends in any of these dimensions, "native" without;
         InputError if none works.
         """
-        return _backends(self.name, json.dumps(dict(self.settings)), dims)
+        return self.peer or _backends(self.name, json.dumps(dict(self.settings)), dims)
 
 
 def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> MethodSpec:
@@ -56,17 +59,17 @@ def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> M
 
     InputError if its name or a setting is unknown, or a backend is not installed.
     """
+    law, peer = OTHER_LAWS.get(name, "coulomb"), ""
     if name in METHODS:
         find_method(name, **settings)
-        law = OTHER_LAWS.get(name, "coulomb")
     elif (plugin := registry.find(name)) is not None:
         plugin.check(settings)
-        law = plugin.law
+        law, peer = plugin.law, plugin.version
     else:
         raise InputError(
             f"unknown method {name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
         )
-    spec = MethodSpec(name, settings, law)
+    spec = MethodSpec(name, settings, law, peer)
     spec.backends(2, 3)
     return spec
 

@@ -34,6 +34,7 @@ SCHEMA = 1  # of COLUMNS; a reader refuses newer ones
 STATUSES = {status.label: status.sentence for status in Status} | ENDS
 REFERENCE = 1e-8  # largest residual of a reference solution
 UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
+ABSENT = "absent"  # status of the row of a method that is not there
 _log = logging.getLogger(__name__)
 
 
@@ -142,7 +143,7 @@ def _unpack(text: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text))
 
 
-def load(path: str | Path) -> pd.DataFrame:
+def load(path: str | Path, absent: bool = False) -> pd.DataFrame:
     """Read the table of a campaign, one row for each run, with the columns COLUMNS.
 
     Parameters of the problem and settings of the method are added as columns problem.NAME and
@@ -151,6 +152,7 @@ def load(path: str | Path) -> pd.DataFrame:
     Parameters
     ----------
     path : The folder of the campaign, or a rows.jsonl, .parquet or .csv.
+    absent : Whether to keep the rows that say why a method is not there.
 
     Returns
     -------
@@ -181,6 +183,8 @@ def load(path: str | Path) -> pd.DataFrame:
             table = pd.read_csv(path, dtype=texts, keep_default_na=False, na_values=empty)
         if len(table) and int(table["schema"].max()) > SCHEMA:
             raise InputError(f"'{path}' was written by a newer version; update contactopt.")
+        if not absent:
+            table = table[table["status"] != ABSENT].reset_index(drop=True)
         for source, prefix in (("parameters", "problem"), ("settings", "method")):
             if source in table:
                 given = pd.DataFrame(

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.benchmark.ranking import SHIFT, leader_table
 from contactopt.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 INSTANCE = ["problem", "setting", "start"]
-SHIFT = 1e-3  # s, of shifted geometric means
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
@@ -105,4 +105,6 @@ def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
     return sorted(found, key=lambda pair: -pair[1]["tolerance"].max()) if by == "setting" else found
 
 
-TABLES: dict[str, Callable[..., Any]] = {f.__name__: f for f in (success_table, time_table)}
+TABLES: dict[str, Callable[..., Any]] = {
+    f.__name__: f for f in (leader_table, success_table, time_table)
+}

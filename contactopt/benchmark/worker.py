@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from contactopt.benchmark.calls import call, measure
-from contactopt.benchmark.measure import Answer, Task
+from contactopt.benchmark.measure import Task
+from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
@@ -27,6 +28,7 @@ from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws.coulomb import Coulomb
 
 NEIGHBOUR = 0.9  # load and friction of the problem whose solution is the warm start
+MOST_ROWS = 3000  # components up to which a Q of products is made a matrix
 UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAlgError)
 
 
@@ -56,10 +58,12 @@ def build(
         begin = time.perf_counter()
         problem = spec.build(_kept.plugins.problems)
         seconds = time.perf_counter() - begin
+        if isinstance(problem.Q, InterfaceOperator) and problem.q.size <= MOST_ROWS:
+            problem = problem.explicit()
         if isinstance(problem.Q, InterfaceOperator):
             raise InputError(
                 f"problem '{spec.label}' must have Q as a"
-                " matrix; a benchmark hands it to other processes."
+                f" matrix above {MOST_ROWS} components; a benchmark hands it to other processes."
             )
         facts = {
             "fingerprint": problem.fingerprint,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.cards import count
+from contactopt.cli.test_set import problems
 from contactopt.errors import InputError
 from contactopt.methods.method import NATIVE
 from contactopt.readings.resultants import resultant_words
@@ -220,8 +221,7 @@ def bench(options: argparse.Namespace) -> int:
         print(f"  {sentence}")
     print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
     page = report_campaign(folder, options.file)
-    more = "; a page to explore needs: pip install 'contactopt[view]'"
-    print(f"report: {page}{'' if page.suffix == '.html' else more}")
+    print(f"report: {page}")
     return 0
 
 
@@ -234,8 +234,10 @@ def report(options: argparse.Namespace) -> int:
     folders = [path for path in given if path.is_dir() and any(path.glob("rows.*"))]
     if folders and len(folders) == len(options.names) and not options.run:
         for folder in folders:
-            print(f"report: {report_campaign(folder)}")
+            print(f"report: {report_campaign(folder, others=options.merge)}")
         return 0
+    if options.merge:
+        raise InputError("--merge adds rows to the folder of a campaign; name this folder first.")
     paths = sorted(Path(options.experiments).glob("*.toml"))
     page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
     print(f"reports in {page.parent}, all of them in {page}")
@@ -293,6 +295,7 @@ COMMANDS: dict[str, Command] = {
     "new": new,
     "bench": bench,
     "report": report,
+    "problems": problems,
     "list": listing,
     "completion": completion,
 }

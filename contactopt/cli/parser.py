@@ -8,6 +8,7 @@ import contactopt
 from contactopt.benchmark.keys import help_text
 from contactopt.cli import commands
 from contactopt.cli.completion import NAMES, SHELLS
+from contactopt.cli.test_set import add_options
 from contactopt.run_options import OPTIONS
 
 EPILOG = """Examples:
@@ -37,6 +38,7 @@ COMMANDS = {
     "bench": "compare methods: make all runs that an experiment"
     " file describes, and a report about them",
     "report": "make the reports of comparisons again from their tables, without solving anything",
+    "problems": "list, show or write the problems of a test set: list, show NAME, write NAME",
     "list": "list everything that is chosen by its name: scenes, laws, methods, solvers, backends",
     "completion": "print a script with which a shell completes"
     " commands, options and names of scenes",
@@ -80,6 +82,7 @@ def make_parser() -> argparse.ArgumentParser:
     _run(made["run"])
     _bench(made["bench"])
     _report(made["report"])
+    add_options(made["problems"])
     view = made["view"]
     view.add_argument("folder", metavar="DIR", help="a folder that `contactopt run` wrote")
     view.add_argument("--out", metavar="FILE", help="name of the page (default: DIR/view.html)")
@@ -188,4 +191,6 @@ def _report(report: argparse.ArgumentParser) -> None:
         choices=("quick", "full"),
         help="make the runs first: all of them (full), or a few, into out/ (quick)",
     )
+    what = "add the rows of another campaign, also of another machine: a folder or a rows.csv"
+    report.add_argument("--merge", action="append", default=[], metavar="FILE", help=what)
     report.add_argument("--jobs", type=int, metavar="N", help=JOBS)

@@ -61,19 +61,21 @@ def _text(array: np.ndarray) -> str:
 
 
 def write_html(
-    file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]
+    file: str | Path,
+    title: str,
+    body: str,
+    data: Mapping[str, Any],
+    programs: Sequence[str],
+    plotly: bool = True,
 ) -> Path:
     """Write a page that stands alone.
 
     `body` is HTML with every name in it escaped, between the header with its title, plain text, and
-    the programs: JavaScript files in contactopt/figures/pages, run in this order once plotly is
-    there. They read `data`, which may be anything that JSON can hold. InputError if plotly is not
-    installed, or the file cannot be written.
+    the programs: JavaScript files in contactopt/figures/pages, run in this order once `plotly` is
+    there, if they need it. They read `data`, which may be anything that JSON can hold. InputError
+    if plotly is not installed, or the file cannot be written.
     """
-    check_installed()
-    from plotly.offline import get_plotlyjs
-
-    plotly = base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+    packed = _plotly() if plotly else ""
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
     encoded = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     parts = [
@@ -83,7 +85,7 @@ def write_html(
         f"<title>{html.escape(title)}</title><style>{texts['page.css']}</style></head><body>",
         body,
         f'<script type="application/json" id="data">{encoded}</script>',
-        f'<script type="text/plain" id="plotly">{plotly}</script>',
+        f'<script type="text/plain" id="plotly">{packed}</script>',
         f"<script>{texts['start.js']}\nstart(() => {{\n"
         + "\n".join(texts[name] for name in programs)
         + "\n});</script>",
@@ -92,6 +94,14 @@ def write_html(
     with whole_file(file) as beside:
         beside.write_text("".join(parts), encoding="utf-8")
     return Path(file)
+
+
+def _plotly() -> str:
+    """The program of plotly, compressed, as text."""
+    check_installed()
+    from plotly.offline import get_plotlyjs
+
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
 
 
 def filled(name: str, **texts: str) -> str:

@@ -1,28 +1,23 @@
 """How do the methods do on problems of other codes? `python -m experiments.questions.fclib_problems
-[--siconos PYTHON] FOLDER [FOLDER ...]`.
+FOLDER [FOLDER ...]`.
 
 The folders hold FCLib files (*.hdf5) and files in Siconos' text format (*.dat), which are not part
-of this project. PYTHON is an interpreter that can import siconos.numerics: its solvers then take
-the same files in the same run. The table of the default method is printed first; the other methods
-follow.
+of this project. Where Siconos is installed, its solvers take the same files in the same run. The
+table of the default method is printed first; the other methods follow.
 """
 
 from __future__ import annotations
 
-import json
 import statistics
-import subprocess
 import sys
-import tempfile
 import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from contactopt import InterfaceProblem, Solution, fclib, siconos_residual, solve
+from contactopt import InputError, InterfaceProblem, Solution, fclib, siconos_residual, solve
+from experiments.peers.siconos_numerics import siconos
 from experiments.report import markdown, write
 
 DEFAULT, OTHERS = "auto", ("proximal", "nsgs", "admm")
@@ -32,54 +27,19 @@ REPEATS, LONG = 3, 2.0  # a solve that takes longer than so many seconds is not 
 SOLVERS = ("NSGS", "PROX", "ADMM", "NSN_AC", "VI_EG")
 SHIFT = 1e-3  # of the shifted geometric means [s]
 
-# What an interpreter with Siconos runs: a file, a solver, the tolerance, the repetitions. It prints
-# the median of the processor seconds of the solve alone, and the reactions.
-SICONOS = """
-import json, statistics, sys, time
-import numpy as np
-import siconos.numerics as sn
-problem = sn.frictionContact_new_from_filename(sys.argv[1])
-dim, times = problem.dimension, []
-solve = sn.fc3d_driver if dim == 3 else sn.fc2d_driver
-solver = getattr(sn, f"SICONOS_FRICTION_{dim}D_{sys.argv[2]}")
-while len(times) < int(sys.argv[4]) and sum(times) < 2:
-    r, v = np.zeros(problem.M.size0), np.zeros(problem.M.size0)
-    options = sn.SolverOptions(solver)
-    options.dparam[0], options.iparam[0] = float(sys.argv[3]), 100000
-    start = time.process_time()
-    solve(problem, r, v, options)
-    times.append(time.process_time() - start)
-print("ANSWER", json.dumps([statistics.median(times), r.tolist()]))
-"""
 
-
-def as_text(problem: InterfaceProblem) -> str:
-    """The problem in Siconos' text format, in sparse blocks."""
-    (k, d), Q = problem.q.shape, sp.bsr_array(sp.csr_array(problem.Q), blocksize=2 * (problem.dim,))
-    Q.sort_indices()
-    ends, blocks = d * np.arange(1, k + 1), len(Q.indices)
-    head = [d, k, 1, k * d, k * d, blocks, k, k, *ends, *ends, k + 1, blocks]
-    numbers = [*head, *Q.indptr, *Q.indices]
-    for number, block in enumerate(Q.data):
-        numbers += [number, *block.T.ravel().tolist()]
-    return "\n".join(map(str, [*numbers, *problem.q.ravel().tolist(), *problem.mu.tolist()]))
-
-
-def of_siconos(python: str, problem: InterfaceProblem, solver: str) -> float | None:
-    """Seconds of one of Siconos' solvers; None where it is not certified by its own measure."""
-    with tempfile.NamedTemporaryFile("w", suffix=".dat") as file:
-        file.write(as_text(problem))
-        file.flush()
-        command = [python, "-c", SICONOS, file.name, solver, str(TOL), str(REPEATS)]
-        with suppress(subprocess.TimeoutExpired):
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
-            for line in done.stdout.splitlines():
-                if line.startswith("ANSWER"):
-                    seconds, r = json.loads(line.removeprefix("ANSWER"))
-                    reactions = np.array(r).reshape(problem.q.shape)
-                    good = siconos_residual(problem, reactions) <= TOL
-                    return float(seconds) if good else None
-    return None
+def of_siconos(problem: InterfaceProblem, solver: str) -> float | None:
+    """Processor seconds of one of Siconos' solvers; None where it claims no success."""
+    times: list[float] = []
+    while len(times) < REPEATS and max(times, default=0.0) < LONG:
+        try:
+            answer = siconos(problem, TOL, LIMIT, solver)
+        except InputError:  # not installed
+            return None
+        if answer.status != "solved":
+            return None
+        times.append(answer.measured["cpu_seconds"])
+    return statistics.median(times)
 
 
 def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solution, float]:
@@ -92,11 +52,11 @@ def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solutio
     return solution, statistics.median(times)
 
 
-def beside_siconos(path: Path, python: str | None) -> dict[str, Any]:
+def beside_siconos(path: Path) -> dict[str, Any]:
     """The default method on one file, and what Siconos' solvers take for it in the same run."""
     problem = fclib.read(path)
     solution, seconds = timed(problem, DEFAULT, LIMIT)
-    known = [python and of_siconos(python, problem, solver) for solver in SOLVERS]
+    known = [of_siconos(problem, solver) for solver in SOLVERS]
     return {
         "folder": path.parent.resolve().name,
         "problem": path.stem,
@@ -157,8 +117,9 @@ def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone,
 medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the
 published measure, which depends on units. The last columns are the seconds of Siconos' solvers in
-the same run, certified by that measure; - where they do not reach 1e-8 in {limit:g} s. The shifted
-geometric means (1 ms) compare the default method with the best of these solvers for each file.
+the same run, on the problem without units; - where they do not claim 1e-8 in {limit:g} s. The
+shifted geometric means (1 ms) compare the default method with the best of these solvers for each
+file.
 
 {{means}}
 
@@ -180,9 +141,7 @@ At most {short:g} s a file.
 """
 
 if __name__ == "__main__":
-    folders, python = sys.argv[1:], None
-    if folders[:1] == ["--siconos"]:
-        python, folders = folders[1], folders[2:]
+    folders = sys.argv[1:]
     files = [
         path
         for folder in folders
@@ -191,10 +150,10 @@ if __name__ == "__main__":
     ]
     if not files:
         sys.exit(
-            "usage: python -m experiments.questions.fclib_problems [--siconos PYTHON] FOLDER"
-            " [FOLDER ...], with files *.hdf5 or *.dat"
+            "usage: python -m experiments.questions.fclib_problems FOLDER [FOLDER ...], with files"
+            " *.hdf5 or *.dat"
         )
-    default = [beside_siconos(path, python) for path in files]
+    default = [beside_siconos(path) for path in files]
     certified = totals(default, "folder")
     print(markdown(certified), markdown(means(default)), markdown(default), sep="\n\n", flush=True)
     others = [of_another(path, method) for method in OTHERS for path in files]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
-from contactopt.benchmark.packings import packing
+from contactopt.benchmark.families.packings import packing
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contactopt import InterfaceProblem, natural_map_residual, solve
-from contactopt.benchmark.packings import packing
+from contactopt.benchmark.families.packings import packing
 from contactopt.linear.operators import dense
 from experiments.questions.coulomb_check import violations
 from experiments.questions.search_for_lies import FAMILIES, judge, make

@@ -1,150 +1,156 @@
 const data = JSON.parse(document.getElementById("data").textContent);
-const names = Object.keys(data.columns);
-const MARKS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "x", "star", "triangle-left", "triangle-right", "hexagon", "cross", "hexagram", "bowtie", "hourglass", "star-diamond"];
-const WORDS = {cpu_seconds: "CPU time of the call [s]", solve_seconds: "time of the method [s]", call_seconds: "time of the call [s]"};
-const MOST = 500;  // rows of the table at a time
-const FLOOR = 0.01;  // of the tolerance, below which a residual answers no question
 const get = (id) => document.getElementById(id);
-const methods = [...new Set(data.rows.map((row) => row.method))].sort();
-const look = (method) => { const i = methods.indexOf(method); return {color: data.colours[i % data.colours.length], symbol: MARKS[i % MARKS.length], dash: i % 16 < 8 ? "solid" : "dash"}; };
-data.rows.forEach((row, i) => { row.number = i; });
-let sorted = "problem", falling = false, chosen = [];
+const GREY = "#bbbbbb", MOST = 500;  // rows of a table at a time
+const runs = data.points.map((row) => ({...Object.fromEntries(data.columns.map((name, i) => [name, row[i]])), method: data.methods[row[1]], problem: data.problems[row[0]].name}));
+const short = (value) => value === null || value === undefined ? "-" : typeof value === "boolean" ? (value ? "yes" : "no") : typeof value === "number" ? (Number.isInteger(value) ? String(value) : Math.abs(value) < 1e-3 ? value.toExponential(1) : value.toPrecision(3).replace(/(\.\d*?)0+(?=e|$)/, "$1").replace(/\.(?=e|$)/, "")) : String(value);
+const plainly = (value) => typeof value === "number" ? value.toExponential(0) : value;
+const leaders = () => data.leaders.find((one) => one.group === get("group").value && String(one.accuracy) === get("accuracy").value);
+const index = () => data.accuracies.findIndex((value) => String(value) === get("accuracy").value);
 
-const median = (values) => { const s = [...values].sort((a, b) => a - b), n = s.length; return n ? (s[(n - 1) >> 1] + s[n >> 1]) / 2 : NaN; };
+function colour(method) {  // the first leaders of these problems have a colour, the others are grey
+  const place = leaders().rows.findIndex((row) => row.method === method);
+  return place < data.colours.length ? data.colours[place] : GREY;
+}
 
-function grouped(rows, key) {
-  const made = new Map();
-  for (const row of rows) { const name = key(row); if (!made.has(name)) made.set(name, []); made.get(name).push(row); }
+function link(kind, name) {
+  const made = element("a", name, {href: `#${kind}=${encodeURIComponent(name)}`});
   return made;
 }
 
-function filtered() {
-  const words = get("words").value.toLowerCase();
-  return data.rows.filter((row) => ["setting", "start", "family", "method", "status"].every((name) => !get(`filter-${name}`).value || String(row[name]) === get(`filter-${name}`).value)
-    && (!words || `${row.problem} ${row.method} ${row.message}`.toLowerCase().includes(words)));
-}
-
-function chart(id, traces, x, y) {
-  const layout = {
-    margin: {l: 65, r: 15, t: 32, b: 50}, hovermode: "closest", showlegend: true, legend: {orientation: "h", y: get(id).clientHeight < 350 ? -0.5 : -0.22, yanchor: "top", font: {size: 11}}, uirevision: "kept",
-    xaxis: {title: {text: x.title}, type: x.type, exponentformat: "power", nticks: 6, range: x.range}, yaxis: {title: {text: y.title}, type: y.type, exponentformat: "power", range: y.range},
-  };
-  Plotly.react(get(id), traces, layout, {responsive: true, displaylogo: false});
-}
-
-const type = (axis) => (get(`log-${axis}`).checked ? "log" : "linear");
-
-function drawSpeed(rows, time) {
-  const traces = [];
-  for (const [method, own] of grouped(rows.filter((row) => row.residual !== null && row.law === "coulomb"), (row) => row.method)) {
-    const points = [...grouped(own, (row) => row.tolerance)].sort((a, b) => b[0] - a[0]).map(([tolerance, same]) => ({
-      x: median(same.map((row) => row[time])), y: median(same.map((row) => Math.max(row.residual, FLOOR * tolerance))),
-      good: same.filter((row) => row.success).length / same.length, text: `${same.length} runs to ${tolerance.toExponential(0)}`,
-    }));
-    const style = look(method);
-    traces.push({
-      type: "scatter", mode: "lines+markers", name: plain(method), x: points.map((p) => p.x), y: points.map((p) => p.y), text: points.map((p) => `${p.text}, ${Math.round(100 * p.good)} % kept it`),
-      line: {color: style.color, dash: style.dash}, marker: {size: 9, symbol: points.map((p) => style.symbol + (p.good >= 0.5 ? "" : "-open")), color: style.color},
-      hovertemplate: "%{text}<br>%{x:.3g} s, residual %{y:.2g}<extra>%{fullData.name}</extra>",
-    });
-  }
-  chart("speed", traces, {title: `${WORDS[time]}, median`, type: type("x")}, {title: "certified residual [-], median", type: type("y")});
-}
-
-function drawProfile(rows, time) {
-  const instances = grouped(rows.filter((row) => row.law === "coulomb"), (row) => `${row.problem}|${row.setting}|${row.start}`), ratios = new Map();
-  for (const same of instances.values()) {
-    const times = [...grouped(same, (row) => row.method)].map(([method, own]) => [method, own.every((row) => row.success) ? median(own.map((row) => row[time])) : Infinity]);
-    const best = Math.min(...times.map(([, value]) => value));
-    for (const [method, value] of times) {
-      if (!ratios.has(method)) ratios.set(method, []);
-      if (Number.isFinite(value)) ratios.get(method).push(best > 0 ? value / best : 1);
+function table(id, columns, rows) {  // columns: [title, key, kind of link]
+  const head = element("tr"), body = get(id).tBodies[0];
+  const fill = (shown) => {
+    body.replaceChildren();
+    for (const row of shown.slice(0, MOST)) {
+      const line = element("tr");
+      for (const [, key, kind] of columns) {
+        const cell = element("td", kind ? "" : short(row[key]));
+        if (kind) cell.append(link(kind, row[key]));
+        line.append(cell);
+      }
+      body.append(line);
     }
+  };
+  let falling = false, sorted = null;
+  for (const [title, key, , what] of columns) {
+    const cell = element("th", "", {scope: "col", title: what ?? ""}), button = element("button", title, {type: "button"});
+    button.addEventListener("click", () => {
+      falling = sorted === key && !falling; sorted = key;
+      [...head.children].forEach((other) => other.removeAttribute("aria-sort"));
+      cell.setAttribute("aria-sort", falling ? "descending" : "ascending");
+      const gone = (value) => value === null || value === undefined;
+      fill([...rows].sort((a, b) => gone(a[key]) || gone(b[key]) ? gone(a[key]) - gone(b[key]) : (a[key] < b[key] ? -1 : a[key] > b[key] ? 1 : 0) * (falling ? -1 : 1)));
+    });
+    cell.append(button); head.append(cell);
   }
-  const largest = 1.3 * Math.max(2, ...[...ratios.values()].flat());
-  const traces = [...ratios].map(([method, found]) => {
-    const x = [...found].sort((a, b) => a - b), style = look(method);
-    return {
-      type: "scatter", mode: "lines", name: plain(`${method} (${x.length})`), x: [1, ...x, largest], y: [0, ...x.map((_, i) => (i + 1) / instances.size), x.length / instances.size],
-      line: {shape: "hv", color: style.color, dash: style.dash}, hovertemplate: "%{y:.0%} within %{x:.3g} times the best<extra>%{fullData.name}</extra>",
-    };
-  });
-  const log = type("x") === "log";
-  chart("profile", traces, {title: "ratio: time / the best method's [-]", type: type("x"), range: log ? [0, Math.log10(largest)] : [1, largest]},
-    {title: `share of ${instances.size} instances solved`, type: "linear", range: [0, 1.03]});
+  get(id).tHead.replaceChildren(head);
+  fill(rows);
 }
 
-function drawSize(rows, time) {
-  const traces = [...grouped(rows.filter((row) => row.success), (row) => row.method)].map(([method, own]) => {
-    const points = [...grouped(own, (row) => row.contacts)].sort((a, b) => a[0] - b[0]), style = look(method);
-    return {
-      type: "scatter", mode: "lines+markers", name: plain(method), x: points.map(([size]) => size), y: points.map(([, same]) => median(same.map((row) => row[time]))),
-      line: {color: style.color, dash: style.dash}, marker: {symbol: style.symbol, size: 8}, hovertemplate: "%{x} contacts: %{y:.3g} s<extra>%{fullData.name}</extra>",
-    };
-  });
-  chart("size", traces, {title: "contacts", type: type("x")}, {title: `${WORDS[time]}, median`, type: type("y")});
+function svg(name, attributes, text = "") {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text) made.textContent = text;
+  return made;
 }
 
-function drawConvergence() {
-  const traces = chosen.map((i) => data.rows[i]).filter((row) => row.history).map((row) => ({
-    type: "scatter", mode: "lines+markers", name: plain(`${row.method}, ${row.problem}, ${row.setting}, ${row.start}`), x: row.history[2], y: row.history[0], customdata: row.history[1],
-    line: {color: look(row.method).color}, hovertemplate: "iteration %{x}: residual %{y:.2g} after %{customdata:.3g} s<extra>%{fullData.name}</extra>",
-  }));
-  chart("convergence", traces, {title: "outer iteration", type: "linear"}, {title: "natural-map residual [-]", type: type("y")});
-}
-
-function choose(number) {
-  chosen = chosen.includes(number) ? chosen.filter((other) => other !== number) : [...chosen, number];
-  document.querySelectorAll("#runs tbody tr").forEach((row) => row.classList.toggle("chosen", chosen.includes(Number(row.dataset.number))));
-  drawConvergence();
-}
-
-function compare(a, b) {
-  const x = a[sorted], y = b[sorted];
-  if (x === y) return a.number - b.number;
-  if (x === null || y === null) return x === null ? 1 : -1;
-  return (x < y ? -1 : 1) * (falling ? -1 : 1);
-}
-
-function drawTable(rows) {
-  const body = document.querySelector("#runs tbody");
-  body.replaceChildren();
-  for (const row of [...rows].sort(compare).slice(0, MOST)) {
-    const line = element("tr", "", {tabindex: 0, "data-number": row.number});
-    if (chosen.includes(row.number)) line.className = "chosen";
-    for (const name of names) line.append(element("td", row[name] === null ? "" : typeof row[name] === "boolean" ? (row[name] ? "yes" : "no") : String(row[name])));
-    line.addEventListener("click", () => choose(row.number));
-    line.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { choose(row.number); event.preventDefault(); } });
-    body.append(line);
+function chart(id, lines, across, up, options = {}) {  // lines: {name, x, y, dots}; the x axis is logarithmic
+  const W = 560, H = 330, L = 62, R = 12, T = 8, B = 44, picture = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${up} against ${across}`});
+  const seen = lines.map((line) => ({...line, at: line.x.map((x, i) => [x, line.y[i]]).filter(([x, y]) => x > 0 && (options.share ? y >= 0 : y > 0))})).filter((line) => line.at.length);
+  get(id).replaceChildren();
+  if (!seen.length) { get(id).append(element("p", "Nothing is known here.", {class: "note"})); return; }
+  const xs = seen.flatMap((line) => line.at.map(([x]) => Math.log10(x))), ys = options.share ? [0, 1] : seen.flatMap((line) => line.at.map(([, y]) => Math.log10(y)));
+  const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs) + 1e-3, Math.min(...ys), Math.max(...ys) + 1e-3];
+  const X = (x) => L + (W - L - R) * (Math.log10(x) - x0) / (x1 - x0), Y = (y) => H - B - (H - B - T) * ((options.share ? y : Math.log10(y)) - y0) / (y1 - y0);
+  const power = (k) => k >= 0 && k < 4 ? String(10 ** k) : `1e${k}`;
+  const step = (low, high) => Math.max(1, Math.ceil((high - low) / 7));
+  for (let k = Math.ceil(x0); k <= x1; k += step(x0, x1)) picture.append(svg("path", {d: `M${X(10 ** k)} ${T}V${H - B}`, stroke: "#ddd"}), svg("text", {x: X(10 ** k), y: H - B + 16, "text-anchor": "middle"}, power(k)));
+  const marks = options.share ? [0, 0.25, 0.5, 0.75, 1] : [];
+  if (!options.share) for (let k = Math.ceil(y0); k <= y1; k += step(y0, y1)) marks.push(10 ** k);
+  for (const y of marks) picture.append(svg("path", {d: `M${L} ${Y(y)}H${W - R}`, stroke: "#ddd"}), svg("text", {x: L - 5, y: Y(y) + 4, "text-anchor": "end"}, options.share ? `${100 * y} %` : power(Math.round(Math.log10(y)))));
+  picture.append(svg("text", {x: (L + W) / 2, y: H - 6, "text-anchor": "middle"}, across), svg("text", {x: 14, y: H / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${H / 2})`}, up));
+  for (const line of [...seen].reverse()) {
+    const ink = colour(line.name), path = line.at.map(([x, y], i) => i === 0 ? `M${X(x)} ${Y(y)}` : options.share ? `H${X(x)}V${Y(y)}` : `L${X(x)} ${Y(y)}`).join("");
+    const drawn = svg("path", {d: path, fill: "none", stroke: ink, "stroke-width": ink === GREY ? 1.2 : 2});
+    drawn.append(svg("title", {}, line.name));
+    picture.append(drawn);
+    if (line.dots) for (const [x, y] of line.at) { const dot = svg("circle", {cx: X(x), cy: Y(y), r: 3.5, fill: ink}); dot.append(svg("title", {}, `${line.name}: ${short(y)} after ${short(x)} s`)); picture.append(dot); }
   }
-  const good = rows.filter((row) => row.success).length;
-  get("count").textContent = `${rows.length} of ${data.rows.length} runs, ${good} of them kept their tolerance` + (rows.length > MOST ? `; the first ${MOST} are shown` : "");
+  const legend = element("p", "", {class: "legend"});
+  for (const line of seen) { const one = element("span", line.name); one.style.setProperty("--ink", colour(line.name)); legend.append(one); }
+  get(id).append(picture, legend);
 }
 
-function everything() {
-  const rows = filtered(), time = get("time").value;
-  drawSpeed(rows, time); drawProfile(rows, time); drawSize(rows, time); drawConvergence(); drawTable(rows);
+function drawLeaders() {
+  const chosen = leaders(), ranked = !data.busy;
+  if (!chosen) return;
+  table("leaders", [
+    ...(ranked ? [["rank", "rank"], ["95 %", "interval", "", "ranks that resampling the problems leaves likely"]] : []), ["method", "method", "solver"], ["solved", "solved"], ["of", "of"],
+    ["taken", "taken", "", "problems that the method did not refuse"], ["CPU [s]", "mean", "", "shifted geometric mean, 1 ms; a failure counts as the time limit"],
+    ["over the least", "over the least"], ["wall [s]", "wall mean"], ["memory [MB]", "memory", "", "most that a run added"], ["certificate / asked", "over claim", "", "median over claimed successes"],
+  ], chosen.rows.map((row) => ({...row, interval: `${row.best} to ${row.worst}`})));
+  const members = chosen.problems, times = data.times[index()];
+  const best = members.map((p) => Math.min(...times[p].map((t) => t ?? Infinity)));
+  const solvable = members.map((p, i) => [p, best[i]]).filter(([, t]) => Number.isFinite(t));
+  const most = Math.max(2, ...solvable.flatMap(([p, t]) => times[p].filter((s) => s !== null).map((s) => s / t)));
+  chart("profile", chosen.rows.map((row) => {
+    const m = data.methods.indexOf(row.method), ratios = solvable.map(([p, t]) => times[p][m] === null ? Infinity : times[p][m] / t).filter(Number.isFinite).sort((a, b) => a - b);
+    return {name: row.method, x: [1, ...ratios, most], y: [0, ...ratios.map((_, i) => (i + 1) / solvable.length), ratios.length / solvable.length]};
+  }), "CPU time over the best method's [-]", "share of the problems solved", {share: true});
 }
 
-const head = element("tr");
-for (const name of names) {
-  const cell = element("th", "", {scope: "col", title: data.columns[name]}), button = element("button", name.replaceAll("_", " "), {type: "button"});
-  button.addEventListener("click", () => {
-    falling = sorted === name && !falling;
-    sorted = name;
-    document.querySelectorAll("#runs th").forEach((other) => other.removeAttribute("aria-sort"));
-    cell.setAttribute("aria-sort", falling ? "descending" : "ascending");
-    drawTable(filtered());
-  });
-  cell.append(button);
-  head.append(cell);
+function drawSolver(name) {
+  const m = data.methods.indexOf(name), times = data.times[index()];
+  if (m < 0) return;
+  get("choose-solver").value = name;
+  table("of-solver", [["problem", "problem", "problem"], ["CPU [s]", "seconds"], ["best [s]", "best"], ["over the best", "ratio"], ["best method", "by", "solver"]], data.problems.map((problem, p) => {
+    const known = times[p].filter((t) => t !== null), best = known.length ? Math.min(...known) : null;
+    return {problem: problem.name, seconds: times[p][m], best, ratio: times[p][m] === null ? null : times[p][m] / best, by: best === null ? "" : data.methods[times[p].indexOf(best)]};
+  }).filter((row) => leaders().problems.includes(data.problems.findIndex((problem) => problem.name === row.problem))));
 }
-document.querySelector("#runs thead").append(head);
-for (const name of ["setting", "start", "family", "method", "status"]) {
-  for (const value of [...new Set(data.rows.map((row) => String(row[name])))].sort()) get(`filter-${name}`).append(element("option", value, {value}));
-  get(`filter-${name}`).addEventListener("change", everything);
+
+function drawProblem(name) {
+  const p = data.problems.findIndex((problem) => problem.name === name), own = runs.filter((run) => run.problem === name);
+  if (p < 0) return;
+  get("choose-problem").value = name;
+  get("tags").textContent = Object.entries(data.problems[p].tags).map(([key, value]) => `${key} ${short(value)}`).join(", ");
+  const named = data.order.filter((method) => own.some((run) => run.method === method));
+  chart("speed", named.map((method) => { const same = own.filter((run) => run.method === method); return {name: method, x: same.map((run) => run.cpu), y: same.map((run) => run.residual ?? 0), dots: true}; }), "CPU time [s]", "certificate [-]");
+  chart("convergence", data.histories.filter((one) => one[0] === p).map((one) => ({name: data.methods[one[1]], x: one[3], y: one[2]})), "time [s]", "certificate [-]");
+  table("of-problem", [["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["memory [MB]", "memory"], ["repeats", "repeats"]], own);
 }
-for (const id of ["time", "log-x", "log-y"]) get(id).addEventListener("change", everything);
-get("words").addEventListener("input", everything);
-get("forget").addEventListener("click", () => { chosen = []; everything(); });
-everything();
+
+function drawRuns() {
+  const words = get("words").value.toLowerCase();
+  const shown = runs.filter((run) => ["method", "status", "tolerance"].every((name) => !get(`filter-${name}`).value || String(run[name]) === get(`filter-${name}`).value) && (!words || `${run.problem} ${run.method}`.toLowerCase().includes(words)));
+  get("count").textContent = `${shown.length} of ${runs.length} runs, each with its repeats` + (shown.length > MOST ? `; the first ${MOST} are shown` : "");
+  table("runs", [["problem", "problem", "problem"], ["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["memory [MB]", "memory"], ["repeats", "repeats"]], shown);
+}
+
+function options(id, values, draw, first = null) {
+  if (first !== null) get(id).append(element("option", first, {value: ""}));
+  for (const value of values) get(id).append(element("option", plainly(value), {value: String(value)}));
+  get(id).addEventListener("change", draw);
+}
+
+function follow() {
+  const [kind, name] = decodeURIComponent(location.hash.slice(1)).split(/=(.*)/s);
+  if (kind === "solver") drawSolver(name);
+  if (kind === "problem") drawProblem(name);
+  if (name && get(kind)) get(kind).scrollIntoView();
+}
+
+const everything = () => { drawLeaders(); drawSolver(get("choose-solver").value); drawProblem(get("choose-problem").value); };
+options("group", [...new Set(data.leaders.map((one) => one.group))], everything);
+options("accuracy", data.accuracies, everything);
+get("accuracy").value = String(data.accuracies[Math.floor(data.accuracies.length / 2)]);
+options("choose-solver", data.order, () => { location.hash = `solver=${encodeURIComponent(get("choose-solver").value)}`; });
+options("choose-problem", data.problems.map((problem) => problem.name), () => { location.hash = `problem=${encodeURIComponent(get("choose-problem").value)}`; });
+for (const name of ["method", "status", "tolerance"]) options(`filter-${name}`, [...new Set(runs.map((run) => run[name]))].sort(), drawRuns, "all");
+get("words").addEventListener("input", drawRuns);
+window.addEventListener("hashchange", follow);
+if (data.busy) { get("warning").hidden = false; get("warning").textContent = data.busy; }
+get("protocol").textContent = data.protocol;
+table("cards", Object.keys(data.cards[0]).map((name) => [name, name]), data.cards);
+for (const [method, why] of data.absent) get("absent").append(element("li", `${method} was not there: ${why}`));
+everything(); drawRuns(); follow();

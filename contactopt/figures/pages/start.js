@@ -29,10 +29,12 @@ function plain(name) {  // as text in a chart: plotly reads tags and formulas in
 async function start(program) {
   try {
     const packed = bytes(document.getElementById("plotly").textContent);
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const script = document.createElement("script");
-    script.textContent = await new Response(stream).text();
-    document.head.append(script);
+    if (packed.length) {
+      const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+      const script = document.createElement("script");
+      script.textContent = await new Response(stream).text();
+      document.head.append(script);
+    }
     program();
   } catch (fault) {
     const said = element("p", `This page could not be drawn: ${fault.message}. It needs a browser of 2023 or later.`, {id: "fault", role: "alert"});

@@ -99,8 +99,10 @@ _CONE = {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}
 _DAQP = {"primal_tol": TIGHT, "dual_tol": TIGHT}
 _EPS = {"eps_abs": TIGHT, "eps_rel": TIGHT}
 _HIGHS = {"primal_feasibility_tolerance": TIGHT, "dual_feasibility_tolerance": TIGHT}
+_MOREAU = {"ipm_settings": _CLARABEL}
 _OSQP = _EPS | {"max_iter": 200_000, "polishing": True}
 _PROXQP = {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 1_000}
+_QOCO = {"abstol": TIGHT, "reltol": TIGHT, "max_iters": 200}
 _SCS = _EPS | {"max_iters": 200_000}
 _SHORT = _CONE | {"max_iters": 100}
 
@@ -128,6 +130,8 @@ CONIC: dict[str, Backend] = {
         Backend("scs", "conic", "scs", "scs", _SCS, clock="time_limit_secs"),
         Backend("ecos", "conic", "ecos", "ecos", _SHORT, steps="max_iters"),
         Backend("cvxopt", "conic", "cvxopt", "cvxopt", _SHORT, steps="max_iters"),
+        Backend("qoco", "conic", "qoco", "qoco", _QOCO, steps="max_iters"),
+        Backend("moreau", "conic", "moreau", "moreau", _MOREAU, clock="time_limit"),
     )
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import Delaunay
 
+from contactopt.benchmark.families.rigid_motion import velocities
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
@@ -25,6 +26,7 @@ def packing(
     points: int = 1,
     disorder: float = 0.3,
     shake: float = 1.0,
+    spin: float = 0.0,
 ) -> InterfaceProblem:
     """A packing under its own weight on a fixed floor, read from the Delaunay graph of jittered
     lattice places.
@@ -32,6 +34,8 @@ def packing(
     points    contacts per pair of bodies: one for discs, several for faces that touch
     disorder  jitter of the places over their distance; also the spread of the radii
     shake     random part of the free velocity, over that which gravity makes in the step
+    spin      angle by which the frame of the observer turns in the step. Coriolis' forces make M,
+              and with it W, unsymmetric
     """
     if dim not in (2, 3) or bodies < 2**dim or points < 1:
         raise InputError("packing needs dim 2 or 3, at least 2^dim bodies, and points at least 1.")
@@ -52,13 +56,20 @@ def packing(
         [np.repeat(1 / mass[:, None], dim, 1), np.repeat(1 / inertia[:, None], turns, 1)], axis=1
     )
     inverse[fixed] = 0.0
-    H = _velocities(places, np.repeat(pairs, points, axis=0), points, rng)
+    pairs = np.repeat(pairs, points, axis=0)
+    H = velocities(places, pairs, *_places_of_contact(places, pairs, points, rng))
     free = np.zeros((len(places), dim + turns))
     free[:, dim - 1] = -1.0
     free += shake * 0.3 * rng.normal(size=free.shape)
     free[fixed] = 0.0
-    W = H @ sp.diags_array(inverse.ravel()) @ H.T
-    q = (H @ free.ravel()).reshape(-1, dim)
+    if spin:  # (m I + 2 m spin [[0, -1], [1, 0]])^-1 m in the first two directions
+        turned = np.eye(dim + turns)
+        turned[:2, :2] = np.linalg.inv([[1, -2 * spin], [2 * spin, 1]])
+        turned = sp.kron(sp.eye_array(len(places)), turned, format="csr")
+    else:
+        turned = sp.eye_array(free.size, format="csr")
+    W = H @ turned @ sp.diags_array(inverse.ravel()) @ H.T
+    q = (H @ (turned @ free.ravel())).reshape(-1, dim)
     q[:, 0] += np.maximum(0.0, rng.normal(size=len(q)) - 0.5) * 0.2  # some are not touching yet
     return InterfaceProblem(sp.csr_array(W), q, Coulomb(np.full(len(q), mu)))
 
@@ -72,14 +83,11 @@ def _pairs(places: np.ndarray, longest: float) -> np.ndarray:
     return edges[np.linalg.norm(places[edges[:, 0]] - places[edges[:, 1]], axis=1) <= longest]
 
 
-def _velocities(
+def _places_of_contact(
     places: np.ndarray, pairs: np.ndarray, points: int, rng: np.random.Generator
-) -> sp.csr_array:
-    """H (dim m, freedom): velocity of the second body of each pair relative to the first in the
-    contact's frame.
-    """
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where each pair of bodies touches (m, dim), and the frame there (m, dim, dim)."""
     dim = places.shape[1]
-    freedom = 3 if dim == 2 else 6
     axis = places[pairs[:, 1]] - places[pairs[:, 0]]
     normal = axis / np.linalg.norm(axis, axis=1)[:, None]
     frame = np.linalg.qr(
@@ -90,23 +98,4 @@ def _velocities(
     if points > 1:  # spread over a face
         spread = 0.25 * rng.uniform(-1, 1, (len(pairs), dim - 1))
         where = where + np.einsum("mij,mj->mi", frame[:, :, 1:], spread)
-    i, j, x = [], [], []
-    rows = np.arange(len(pairs))[:, None] * dim + np.arange(dim)
-    for side, sign in ((1, 1.0), (0, -1.0)):
-        arm = where - places[pairs[:, side]]
-        move = np.swapaxes(frame, 1, 2)  # (m, dim components, dim)
-        if dim == 2:
-            spin = np.einsum("mai,mi->ma", move, np.stack([-arm[:, 1], arm[:, 0]], axis=1))[
-                :, :, None
-            ]
-        else:
-            spin = np.cross(arm[:, None, :], move)
-        block = sign * np.concatenate([move, spin], axis=2)
-        columns = pairs[:, side, None, None] * freedom + np.arange(freedom)
-        i.append(np.broadcast_to(rows[:, :, None], block.shape).ravel())
-        j.append(np.broadcast_to(columns, block.shape).ravel())
-        x.append(block.ravel())
-    shape = (len(pairs) * dim, len(places) * freedom)
-    return sp.csr_array(
-        sp.coo_array((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=shape)
-    )
+    return where, frame

@@ -1,0 +1,213 @@
+"""Solvers of others that live in another Python: one process of it answers many problems.
+
+A peer is a plug-in file with three functions that the other Python runs. They import what they
+need, and use no name from outside themselves. `version()` returns the version of the solver.
+`prepare(problem, tol, settings)` makes what the solver takes of the problem, a mapping of arrays:
+Q in rows of blocks (3, 3), namely `indptr`, `indices` and `data`, and `q` (k, 3) and `mu` (k,). The
+normal component comes first. `solve(prepared)` returns the forces, whether the solver claims
+success, and its iterations. Only `solve` is timed.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem, Status, dimensionless
+
+FIND_LIMIT = 60.0  # s for a Python to import the solver
+MOST_MEMORY = 500.0  # MB above which the process makes room for a new one after its answer
+
+# What the other Python runs after the source of the three functions. Solvers print: what they say
+# goes to the standard error. The system ends the process when the solver exceeds its time.
+SERVER = """
+import json, os, signal, sys, time
+import numpy as np
+
+out = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
+
+def memory(name):
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) * 1.024e-3 for line in file if line.startswith(name))
+
+version()
+for line in sys.stdin:
+    path, tol, limit, settings = json.loads(line)
+    try:
+        prepared = prepare(dict(np.load(path)), tol, settings)
+        with open("/proc/self/clear_refs", "w") as file:
+            file.write("5")  # forget the largest memory so far
+        base = memory("VmRSS")
+        signal.setitimer(signal.ITIMER_REAL, limit)
+        wall, cpu = time.perf_counter(), time.process_time()
+        r, claimed, iterations = solve(prepared)
+        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        measured = dict(call_seconds=wall, cpu_seconds=cpu, base_mb=base, peak_mb=memory("VmHWM"))
+        reply = dict(reactions=np.ravel(r).tolist(), claimed=bool(claimed),
+                     iterations=float(iterations), measured=measured)
+    except Exception as error:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        reply = dict(error=f"{type(error).__name__}: {error}")
+    print(json.dumps(reply), file=out, flush=True)
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a method answers, as a worker says it of a run.
+
+    `status` is the method's own word; `reactions` None where there is no answer.
+
+    measured  the columns call_seconds, cpu_seconds, peak_mb and base_mb, as far as they are known
+    history   residuals, seconds and iterations
+    """
+
+    status: str
+    message: str = ""
+    reactions: np.ndarray | None = None
+    multipliers: np.ndarray | None = None
+    label: str = ""
+    iterations: float = np.nan
+    seconds: float = np.nan
+    history: Any = None
+    measured: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Peer:
+    """A solver in the first of several Pythons that can import it.
+
+    name     as it is called in messages
+    install  the line that installs it
+    pythons  interpreters to try
+    """
+
+    name: str
+    install: str
+    pythons: Sequence[str]
+    version: Callable[[], str]
+    prepare: Callable[..., Any]
+    solve: Callable[[Any], Any]
+    process: subprocess.Popen[str] | None = field(default=None, init=False)
+
+    def found(self) -> tuple[str, str]:
+        """Find a Python that can import the solver.
+
+        Returns
+        -------
+        The Python, and the solver's version. InputError, with the line that installs it, if there
+        is none.
+        """
+        program = f"{inspect.getsource(self.version)}\nprint('VERSION', version())"
+        for python in self.pythons:
+            if version := _said(python, program):
+                return python, version
+        raise InputError(f"{self.name} is not installed; {self.install}")
+
+    def answer(
+        self, problem: InterfaceProblem, tol: float, time_limit: float, **settings: Any
+    ) -> Answer:
+        """Let the solver answer a problem, which it gets in space and without units.
+
+        Parameters
+        ----------
+        problem : With Q as a matrix, without plates; InputError on one with plates.
+        tol, time_limit : The solver's own tolerance [-], and the most that it may take [s].
+        settings : What `prepare` gets besides.
+
+        Returns
+        -------
+        The forces in the problem's units, with what the solver says of them and what was measured.
+        """
+        if len(problem.s):
+            raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")
+        p, scales = dimensionless(problem)
+        p = _in_space(p)
+        Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(3, 3))
+        Q.sort_indices()
+        arrays = {"indptr": Q.indptr, "indices": Q.indices, "data": Q.data}
+        with tempfile.NamedTemporaryFile(suffix=".npz") as file:
+            np.savez(file, q=p.q, mu=p.mu, **arrays)
+            file.flush()
+            reply = self._ask([file.name, tol, time_limit, settings])
+        if reply is None:
+            return Answer("time_limit", f"{self.name} was ended after {time_limit:g} s")
+        if "error" in reply:
+            return Answer("error", reply["error"])
+        status = Status.SOLVED if reply["claimed"] else Status.SETTLED
+        r = np.array(reply["reactions"]).reshape(p.q.shape)[:, : problem.dim]
+        return Answer(
+            status.label,
+            reactions=scales.to_physical(r, problem.s)[0],
+            iterations=reply["iterations"],
+            seconds=reply["measured"]["call_seconds"],
+            measured=reply["measured"],
+        )
+
+    def _ask(self, request: list[Any]) -> Any:
+        """The reply to a request; None if the process was ended at the limit of time."""
+        if self.process is None:
+            parts = [inspect.getsource(part) for part in (self.version, self.prepare, self.solve)]
+            command = [self.found()[0], "-c", "\n".join([*parts, SERVER])]
+            pipe = subprocess.PIPE
+            self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
+        assert self.process.stdin and self.process.stdout
+        print(json.dumps(request), file=self.process.stdin, flush=True)
+        if line := self.process.stdout.readline():
+            reply = json.loads(line)
+            if reply.get("measured", {}).get("peak_mb", 0.0) > MOST_MEMORY:
+                self.process.kill()
+                self.process.wait()
+                self.process = None
+            return reply
+        code, self.process = self.process.wait(), None
+        if code == -14:  # SIGALRM
+            return None
+        raise RuntimeError(f"{self.name} ended its process with code {code}")
+
+
+@cache
+def _said(python: str, program: str) -> str:
+    """The version that a program prints; '' if this Python cannot run it."""
+    try:
+        done = subprocess.run(
+            [python, "-c", program], capture_output=True, text=True, timeout=FIND_LIMIT
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    found = [line for line in done.stdout.splitlines() if line.startswith("VERSION ")]
+    return found[-1].removeprefix("VERSION ") if found else ""
+
+
+def _in_space(problem: InterfaceProblem) -> InterfaceProblem:
+    """The same problem with a second tangent: what moves along it stays where it is.
+
+    Q gets on the new components the mean of its diagonal and q gets 0, so that no force acts along
+    them. A problem in space is returned as it is.
+    """
+    k, dim = problem.q.shape
+    if dim == 3:
+        return problem
+    Q, new = problem.Q, float(problem.Q.diagonal().mean()) * sp.eye_array(k)
+    order = np.concatenate([np.arange(2 * k).reshape(k, 2), 2 * k + np.arange(k)[:, None]], axis=1)
+    order = order.ravel()
+    wide = (
+        sp.csr_array(sp.block_diag([Q, new]))[order][:, order]
+        if sp.issparse(Q)
+        else la.block_diag(Q, new.toarray())[np.ix_(order, order)]
+    )
+    q = np.column_stack([problem.q, np.zeros(k)])
+    return InterfaceProblem(wide, q, problem.law, s=problem.s[:0])

@@ -1,0 +1,195 @@
+"""Who is first: methods compared at the accuracy that they reach, not at the one asked for.
+
+The runs of a method on an instance (a problem and a start) are points: the median time of its
+repeats, and the worst certificate among them, one for each tolerance asked. The time to an accuracy
+is read off the front of these points, straight between two of them in logarithms of time and
+certificate. What reaches the accuracy with none of them has failed, and counts as its time limit.
+Times below NOISE count as NOISE: nobody is first by what a clock cannot tell.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SHIFT = 1e-3  # s, of shifted geometric means
+NOISE = 1e-4  # s
+BUSY = 1.2  # wall over CPU time above which a machine is too busy for a ranking
+LEAST = 1e-17  # drawn and compared in place of a certificate of 0
+RESAMPLES, CONFIDENCE, SEED = 2000, 0.95, 0
+POINT = ["problem", "start", "method", "tolerance"]
+# what is known of a point: (of the table's column, how the repeats are joined)
+JOINED = {
+    "cpu": ("cpu_seconds", "median"),
+    "wall": ("call_seconds", "median"),
+    "low": ("cpu_seconds", lambda t: t.quantile(0.25)),
+    "high": ("cpu_seconds", lambda t: t.quantile(0.75)),
+    "residual": ("residual", "max"),
+    "claimed": ("claimed", "all"),
+    "status": ("status", "last"),
+    "limit": ("time_limit", "max"),
+    "repeats": ("repeat", "count"),
+}
+
+
+def points(table: pd.DataFrame) -> pd.DataFrame:
+    """A row for each problem, start, method and tolerance: times [s] with their quartiles, the
+    worst certificate, whether success was claimed, and the memory taken [MB].
+    """
+    memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
+    joined = JOINED | {"memory": ("_memory", "max")}
+    return table.assign(_memory=memory).groupby(POINT, sort=False).agg(**joined).reset_index()
+
+
+def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
+    """The seconds to a certificate of `accuracy`: a row for each instance, a column for each
+    method, inf where it is not reached.
+    """
+    fronts = points.groupby(["problem", "start", "method"], sort=False)[[time, "residual", "limit"]]
+    seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
+    return seconds.unstack("method").fillna(np.inf)
+
+
+def _seconds_to(
+    accuracy: float, seconds: np.ndarray, residuals: np.ndarray, limit: np.ndarray
+) -> float:
+    """Read the time to an accuracy off the front of points, of which none is both slower and less
+    accurate than another.
+    """
+    kept = (seconds <= limit) & np.isfinite(residuals)
+    t, e = np.maximum(seconds[kept], NOISE), np.maximum(residuals[kept], LEAST)
+    order = np.lexsort((t, e))
+    t, e = t[order], e[order]
+    best = np.concatenate([[np.inf], np.minimum.accumulate(t)])[:-1]
+    t, e = t[t < best], e[t < best]  # from the most accurate and slowest on
+    if not len(e) or e[0] > accuracy:
+        return np.inf
+    return float(np.exp(np.interp(np.log(accuracy), np.log(e), np.log(t))))
+
+
+def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+    """The leader table at an accuracy: a row for each method, the best first.
+
+    `mean` and `wall mean` are shifted geometric means (1 ms) of CPU and wall time [s] over the
+    instances that somebody solved, a failure counted at its limit. `rank` is that of `mean`; `best`
+    and `worst` bound it in 95 % of the bootstrap samples of the problems. `over claim` is the
+    median of the certificate over the tolerance of claimed successes.
+    """
+    import pandas as pd
+
+    logs, solved = _logs(points, accuracy)
+    walls, _ = _logs(points, accuracy, "wall")
+    low, high = _rank_interval(logs.to_numpy(float))
+    claims = points[points["claimed"] & np.isfinite(points["residual"])]
+    ratio = (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median()
+    tried = points[points["status"] != "refused"].groupby("method")["problem"].nunique()
+    means = np.exp(logs.mean()) - SHIFT
+    made = pd.DataFrame(
+        {
+            "method": logs.columns,
+            "solved": solved.sum().to_numpy(),
+            "of": len(logs),
+            "taken": tried.reindex(logs.columns).fillna(0).astype(int).to_numpy(),
+            "mean": means.to_numpy(),
+            "over the least": (means / means.min()).to_numpy(),
+            "wall mean": (np.exp(walls.mean()) - SHIFT).reindex(logs.columns).to_numpy(),
+            "memory": points.groupby("method")["memory"].max().reindex(logs.columns).to_numpy(),
+            "over claim": ratio.reindex(logs.columns).to_numpy(),
+            "rank": means.rank(method="min").astype(int).to_numpy(),
+            "best": low,
+            "worst": high,
+        }
+    )
+    return made.sort_values(["rank", "method"], ignore_index=True)
+
+
+def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
+    """The leader table of a report at a certificate; without ranks where the machine was busy."""
+    found = ranking(points(table), accuracy)
+    shown = {
+        "method": found["method"],
+        "solved": [f"{n} of {all_}" for n, all_ in zip(found["solved"], found["of"])],
+        "CPU [s]": found["mean"],
+        "over the least": found["over the least"],
+        "wall [s]": found["wall mean"],
+        "memory [MB]": found["memory"],
+        "certificate / asked": found["over claim"],
+    }
+    if wall_over_cpu(table) <= BUSY:
+        bounds = zip(found["rank"], found["best"], found["worst"])
+        shown = {"rank (95 %)": [f"{n} ({low} to {high})" for n, low, high in bounds]} | shown
+    return found.assign(**shown)[list(shown)]
+
+
+def _logs(
+    points: pd.DataFrame, accuracy: float, time: str = "cpu"
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """log(t + SHIFT) of the instances that somebody solved, and which methods solved them."""
+    seconds = achieved(points, accuracy, time)
+    limits = points.groupby(["problem", "start"], sort=False)["limit"].max()
+    solved = np.isfinite(seconds)
+    kept = solved.any(axis=1)
+    shown = seconds.where(solved, limits.reindex(seconds.index), axis=0)[kept]
+    return np.log(shown + SHIFT), solved[kept]
+
+
+def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest rank of each method that resampling the instances leaves likely."""
+    from scipy.stats import bootstrap, rankdata
+
+    def ranks(index: np.ndarray, axis: int) -> np.ndarray:
+        means = logs[index].mean(axis=-2)
+        return np.moveaxis(rankdata(means, method="min", axis=-1).astype(float), -1, 0)
+
+    if len(logs) < 2:
+        only = rankdata(logs.mean(axis=0), method="min") if len(logs) else np.zeros(logs.shape[1])
+        return only.astype(int), only.astype(int)
+    options: dict[str, Any] = {"n_resamples": RESAMPLES, "batch": 100, "method": "percentile"}
+    rng = np.random.default_rng(SEED)
+    found = bootstrap(
+        (np.arange(len(logs)),), ranks, axis=-1, rng=rng, confidence_level=CONFIDENCE, **options
+    ).confidence_interval
+    return np.floor(found.low).astype(int), np.ceil(found.high).astype(int)
+
+
+def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
+    """Kendall's tau of the ranks of the same methods in the points of two reruns; nan with fewer
+    than two methods.
+    """
+    from scipy.stats import kendalltau
+
+    ranks = [ranking(points, accuracy).set_index("method")["mean"] for points in (one, other)]
+    common = ranks[0].index.intersection(ranks[1].index)
+    if len(common) < 2:
+        return np.nan
+    return float(kendalltau(ranks[0][common], ranks[1][common]).statistic)
+
+
+def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The table in two halves: the even and the odd repeats, which were made one after the other.
+
+    A run of a single repeat stands in both.
+    """
+    single = table.groupby(POINT)["repeat"].transform("size") == 1
+    even = table["repeat"] % 2 == 0
+    return table[even | single], table[~even | single]
+
+
+def wall_over_cpu(table: pd.DataFrame) -> float:
+    """The median of wall time over CPU time of the calls: above BUSY nothing is ranked."""
+    timed = table[table["cpu_seconds"] > NOISE]
+    return float((timed["call_seconds"] / timed["cpu_seconds"]).median())
+
+
+def warning(ratio: float) -> str:
+    """Say that nothing is ranked where the machine was busy; '' where it was not."""
+    if not ratio > BUSY:
+        return ""
+    return (
+        f"The median of wall time over CPU time is {ratio:.2f}, above {BUSY:g}: the machine was"
+        " busy, so nothing is ranked. The CPU times are shown as they are."
+    )

@@ -1,0 +1,26 @@
+"""Small numbers by which a problem made on another machine is known again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactopt.problem import InterfaceProblem
+
+
+def invariants(problem: InterfaceProblem) -> dict[str, float]:
+    """Compute numbers that rounding hardly changes, unlike `problem.fingerprint`.
+
+    Parameters
+    ----------
+    problem : of any form
+
+    Returns
+    -------
+    Norms of q, of Q x and V' x with x_i = cos i, of the load s, and of mu, with ten digits.
+    """
+    x = np.cos(np.arange(problem.q.size))
+    parts = {"q": problem.q, "Qx": problem.Q @ x, "Vx": problem.V.T @ x, "s": problem.s}
+    return {
+        name: float(f"{np.linalg.norm(part):.10g}")
+        for name, part in (parts | {"mu": problem.mu}).items()
+    }

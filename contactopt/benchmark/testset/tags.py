@@ -1,0 +1,67 @@
+"""What a problem is like: sizes, structure of Q, thresholds of friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.methods.diagnosis import diagnose
+from contactopt.problem import InterfaceProblem, infeasibility
+
+MOST = 1200  # components up to which Q's eigenvalues are computed
+# tag -> what it is
+TAGS = {
+    "dim": "2 or 3",
+    "contacts": "number of contacts",
+    "motions": "number of free motions, the columns of V",
+    "law": "law of contact",
+    "mu": "largest friction coefficient",
+    "form": "of Q: dense, sparse, or products with vectors only",
+    "symmetric": "whether Q is",
+    "feasible": "false where a proof says that there is no solution",
+    "rank": "of Q",
+    "condition": "of Q on its range",
+    "unique_below": "friction below which the solution is unique for every load",
+    "several_from": "friction from which on some load has several solutions",
+    "solutions": "their number, where all of them were listed",
+}
+
+
+def tags_of(problem: InterfaceProblem) -> dict[str, Any]:
+    """Compute the tags of a problem, the keys of TAGS.
+
+    Parameters
+    ----------
+    problem : of any form
+
+    Returns
+    -------
+    Their values; None for what was not computed because the problem is large, or because its law
+    or its form does not allow it.
+    """
+    products = isinstance(problem.Q, InterfaceOperator)
+    tags: dict[str, Any] = {
+        "dim": problem.dim,
+        "contacts": problem.contacts,
+        "motions": len(problem.s),
+        "law": type(problem.law).__name__.lower(),
+        "mu": float(problem.mu.max(initial=0.0)),
+        "form": "products" if products else "sparse" if sp.issparse(problem.Q) else "dense",
+        "symmetric": bool(problem.symmetric),
+        "feasible": products or infeasibility(problem) is None,
+    }
+    tags |= dict.fromkeys(TAGS.keys() - tags.keys())
+    law = problem.law
+    if not products and problem.q.size <= MOST and law.unilateral and law.proportional:
+        found = diagnose(problem.explicit())
+        tags |= {"rank": found.rank, "condition": _short(found.condition)}
+        tags["unique_below"] = _short(found.guaranteed.unique)
+        tags["several_from"] = _short(found.uniform_slip.unique)
+    return {name: tags[name] for name in TAGS}
+
+
+def _short(value: float) -> float | None:
+    return float(f"{value:.4g}") if np.isfinite(value) else None

@@ -1,0 +1,176 @@
+"""The command `problems`: list, show and write the problems of a test set."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contactopt.cards import count
+from contactopt.errors import InputError
+
+if TYPE_CHECKING:
+    from contactopt.benchmark.testset import Problem
+    from contactopt.problem import InterfaceProblem
+
+SHOWN = 8  # contacts up to which the forces of all solutions are printed
+TOL = 1e-10  # certificate of the forces at which subproblems are made
+EPILOG = """Examples:
+  contactopt problems list --tier small --tag dim=3 --tag 'contacts<50'
+  contactopt problems show 'springs*nodes=1*'      tags, reference answer, all solutions, proofs
+  contactopt problems write 'punch-2d*' --as npz   quadratic programs for a QP solver
+  contactopt problems list --testset folder        problems of yours: files of FCLib or Siconos
+
+A NAME may be a pattern with * and ?. Tags: dim, contacts, motions (columns of V), law, mu,
+form (dense, sparse, products), symmetric, feasible, rank, condition, unique_below and several_from
+(thresholds of friction), solutions (their number, where all of them were listed)."""
+
+
+def problems(options: argparse.Namespace) -> int:
+    """List, show or write problems of a test set.
+
+    Parameters
+    ----------
+    options : of the command `problems`
+
+    Returns
+    -------
+    int : the exit code, 0
+    """
+    from contactopt.benchmark import testset
+
+    found = testset.problems(options.tier or "", options.tag, options.testset)
+    if options.names:
+        found = [one for one in found if any(_fits(one.name, name) for name in options.names)]
+    if not found:
+        raise InputError("no problem has that name, tier and tags; see `contactopt problems list`.")
+    if options.action != "list" and not options.names:
+        raise InputError(f"name the problems to {options.action}, as in 'punch-2d*'; '*' is all.")
+    ACTIONS[options.action](found, options)
+    return 0
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return name == pattern or fnmatchcase(name, pattern)
+
+
+def _list(found: list[Problem], options: argparse.Namespace) -> None:
+    for one in found:
+        stored = one.known.get("tags", {})
+        words = [f"{key}={stored[key]}" for key in ("dim", "contacts", "form") if key in stored]
+        words += ["unsymmetric"] if stored.get("symmetric") is False else []
+        words += ["no solution"] if stored.get("feasible") is False else []
+        print(f"{one.tier:7}{one.name:74} {' '.join(words)}".rstrip())
+    tiers = Counter(one.tier for one in found)
+    print(f"{count(len(found), 'problem')}: {', '.join(f'{n} {t}' for t, n in tiers.items())}")
+
+
+def _show(found: list[Problem], options: argparse.Namespace) -> None:
+    for one in found:
+        print(f"{one.name}\ntier: {one.tier}")
+        print("tags: " + ", ".join(f"{key}={value}" for key, value in one.tags.items()))
+        for key, value in (one.reference or {"reference answer": "none stored"}).items():
+            print(f"{key}: {value}")
+        _print_solutions(one)
+        print()
+
+
+def _print_solutions(one: Problem) -> None:
+    """All solutions of a small problem that has several, or the proof that there is none."""
+    tags = one.tags
+    if not tags["feasible"]:
+        _print_proof(one.load())
+    elif (tags.get("solutions") or 0) > 1 and tags["contacts"] <= SHOWN:
+        from contactopt.methods.enumeration import all_solutions
+
+        for number, solution in enumerate(all_solutions(one.load()), 1):
+            forces = np.array2string(solution.reactions.ravel(), precision=6, suppress_small=True)
+            print(f"solution {number}: forces {forces}, certificate {solution.residual:.1e}")
+
+
+def _print_proof(problem: InterfaceProblem) -> None:
+    from contactopt.problem import infeasibility
+
+    proof = infeasibility(problem)
+    if proof is None:
+        return
+    print(f"proof that there is no solution: {proof.sentence}")
+    print(
+        "  weights y of the contacts, and motions z: every r in the cones with V'r + s = 0 has\n"
+        "  (Q'e + Vz)'r <= 0 with e = (y, 0), but y'u_n >= 0 would need it to be at least"
+        f" {proof.margin:.6g}"
+    )
+    for name, values in (("y", proof.weights), ("z", proof.motions)):
+        print(f"  {name} = {np.array2string(values, precision=6, threshold=60)}")
+
+
+def _write(found: list[Problem], options: argparse.Namespace) -> None:
+    out = Path(options.out)
+    out.mkdir(parents=True, exist_ok=True)
+    for one in found:
+        stem = out / re.sub(r"[^\w.-]+", "_", one.name).strip("_")
+        try:
+            for path in _written(one, stem, options.format, options.program):
+                print(path)
+        except InputError as error:
+            print(f"left out: {one.name}: {error}", file=sys.stderr)
+
+
+def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> Iterator[Path]:
+    """The files of one problem, written."""
+    from contactopt import fclib
+    from contactopt.benchmark.testset import programs
+    from contactopt.methods.driver import solve
+
+    problem, writers = one.load(), {"npz": programs.write_npz, "cbf": programs.write_cbf}
+    if form == "fclib":
+        path = stem.with_name(f"{stem.name}.hdf5")
+        fclib.write(problem.explicit(), path, one.name)
+        yield path
+        return
+    answer = solve(problem, tol=TOL)
+    if not answer.solved:
+        raise InputError(f"it was not solved ({answer.status}).")
+    for kind in kinds or PROGRAM_NAMES:
+        if form == "npz" and problem.dim == 3 and kind != "normal" and not kinds:
+            continue  # no quadratic program
+        path = stem.with_name(f"{stem.name}_{kind}.{form}")
+        writers[form](programs.convex_program(problem, kind, answer.reactions), path)
+        yield path
+
+
+ACTIONS = {"list": _list, "show": _show, "write": _write}
+FORMATS = ("npz", "cbf", "fclib")
+# the names in contactopt.benchmark.testset, whose import takes half a second
+TIERS = ("small", "medium", "large")
+PROGRAM_NAMES = ("normal", "tangential", "tresca", "associated")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Give the parser of the command `problems` its options."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument(
+        "action",
+        choices=ACTIONS,
+        help="list names; show tags, the reference answer, and proofs; write files",
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="name of a problem, or a pattern")
+    what = "the number of a test set (default: 1), a TOML file, or a folder of problems"
+    parser.add_argument("--testset", default="1", metavar="SET", help=what)
+    parser.add_argument("--tier", choices=TIERS, help="only problems of this tier")
+    what = "only problems of which this holds; the option may be given several times"
+    parser.add_argument("--tag", action="append", default=[], metavar="TAG=VALUE", help=what)
+    what = "npz: quadratic programs; cbf: cone programs; fclib (default): the contact problem"
+    parser.add_argument("--as", dest="format", choices=FORMATS, default="fclib", help=what)
+    what = "which subproblem: normal, tangential, tresca, associated (default: all of them)"
+    parser.add_argument("--program", action="append", choices=PROGRAM_NAMES, help=what)
+    what = "folder of the files (default: out/problems)"
+    parser.add_argument("--out", default="out/problems", metavar="DIR", help=what)

@@ -1,0 +1,135 @@
+"""Who is first: times at the accuracy reached, rank intervals, reruns, busy machines."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from contactopt.benchmark.ranking import (
+    NOISE,
+    SHIFT,
+    achieved,
+    agreement,
+    leader_table,
+    points,
+    ranking,
+    reruns,
+    wall_over_cpu,
+    warning,
+)
+
+
+def rows(method, curve, problem="p", repeat=0, wall=1.0, limit=10.0):
+    """Runs of a method: `curve` holds (tolerance asked, certificate, CPU seconds)."""
+    return [
+        {
+            "problem": problem,
+            "start": "cold",
+            "method": method,
+            "tolerance": tolerance,
+            "repeat": repeat,
+            "residual": residual,
+            "cpu_seconds": seconds,
+            "call_seconds": wall * seconds,
+            "claimed": True,
+            "status": "solved",
+            "time_limit": limit,
+            "peak_mb": 80.0,
+            "base_mb": 70.0,
+        }
+        for tolerance, residual, seconds in curve
+    ]
+
+
+def test_a_time_is_read_at_the_certificate_reached_and_not_at_the_tolerance_asked():
+    # asked for 1e-6 it reaches 1e-4 only: at 1e-5 it stands midway to its next answer
+    found = points(pd.DataFrame(rows("a", [(1e-6, 1e-4, 0.01), (1e-8, 1e-6, 1.0)])))
+    assert achieved(found, 1e-5).iloc[0, 0] == pytest.approx(0.1)
+    assert achieved(found, 1e-4).iloc[0, 0] == pytest.approx(0.01)
+    assert achieved(found, 1e-2).iloc[0, 0] == pytest.approx(0.01)  # nothing cheaper is known
+    assert np.isinf(achieved(found, 1e-7).iloc[0, 0])
+
+
+def test_a_slower_and_less_accurate_point_does_not_count():
+    curve = [(1e-3, 1e-3, 5.0), (1e-6, 1e-8, 0.1)]
+    assert achieved(points(pd.DataFrame(rows("a", curve))), 1e-3).iloc[0, 0] == pytest.approx(0.1)
+
+
+def test_the_worst_repeat_and_the_median_time_count_and_late_answers_do_not():
+    table = pd.DataFrame(
+        [
+            *rows("a", [(1e-6, 1e-7, 1.0)]),
+            *rows("a", [(1e-6, 1e-5, 3.0)], repeat=1),
+            *rows("a", [(1e-6, 1e-7, 2.0)], repeat=2),
+            *rows("late", [(1e-6, 1e-7, 20.0)]),
+        ]
+    )
+    found = points(table)
+    assert achieved(found, 1e-5)["a"].iloc[0] == 2.0 and np.isinf(
+        achieved(found, 1e-6)["a"].iloc[0]
+    )
+    assert np.isinf(achieved(found, 1e-3)["late"].iloc[0])
+
+
+def test_nobody_is_first_by_what_a_clock_cannot_tell():
+    table = pd.DataFrame(rows("a", [(1e-6, 1e-7, 1e-6)]) + rows("b", [(1e-6, 1e-7, 0.9 * NOISE)]))
+    assert list(ranking(points(table), 1e-6)["rank"]) == [1, 1]
+
+
+def campaign(rng, ratio=10.0, repeats=1, wall=1.0):
+    """Thirty problems: `fast` is `ratio` times as fast as `slow`, and both as `fails` on half."""
+    made = []
+    for number in range(30):
+        for repeat in range(repeats):
+            base = 0.01 * np.exp(rng.normal())
+            for method, factor in (("fast", 1.0), ("slow", ratio)):
+                curve = [(1e-6, 1e-7, base * factor)]
+                made += rows(method, curve, f"p{number}", repeat, wall)
+            reached = 1e-7 if number % 2 else 1.0
+            made += rows("fails", [(1e-6, reached, base)], f"p{number}", repeat, wall)
+    return pd.DataFrame(made)
+
+
+def test_leaders_are_ordered_by_shifted_means_in_which_a_failure_is_the_time_limit():
+    table = campaign(np.random.default_rng(0))
+    found = ranking(points(table), 1e-6).set_index("method")
+    assert list(found.index) == ["fast", "slow", "fails"] and list(found["solved"]) == [30, 30, 15]
+    fast = table[table["method"] == "fast"]["cpu_seconds"]
+    assert found.loc["fast", "mean"] == pytest.approx(np.exp(np.log(fast + SHIFT).mean()) - SHIFT)
+    own = table[table["method"] == "fails"]
+    times = own["cpu_seconds"].where(own["residual"] < 1e-6, 10.0)
+    assert found.loc["fails", "mean"] == pytest.approx(np.exp(np.log(times + SHIFT).mean()) - SHIFT)
+    assert (found["memory"] == 10.0).all() and found.loc["fast", "over claim"] == pytest.approx(0.1)
+
+
+def test_rank_intervals_are_narrow_where_a_difference_is_sure_and_wide_where_it_is_not():
+    sure = ranking(points(campaign(np.random.default_rng(0))), 1e-6).set_index("method")
+    assert (sure.loc["fast", ["best", "worst"]] == 1).all()
+    rng, made = np.random.default_rng(1), []
+    for number in range(12):  # two methods that win by chance
+        for method in ("a", "b"):
+            curve = [(1e-6, 1e-7, 0.01 * np.exp(rng.normal()))]
+            made += rows(method, curve, f"p{number}")
+    unsure = ranking(points(pd.DataFrame(made)), 1e-6)
+    assert (unsure["best"] == 1).all() and (unsure["worst"] == 2).all()
+
+
+def test_problems_that_nobody_solves_rank_nobody():
+    table = pd.DataFrame(rows("a", [(1e-6, 1.0, 0.1)]) + rows("b", [(1e-6, 1e-7, 0.1)], "q"))
+    found = ranking(points(table), 1e-6).set_index("method")
+    assert list(found["of"]) == [1, 1] and list(found.index) == ["b", "a"]
+
+
+def test_two_reruns_agree_as_kendall_says():
+    halves = reruns(campaign(np.random.default_rng(2), repeats=4))
+    assert all(set(half["repeat"] % 2) == {n} for n, half in enumerate(halves))
+    assert agreement(*map(points, halves), 1e-6) == 1.0
+    one, other = halves
+    swapped = other.replace({"method": {"fast": "fails", "fails": "fast"}})
+    assert agreement(points(one), points(swapped), 1e-6) == pytest.approx(-1.0)
+
+
+def test_a_busy_machine_ranks_nobody_and_says_so():
+    quiet, busy = (campaign(np.random.default_rng(3), wall=wall) for wall in (1.1, 1.5))
+    assert wall_over_cpu(busy) == pytest.approx(1.5) and "nothing is ranked" in warning(1.5)
+    assert warning(wall_over_cpu(quiet)) == ""
+    assert "rank (95 %)" in leader_table(quiet) and "rank (95 %)" not in leader_table(busy)
