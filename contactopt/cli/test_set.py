@@ -159,7 +159,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EPILOG
     parser.add_argument(
         "action",
-        choices=ACTIONS,
+        choices=tuple(ACTIONS),
         help="list names; show tags, the reference answer, and proofs; write files",
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="name of a problem, or a pattern")

@@ -160,12 +160,6 @@ def solutions(problem: InterfaceProblem) -> int | None:
         return None
 
 
-def computed(problem: InterfaceProblem, limit: float) -> dict[str, Any]:
-    """What the JSON file says of one problem."""
-    tags = testset.tags_of(problem) | {"solutions": solutions(problem)}
-    return {"tags": tags, "reference": reference(problem, limit)}
-
-
 def store(path: Path, known: dict[str, Any]) -> None:
     """Write the JSON file, one line for each problem."""
     lines = [f"{json.dumps(name)}: {json.dumps(value)}" for name, value in known.items()]
@@ -180,8 +174,12 @@ def compute(name: str, tier: str, again: bool) -> None:
     of_set = testset.problems("", testset=name)
     known = {one.name: known[one.name] for one in of_set if one.name in known}
     for one in of_set:
-        if one.tier == tier and (again or one.name not in known):
-            known[one.name] = computed(one.load(), LIMIT[tier])
+        if one.tier == tier and (again or "reference" not in known.get(one.name, {})):
+            problem = one.load()
+            tags = testset.tags_of(problem) | {"solutions": solutions(problem)}
+            known[one.name] = {"tags": tags}
+            store(path, {row.name: known[row.name] for row in of_set if row.name in known})
+            known[one.name] |= {"reference": reference(problem, LIMIT[tier])}
             print(one.name, json.dumps(known[one.name]["reference"]), flush=True)
             store(path, {row.name: known[row.name] for row in of_set if row.name in known})
 
