@@ -17,8 +17,7 @@ from contactopt import InterfaceProblem, reduce_bodies, scenes, solve
 from contactopt.benchmark.packings import packing
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.paper_figure import label_lines, paper_axes
-from experiments.report import measure, stored
+from experiments.report import label_lines, measure, paper_axes, stored
 
 TIGHT, LOOSE = 1e-10, 1e-4  # tolerances of the cone solver
 ROUNDS, STILL = 100, 1e-8  # of a fixed point; its last change
@@ -161,7 +160,7 @@ PROBLEMS: dict[str, Callable[[], InterfaceProblem]] = {
     "block that slides": lambda: blocks((0.5,), 1.0),
     "stack that slides": lambda: blocks((0.4, 0.8, 0.8), 0.6),
     "pile": lambda: packing(3, 12, 0, 0.5),
-    "elastic punch": lambda: reduce_bodies(scenes.punch_3d(elements=4)).problem,
+    "elastic punch": lambda: reduce_bodies(scenes.flat_punch(dim=3, elements=3)).problem,
 }
 LAWS: dict[str, tuple[Callable[..., Answer], tuple[float, ...]]] = {
     "associated": (lambda problem, _, tol=TIGHT: associated(problem, tol=tol), (0.0,)),
