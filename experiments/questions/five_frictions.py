@@ -43,9 +43,7 @@ def minimum(
     flat = cp.reshape(r, (k * dim,), order="C")
     cost += cp.quad_form(flat, cp.psd_wrap(Q + softness * np.diag(np.diag(Q)))) / 2
     balance = [problem.V.T @ flat + problem.s == 0] if problem.V.size else []
-    program = cp.Problem(
-        cp.Minimize(cost + problem.q.ravel() @ flat), [*balance, *constraints]
-    )
+    program = cp.Problem(cp.Minimize(cost + problem.q.ravel() @ flat), [*balance, *constraints])
     tolerances = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tol)
     program.solve(solver=cp.CLARABEL, **tolerances)
     u = Q @ r.value.ravel() + problem.q.ravel()
@@ -122,6 +120,7 @@ def barrier(problem: InterfaceProblem, width: float, tol: float = TIGHT) -> Answ
     """-width log r_n holds contacts apart by u_n = width / r_n; friction is regularised at the
     speed `width`, and its bound is mu r_n of the answer without friction (a lag of one).
     """
+
     def law(n: Any, t: Any) -> tuple[Any, list[Any]]:
         return -width * cp.sum(cp.log(n)), [t == 0]
 
@@ -250,9 +249,12 @@ def sides_figure(table: list[dict[str, Any]]) -> Any:
     lines = []
     for name in PROBLEMS:
         own = [r for r in table if (r["problem"], r["law"]) == (name, "polygon")]
-        lines.append((name, [r["parameter"] for r in own], [r["distance"] for r in own]))
-    label_lines(axes[0], [line for line in lines if max(line[2]) > SMALL])
+        shown = [max(r["distance"], SMALL) for r in own]
+        lines.append((name, [r["parameter"] for r in own], shown))
+    label_lines(axes[0], lines)
     axes[0].set(xlabel="sides of the polygon", ylabel="distance to Coulomb's solution [-]")
+    axes[0].set_xscale("log", base=2)
+    axes[0].set_xticks(SIDES, [str(sides) for sides in SIDES])
     return picture
 
 
@@ -261,6 +263,22 @@ solution do they end? Each law is a program of about ten lines over the same Q, 
 a tolerance of {tight:g}. The problems are a block on an incline that holds, one that slides, a
 stack of three blocks whose lowest face slides, a pile of spheres, and an elastic punch. The
 reference has the certificate of Coulomb's law.
+
+- Contacts that slip lift off under the associated law, by mu times the slip: up to 22 % of the
+  largest displacement. Springs in the contacts do not cure it. The stiffer they are, the nearer the
+  answer comes to the associated law, whose distance to Coulomb's is up to 20 %.
+- Contacts that stick under Coulomb's law creep under the regularised law, the compliant law and the
+  barrier, in proportion to the parameter: by 1 % to 2 % at .01 and by .01 % to .02 % at .0001.
+- Forces lie outside the cone where each component of friction is bounded by itself, by up to 20 %
+  of the largest force, and where the bound comes from an answer without friction, by up to 16 %.
+  The distance of the barrier stays at 8 % however thin it is, because its bound lags.
+- A polygon of four sides is up to 17 % away, and one of 32 sides up to .4 %. The error depends on
+  the direction of the slip: it vanishes where the slip points to a corner.
+- The solver's error at a tolerance of {loose:g} is at most .3 % everywhere. The errors of the
+  associated law, of four to sixteen sides and of the lagging bound are larger than it. The
+  regularised law comes below it with a parameter of .001 or less.
+
+What the parameter stands for:
 
 - **associated**: the forces in Coulomb's cones minimise the energy, as in cone complementarity.
 - **square around the disc**: each of two components of friction is bounded by itself.
@@ -286,8 +304,8 @@ by the largest force. The solver error is the distance between the law's answers
 {{rows}}
 
 **The figures** show the largest distance and the largest creep against the parameter, and the
-distance of the polygons against the number of their sides. A problem that is not drawn has a
-distance below {small:g}.
+distance of the polygons against the number of their sides. A distance below {small:g} is drawn
+there.
 """
 
 if __name__ == "__main__":

@@ -280,7 +280,9 @@ FORMS = ("explicit", "implicit", "coupled")
 def map_figure(table: list[Row]) -> Any:
     """The error of the peak over tolerance and mesh; hatched where the solver still matters."""
     picture, (ax,) = paper_axes()
-    grid = np.array([abs(r["mesh alone"]) + r["solver alone"] for r in table]).reshape(len(MESHES), len(TOLERANCES))
+    grid = np.array([abs(r["mesh alone"]) + r["solver alone"] for r in table]).reshape(
+        len(MESHES), len(TOLERANCES)
+    )
     matters = np.array([r["matters"] in (True, "True") for r in table]).reshape(grid.shape)
     drawn = ax.imshow(np.log10(np.maximum(grid, 1e-6)), cmap="cividis", aspect="auto",
                       origin="lower")  # fmt: skip
