@@ -39,6 +39,7 @@ BOX = 2.5  # side of the square of a half-space's points over the contact radius
 TOLERANCES = tuple(10.0**-power for power in range(1, 9))
 MESHES = (4, 8, 16, 32, 64)
 SHORT = 0.5  # CPU seconds, below which a run is repeated three times
+FORMS = ("explicit", "implicit")  # of Q, on graded linear meshes
 MARGIN = 0.1  # of the mesh's own error, within which a tolerance no longer matters
 
 
@@ -63,9 +64,7 @@ def relative(values: dict[str, float], scene: Scene) -> dict[str, float]:
 
 def meshed(scene: Scene, read: tuple[str, ...], form: str = "auto") -> Row:
     """One scene with a mesh, remeshed to its contact zone where it has one."""
-    settings = {"solver": "multigrid"} if form == "coupled" else {"Q": form}
-    options = Options(tol=1e-9, **settings)
-    seconds, solved = timed(lambda: solve_zone(scene, options=options))
+    seconds, solved = timed(lambda: solve_zone(scene, options=Options(Q=form, tol=1e-9)))
     return whole(scene, solved, read, seconds)
 
 
@@ -172,7 +171,7 @@ def runs() -> Iterator[tuple[str, str, float, Callable[[], Row]]]:
         for target in (3e-2, 1e-2, 3e-3):
             coarse = indenter(kind, LARGE, 4, loop=False)
             yield name, "adaptive", target, lambda s=coarse, t=target: adaptive(s, t)
-    for form in ("explicit", "implicit", "coupled"):
+    for form in FORMS:
         for n in (16, 32):
             graded = indenter("axisymmetric", LARGE, n)
             yield "Hertz, point", form, n, lambda s=graded, f=form: meshed(s, both, f)
@@ -274,9 +273,6 @@ def speed_figure(table: list[Row]) -> Any:
     return picture
 
 
-FORMS = ("explicit", "implicit", "coupled")
-
-
 def map_figure(table: list[Row]) -> Any:
     """The error of the peak over tolerance and mesh; hatched where the solver still matters."""
     picture, (ax,) = paper_axes()
@@ -307,14 +303,14 @@ loop over the contact zone. A run shorter than {short:g} s is the median of thre
 - **uniform**: all elements are alike, and the body is {small:g} half-widths large.
 - **graded**: elements grow away from the contact, and the body is {large:g} half-widths large.
 - **adaptive**: the mesh is refined where the peak pressure needs it; `size` is the target.
-- **explicit, implicit, coupled**: Q as an array, by its products, and with bodies that are solved
-  by iteration together with the contact, on graded linear meshes.
+- **explicit, implicit**: Q as an array, and by its products, on graded linear meshes.
 - **space**: a quarter of the body in three dimensions, which the axisymmetric model simplifies.
 - **half-space**: no mesh at all; `size` is the number of points along a side.
 - **Tamaas**: another code on the same points. Its time is that of its solve alone.
 
 Not compared on these scenes: CalculiX, which has a [report of its own](../calculix/report.md) on
-one mesh, and GetFEM and Kratos, for which no model is written here yet.
+one mesh, GetFEM and Kratos, for which no model is written here yet, bodies that are solved by
+iteration together with the contact, and a rough surface.
 
 **The fronts.** These runs are beaten by no other in both time and error.
 
