@@ -236,7 +236,7 @@ def front(table: list[Row], name: str, quantity: str) -> set[tuple[str, float]]:
     own = [r for r in table if r["scene"] == name and np.isfinite(r[quantity])]
     out, best = set(), np.inf
     for row in sorted(own, key=lambda r: r["seconds"]):
-        if abs(row[quantity]) < best:
+        if abs(row[quantity]) < 0.99 * best:
             best = abs(row[quantity])
             out.add((row["way"], row["size"]))
     return out
@@ -259,9 +259,10 @@ def fronts(table: list[Row]) -> list[Row]:
 def speed_figure(table: list[Row]) -> Any:
     """Error against CPU seconds: peak pressure and half-width of Hertz's point contact."""
     picture, axes = paper_axes(columns=2, wide=True)
+    point = [r for r in table if r["scene"] == "Hertz, point" and r["way"] not in FORMS]
+    ways = list(dict.fromkeys(r["way"] for r in point))
     for ax, quantity, label in zip(axes, ("peak", "width"), ("peak pressure", "half-width")):
-        own = [r for r in table if r["scene"] == "Hertz, point" and np.isfinite(r[quantity])]
-        ways = [w for w in dict.fromkeys(r["way"] for r in own) if w not in FORMS]
+        own = [r for r in point if np.isfinite(r[quantity])]
         lines = [
             (w, [r["seconds"] for r in own if r["way"] == w],
              [abs(r[quantity]) for r in own if r["way"] == w])
@@ -299,6 +300,23 @@ answers: Hertz's contacts at a point and along a line, Cattaneo's sheared contac
 with friction, and a smooth flat punch. Errors are relative to the exact value. Times are CPU
 seconds of one thread; they include the mesh, the bodies, the solve and, where there is one, the
 loop over the contact zone. A run shorter than {short:g} s is the median of three.
+
+- Where a half-space can do the scene, nothing with a mesh comes near. Hertz's peak pressure is
+  right to .009 % after .06 s on 64 x 64 points. The best mesh needs 3.5 s for about as much.
+- Tamaas finds the same peak and half-width on the same points. Its solve is faster up to 32 points
+  a side, and slower from 64 on.
+- A uniform mesh spends 3.0 s on an error of the peak of .5 %. A graded one has .24 % after .1 s.
+- Quadratic displacements are more accurate for the peak. Linear ones are more accurate for the
+  half-width, and for the stick width of Spence's punch with as many unknowns.
+- On graded linear meshes the peak of the point contact does not converge: its error stays between
+  .05 % and .09 % from 16 to 64 elements. That of the line contact falls by four with each halving.
+- The adaptive search is slower than a mesh that was graded by hand, because it pays for all of its
+  meshes and estimates.
+- The implicit form takes 1.4 to 1.5 times as long as the explicit one on meshes of this size.
+- The mesh alone decides once the certificate is 1e-4 or better, on all meshes. At 1e-3 the solver
+  still matters from eight elements on, and at 1e-1 the peak is wrong by 5 % to 86 %.
+
+What the ways are:
 
 - **uniform**: all elements are alike, and the body is {small:g} half-widths large.
 - **graded**: elements grow away from the contact, and the body is {large:g} half-widths large.
