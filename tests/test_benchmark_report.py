@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,21 @@ def test_performance_profile_by_hand():
     a, b = curves["a (2)"], curves["b (3)"]
     np.testing.assert_allclose(a[:-1], [[1, 0], [1, 1 / 3], [2, 2 / 3]])
     np.testing.assert_allclose(b[:-1], [[1, 0], [1, 1 / 3], [1, 2 / 3], [2, 1]])
+
+
+def test_a_profile_names_the_eight_best_and_draws_the_others_grey():
+    names = [f"m{i}" for i in range(10)]
+    rows = table(method=names, solve_seconds=[1.0 + i for i in range(10)], success=[True] * 10)
+    figure = figures.performance_profile(rows)
+    figure.canvas.draw()
+    ax = figure.axes[0]
+    texts = {text.get_text(): text.get_window_extent() for text in ax.texts}
+    assert set(texts) == {f"{name} (1)" for name in names[:8]}
+    heights = sorted((box.y0, box.y1) for box in texts.values())
+    assert all(below[1] <= above[0] for below, above in pairwise(heights))
+    assert max(box.x1 for box in texts.values()) <= figure.bbox.x1
+    grey = [line.get_label() for line in ax.get_lines() if line.get_color() == "#cccccc"]
+    assert grey == ["m8 (1)", "m9 (1)"]
 
 
 def test_a_method_that_fails_once_in_its_repeats_has_failed():

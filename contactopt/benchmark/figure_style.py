@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+FAINT: Mapping[str, Any] = MappingProxyType({"color": "#cccccc", "lw": 0.8, "zorder": 0})
 # one for each of 16 methods; colours come back after eight, with other lines
 MARKERS = "osD^vP*X<>hpd8H1"
 # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
@@ -27,6 +28,7 @@ SHORT = 20  # characters of a label, up to which three of them fit side by side 
 LONGEST = 26  # characters of a label
 WIDTH = 5.6  # of a figure [inch], so that its letters can be read where it is 400 pixels wide
 ROW = 0.19  # of a legend [inch]
+ROOM = 11.0  # of a label in the height [pt]
 CELLS = 240  # of a map, above which no numbers are written into them
 NO_LABELS: Mapping[str, str] = MappingProxyType({})
 NAMES = {
@@ -98,6 +100,26 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
         above = (place, (height - up) * POINTS)
         options = {"textcoords": "offset points", "color": colour, "fontsize": 7, "ha": side}
         ax.annotate(name, (x, y), above, **options)
+
+
+def label_right(ax: Any, ends: Sequence[tuple[float, str, str]]) -> None:
+    """Write the names of lines in their colours beside the axes, at the heights where they end or,
+    where names would meet, in the order of these: (height, name, colour) of each.
+    """
+    low, high = ax.get_ylim()
+    rows = ax.figure.get_figheight() * 72 * 0.8 / ROOM
+    # equal heights: the first, which is the better, stands above
+    ordered = sorted(reversed(ends), key=lambda end: end[0])
+    step, places = (high - low) / rows, list[float]()
+    for height, _, _ in ordered:
+        places.append(max(height, places[-1] + step) if places else height)
+    top = high
+    for i in reversed(range(len(places))):
+        places[i] = top = min(places[i], top)
+        top -= step
+    for place, (_, name, colour) in zip(places, ordered):
+        where = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+        ax.annotate(name, (1.0, place), (4, 0), color=colour, va="center", fontsize=8, **where)
 
 
 def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:

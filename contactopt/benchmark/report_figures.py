@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.benchmark.figure_style import (
+    COLOURS,
+    FAINT,
     FLOOR,
     LEAST_RESIDUAL,
     NAMES,
@@ -24,6 +26,7 @@ from contactopt.benchmark.figure_style import (
     WIDTH,
     add_legend,
     label_ends,
+    label_right,
     make_figure,
     set_ticks,
     short_label,
@@ -98,9 +101,10 @@ def performance_profile(
     """Draw a profile: the share of the instances solved within a factor of the best method's time
     on each.
 
-    An instance is a problem at a setting and start, or a problem and a start where `accuracy` is
-    the certificate at which methods are compared. Times are medians over repeats, and a method that
-    fails once has failed.
+    The eight best have colours, and their names stand at their right ends, with the number of
+    instances that they solved; the others are grey. An instance is a problem at a setting and
+    start, or a problem and a start where `accuracy` is the certificate at which methods are
+    compared. Times are medians over repeats, and a method that fails once has failed.
 
     Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math.
     Program. 91, 201-213.
@@ -113,18 +117,23 @@ def performance_profile(
     solvable = wide[np.isfinite(wide.min(axis=1))]
     ratio = solvable.div(solvable.min(axis=1), axis=0)
     largest = 1.3 * float(np.max(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0))
-    for (full, _), style in zip(groups(table, by), cycle(STYLES)):
+    ends = []
+    order = np.log(ratio).replace(np.inf, np.log(1e3 * largest)).sum().sort_values().index
+    for rank, full in enumerate(order):
         reached = np.sort(ratio[full][np.isfinite(ratio[full])].to_numpy())
         share = np.arange(len(reached) + 1) / len(wide)
-        label = f"{short_label(full, labels)} ({len(reached)})"
-        look = {"color": style["color"], "ls": style["ls"], "lw": 1.6, "label": label}
+        label = f"{short_label(str(full), labels)} ({len(reached)})"
+        look = FAINT if rank >= len(COLOURS) else {"color": COLOURS[rank], "lw": 1.6}
         x, y = np.concatenate([[1.0], reached, [largest]]), np.append(share, share[-1])
-        ax.step(x, y, where="post", **look)
+        ax.step(x, y, where="post", label=label, **look)
+        ends += [(float(share[-1]), label, COLOURS[rank])] if rank < len(COLOURS) else []
     what = NAMES.get(metric, metric).partition(" [")[0]
     ax.set(xscale="log", xlim=(1, largest), ylim=(0, 1.03))
     ax.set(xlabel=f"ratio: {what} / the best method's [-]")
     ax.set(ylabel=f"share of the {len(wide)} instances solved")
-    return add_legend(figure, ax, "method (solved)")
+    ax.grid(alpha=0.3)
+    label_right(ax, ends)
+    return figure
 
 
 def _at_settings(table: pd.DataFrame, metric: str, by: str) -> pd.DataFrame:
