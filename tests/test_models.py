@@ -315,7 +315,7 @@ def test_primal_and_dual_have_each_others_multipliers(name, facets, problem):
 
 
 def test_orthotropic_friction_has_a_primal_form_too():
-    near = 3e-7  # as above
+    near = 1e-4  # the ellipses are thin, and forces are as good as the root of the gap
     law = Orthotropic([0.2, 0.5], [0.6, 0.5], [0.4, 0.0])
     A = np.random.default_rng(1).normal(size=(6, 6))
     problem = InterfaceProblem(A @ A.T + np.eye(6), [[-1.0, 2, -1], [-2.0, -1, 3]], law)
