@@ -8,12 +8,11 @@ import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-mu, load = 0.4, np.array([10.0, 1.0])
-pulls, most = np.linspace(0, 4, 9), []
+mu, pulls, most = 0.4, np.linspace(0, 4, 9), []
 for pull in pulls:
     n, t = cp.Variable(3), cp.Variable(3)
     laws = [cp.sum(n) == 10, cp.sum(t) == pull, cp.abs(t) <= mu * n, n <= 6]
     most.append(cp.Problem(cp.Maximize(t[0]), laws).solve(solver="CLARABEL"))
-assert np.allclose(most, np.minimum(mu * 6, (pull_mean := (pulls + mu * 10) / 2)), atol=1e-5)
+assert np.allclose(most, np.minimum(mu * 6, (pulls + mu * 10) / 2), atol=1e-5)
 plt.plot(pulls, most, "o-")
 plt.gca().set(xlabel="pull on all three [N]", ylabel="most that the first carries [N]")

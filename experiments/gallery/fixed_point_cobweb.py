@@ -1,7 +1,7 @@
-"""When a fixed point runs away.
+"""When a fixed point runs in a circle.
 
-Class: fixed point. Mechanics: one slipping node. A step multiplies the error by mu Q_nt / Q_nn,
-so that strong friction makes it grow.
+Class: fixed point. Mechanics: one slipping node with Q_nn = Q_nt. A step multiplies the error by mu
+Q_nt / Q_nn. Above one the bounds leave the solution and end in a bounded cycle.
 """
 
 import matplotlib.pyplot as plt

@@ -14,5 +14,5 @@ for law in tried:
     problem = InterfaceProblem([[2.0, 0.5], [0.5, 1.0]], [[-1.0, -2.0]], law)
     forces[type(law).__name__] = solve(problem).reactions[0]
 assert abs(forces["Tresca"][1] - 0.2) < 1e-6 and abs(forces["Frictionless"][1]) < 1e-6
-plt.plot(*zip(*forces.values(), strict=True), "o")
-plt.gca().set(xlabel="normal force $r_n$ [N]", ylabel="friction force $r_t$ [N]")
+plt.bar(list(forces), [abs(force[1]) for force in forces.values()])
+plt.gca().set(xlabel="law", ylabel="friction force $|r_t|$ [N]")
