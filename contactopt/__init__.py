@@ -85,6 +85,7 @@ _MODULES = {
     "animation": "figures.animation",
     "benchmark": "benchmark",
     "fclib": "fclib",
+    "laws": "problem.laws",
     "models": "models",
     "plots": "figures.plots",
     "scenes": "scenes",

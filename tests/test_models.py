@@ -2,12 +2,13 @@ import cvxpy as cp
 import numpy as np
 import pytest
 from conftest import one_contact
+from matplotlib.figure import Figure
 
+import contactopt
 from contactopt import InputError, InterfaceProblem, models
 from contactopt.methods.backends import CONIC
 from contactopt.methods.backends.conic import Conic
-from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.problem.laws import Bilateral, Coulomb, Orthotropic
 
 PROGRAMS = (
     "normal",
@@ -254,3 +255,109 @@ def test_conic_bridge_solves_again_with_new_parameters():
     bridge = Conic.using("clarabel", models.tresca(problem), problem.Q)
     friction = [abs(bridge.solve(g=np.array([g]))["r"][1]) for g in (0.1, 0.2)]
     assert friction == pytest.approx([0.1, 0.2], abs=1e-6)
+
+
+def refined(program, **given):
+    """Solved as far as the arithmetic goes: 1e-8 is compared."""
+    for name, value in given.items():
+        if name in program.parameters:
+            parameter = program.parameters[name]
+            parameter.value = np.broadcast_to(value, parameter.shape)
+    program.problem.solve(
+        solver="CLARABEL", tol_gap_abs=1e-13, tol_gap_rel=1e-13, tol_feas=1e-13, max_iter=200
+    )
+    assert program.problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+    return program
+
+
+PAIRS = [(name, None) for name in PROGRAMS if name != "displacements"] + [
+    ("tangential", 7),
+    ("tresca", 7),
+    ("associated", 7),
+    ("acary_cadoux", 7),
+]
+
+
+@pytest.mark.parametrize(("name", "facets"), PAIRS)
+def test_primal_and_dual_have_each_others_multipliers(name, facets, problem):
+    """The value changes its sign; forces, gaps, slips and approaches are the same to 1e-8. With
+    discs they are as near as the root of the gap of 1e-13 allows, since the energy is quadratic.
+    """
+    near = 3e-7 if problem.dim == 3 and facets is None else 1e-8
+    rng = np.random.default_rng(5)
+    k, d = problem.contacts, problem.dim - 1
+    given = {
+        "g": rng.uniform(0, 0.6, k),
+        "s": rng.uniform(0, 0.6, k),
+        "r_n": rng.uniform(0, 1, k),
+        "r_t": rng.normal(size=k * d) * 0.1,
+        "approach": -0.4,
+    }
+    options = {} if facets is None else {"facets": facets}
+    build = getattr(models, name)
+    dual = refined(build(problem, **options), **given)
+    primal = refined(build(problem, **options, form="primal"), **given)
+    assert primal.problem.value == pytest.approx(-dual.problem.value, abs=1e-9)
+    force = next(v for key, v in dual.variables.items() if key in ("r", "r_n", "r_t")).value
+    assert np.allclose(primal.multipliers["reaction"], force, atol=near, rtol=0)
+    assert np.abs(force).max() > 1e-2
+    m, gaps = dual.multipliers, primal.variables
+    if "u" in gaps and gaps["u"].size == k:
+        assert np.allclose(gaps["u"].value, m.get("gap", 0.0), atol=near, rtol=0)
+    elif "u" in gaps:
+        u = gaps["u"].value.reshape(k, d + 1)
+        assert np.allclose(u[:, 0], m["gap"], atol=near, rtol=0)
+        assert np.allclose(u[:, 1:], m["slip"], atol=near, rtol=0)
+    else:
+        assert np.allclose(gaps["u_t"].value.reshape(k, d), m["slip"], atol=near, rtol=0)
+    if "lambda" in gaps:
+        assert np.allclose(gaps["lambda"].value, m["approach"], atol=near, rtol=0)
+
+
+def test_orthotropic_friction_has_a_primal_form_too():
+    near = 1e-4  # the ellipses are thin, and forces are as good as the root of the gap
+    law = Orthotropic([0.2, 0.5], [0.6, 0.5], [0.4, 0.0])
+    A = np.random.default_rng(1).normal(size=(6, 6))
+    problem = InterfaceProblem(A @ A.T + np.eye(6), [[-1.0, 2, -1], [-2.0, -1, 3]], law)
+    for name in ("tresca", "associated"):
+        dual, primal = (
+            refined(getattr(models, name)(problem, form=form), g=0.2) for form in ("dual", "primal")
+        )
+        u = primal.variables["u"].value.reshape(2, 3)
+        assert np.allclose(
+            primal.multipliers["reaction"], dual.variables["r"].value, atol=near, rtol=0
+        )
+        assert np.allclose(u[:, 1:], dual.multipliers["slip"], atol=near, rtol=0)
+        assert np.abs(u[:, 1:]).max() > 1e-2
+
+
+def test_unknown_form_is_refused():
+    for name in PROGRAMS:
+        if name != "displacements":
+            with pytest.raises(InputError, match=r"'dual' .* or 'primal'"):
+                getattr(models, name)(one_contact((0.8, 1.0), 1.0), form="mixed")
+
+
+@pytest.mark.parametrize("form", ["dual", "primal"])
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if name != "displacements"])
+def test_program_shows_its_mathematics(name, form, problem):
+    program = getattr(models, name)(problem, form=form)
+    assert str(program).startswith("min ") and "subject to" in str(program)
+    assert "param" not in str(program.problem) and "var" not in str(program.problem)
+    assert repr(program).count(".") == 1 and "not solved yet" in repr(program)
+    latex = program._repr_latex_()
+    figure = Figure()
+    words = latex.replace(r"\displaystyle", "").replace(r"\text", r"\mathrm")
+    figure.text(0, 0, words.replace(r"\top", r"\prime"))
+    figure.draw_without_rendering()  # raises where the LaTeX is none
+
+
+def test_laws_stand_in_one_place_beside_the_programs():
+    """Tresca's law and Tresca's program say the same."""
+    bound = np.array([0.3])
+    node = one_contact((0.8, 1.0), 1.0)
+    problem = InterfaceProblem(node.Q, node.q, contactopt.laws.Tresca(bound))
+    program = refined(models.tresca(problem), g=bound)
+    answer = contactopt.solve(problem).reactions.ravel()
+    assert np.allclose(program.variables["r"].value, answer, atol=1e-8, rtol=0)
+    assert abs(answer[1]) == pytest.approx(0.3)

@@ -131,7 +131,7 @@ def table_functions() -> dict[str, Any]:
     found |= {
         f"models.{name}": thing
         for name, thing in models.items()
-        if thing.__module__ == "contactopt.models"
+        if thing.__module__.startswith("contactopt.models")
     }
     return {name: thing for name, thing in found.items() if inspect.isfunction(thing)}
 

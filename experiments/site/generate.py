@@ -73,6 +73,7 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
         Path("tutorials.md"),
         index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered]),
     )
+    yield from notebook("gallery", "gallery", gallery())
     yield from course(site)
     yield from reference.plug_in_pages(site)
     yield Path("command_line.md"), command_line()
@@ -111,6 +112,9 @@ PYTHON = (
 )
 
 
+KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+
+
 def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tuple[Path, str]]:
     """A percent script as a page that offers the notebook, and the notebook; `head` describes a
     page that is not executed.
@@ -121,10 +125,31 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
     # notebooks of one folder refer to each other
     local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)
     book = jupytext.reads(local, "py:percent")
+    book.metadata["kernelspec"] = KERNEL
     for cell in book.cells:  # what the page folds, JupyterLab folds too
         if "hide-input" in cell.metadata.get("tags", []):
             cell.metadata["jupyter"] = {"source_hidden": True}
     yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(book, "ipynb")
+
+
+GALLERY = """# %% [markdown]
+# # Gallery
+#
+# Thirty programs, each of at most ten statements besides its imports. Each says its class of
+# mathematical program and its mechanics, asserts what it shows, and draws a figure.
+"""
+
+
+def gallery() -> str:
+    """The programs of the gallery as one script, with a heading and a figure for each."""
+    parts = [GALLERY]
+    for path in sorted((ROOT / "experiments" / "gallery").glob("*.py")):
+        _, text, code = path.read_text().split('"""', 2)
+        title, about = text.strip().split("\n\n", 1)
+        lines = "\n".join(f"# {line}" for line in about.splitlines())
+        parts.append(f"# %% [markdown]\n# ## {title.rstrip('.')}\n#\n{lines}\n")
+        parts.append(f"# %%\n{code.strip()}\nplt.show()\n")
+    return "\n".join(parts)
 
 
 def course(site: Path) -> Iterator[tuple[Path, str]]:
