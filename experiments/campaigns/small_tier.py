@@ -24,6 +24,7 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     leaders = ranking(found, ACCURACY).set_index("method")
     auto = leaders.loc["auto"]
     told = [
+        f"The table holds the runs on {table['problem'].nunique()} problems of the set.",
         f"`auto` reaches the certificate 1e-6 on {int(auto['solved'])} of the {int(auto['of'])}"
         f" problems that some solver solves. Its mean CPU time over them is"
         f" {auto['over the least']:.2g} times the least of all {len(leaders)} solvers.",
