@@ -185,3 +185,13 @@ def test_a_proof_that_there_is_no_solution_ends_a_method_that_would_go_on(monkey
     solution = solve(overlapping, _Endless(clock))
     assert solution.status is Status.INFEASIBLE and solution.proof is not None
     assert solution.iterations == 2  # the first whose work took longer than a second
+
+
+@pytest.mark.parametrize("far", [1.0, 1e6, 1e12, 1e17])
+def test_a_body_that_flies_away_balances_nothing(far):
+    """The friction of three contacts cannot hold the plate; far from them it has no forces."""
+    V = np.tile(np.eye(2), (3, 1))
+    problem = InterfaceProblem(np.eye(6), np.zeros((3, 2)), mu=0.2, V=V, s=[-5.0, 1.2])
+    for force in (0.0, 1e-9):
+        reactions = np.tile([force, 0.0], (3, 1))
+        assert natural_map_residual(problem, reactions, [far, 0.0]) > 0.9

@@ -27,7 +27,8 @@ contact i is
 which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a
 larger rho_i, because there a small error of the displacement is a large error of the force. The
 certificate is the largest of all e_i, of (|r_t| - mu r_n) / F, and of the relative errors |V_j' r +
-s_j| / max(|s_j|, max_i |V_ij| F) of the balance.
+s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Where s_j is not zero F is at most F0 there: a body
+that flies away from all contacts, which makes L and F as large as one likes, balances nothing.
 
 What a certificate of at most tol promises for Coulomb friction, at every contact:
 
@@ -227,10 +228,11 @@ def balance_residual(
     if len(problem.s) == 0:
         return 0.0
     r = np.asarray(reactions, dtype=float)
-    if force is None:
-        force = float(np.linalg.norm(r, axis=1).max(initial=0.0))
+    largest = float(np.linalg.norm(r, axis=1).max(initial=0.0))
+    force = largest if force is None else force
     error = np.abs(problem.V.T @ r.ravel() + problem.s)
-    size = np.maximum(np.abs(problem.s), problem.reach * force)
+    sizes = np.where(problem.s == 0, force, min(force, largest))
+    size = np.maximum(np.abs(problem.s), problem.reach * sizes)
     relative = np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0)
     return float(np.max(np.where(error > 0, relative, 0.0)))
 
