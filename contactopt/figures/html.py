@@ -66,8 +66,8 @@ def write_html(
     """Write a page that stands alone.
 
     `body` is HTML with every name in it escaped, between the header with its title, plain text, and
-    the programs: JavaScript files in contactopt/figures/pages, run in this order once plotly is
-    there. They read `data`, which may be anything that JSON can hold. InputError if plotly is not
+    the programs: JavaScript files in contactopt/figures/pages, run in this order. They await
+    plotly() before they draw a chart. They read `data`, which may be anything that JSON can hold. InputError if plotly is not
     installed, or the file cannot be written.
     """
     check_installed()
@@ -84,7 +84,7 @@ def write_html(
         body,
         f'<script type="application/json" id="data">{encoded}</script>',
         f'<script type="text/plain" id="plotly">{plotly}</script>',
-        f"<script>{texts['start.js']}\nstart(() => {{\n"
+        f"<script>{texts['start.js']}\nstart(async () => {{\n"
         + "\n".join(texts[name] for name in programs)
         + "\n});</script>",
         "</body></html>\n",

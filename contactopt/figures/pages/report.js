@@ -1,3 +1,4 @@
+await plotly();
 const data = JSON.parse(document.getElementById("data").textContent);
 const names = Object.keys(data.columns);
 const MARKS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "x", "star", "triangle-left", "triangle-right", "hexagon", "cross", "hexagram", "bowtie", "hourglass", "star-diamond"];
