@@ -14,22 +14,20 @@ BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 FORMATS = ("png", "svg", "pdf")
 DPI = 130
 SHARE = 0.08  # of the bodies' size that the largest displacement is drawn as
-# of the bodies' size by which magnified displacements may let bodies overlap that were apart
-OVERLAP = 0.01
+# a gap above this fraction of the largest displacement: bodies that were apart would seem to
+# overlap if magnified
+APART = 1e-3
 # quantile of the von Mises stress where the colours end: singular corners would take them all
 TOP = 0.998
 
 
 def magnification(size: float, displacement: float, gap: float) -> float:
-    """The factor by which displacements are drawn: a round number of at least 1, for bodies of a
-    size, their largest displacement and their largest gap [length]. A gap that closes is drawn as an
-    overlap of (factor - 1) times itself, so that large gaps allow small factors only.
+    """The factor by which displacements are drawn: a round number of at least 1, and 1 where bodies
+    are apart, for bodies of a size, their largest displacement and their largest gap [length].
     """
-    if displacement == 0:
+    if displacement == 0 or gap > APART * displacement:
         return 1.0
     target = SHARE * size / displacement
-    if gap > 0:
-        target = min(target, 1.0 + OVERLAP * size / gap)
     if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
         return 1.0
     power = 10.0 ** np.floor(np.log10(target))

@@ -105,9 +105,11 @@ class Painter {
     }
   }
 
-  end() {  // shows the picture; from here the context draws in pixels of the page
+  end([left, right, top, bottom]) {  // shows the picture within these limits; from here the context draws in pixels of the page
     this.context.setTransform(1, 0, 0, 1, 0, 0);
-    this.context.putImageData(this.image, 0, 0);
+    this.context.fillStyle = "#fff";
+    this.context.fillRect(0, 0, this.width, this.height);
+    this.context.putImageData(this.image, 0, 0, ...[left, top, right - left, bottom - top].map((value) => Math.round(value * this.dense)));
     this.context.setTransform(this.dense, 0, 0, this.dense, 0, 0);
   }
 

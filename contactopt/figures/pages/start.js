@@ -9,7 +9,9 @@ function element(name, text = "", attributes = {}) {
 }
 
 function bytes(text) {
-  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const letters = atob(text), made = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) made[i] = letters.charCodeAt(i);
+  return made;
 }
 
 function unpack(packed) {  // the numbers of an array, without its shape

@@ -227,7 +227,7 @@ function draw() {
   painter.begin(); aim();
   for (const item of bodies) if (item.shown) paintBody(item, body);
   for (const pair of pairs) paintContact(pair, contact);
-  painter.end();
+  painter.end(room());
   rulers();
   if (now.arrows) pairs.forEach(arrows);
   const [name, unit] = CONTACT[now.contact];
