@@ -67,7 +67,8 @@ def write_html(
 
     `body` is HTML with every name in it escaped, between the header with its title, plain text, and
     the programs: JavaScript files in contactopt/figures/pages, run in this order. They await
-    plotly() before they draw a chart. They read `data`, which may be anything that JSON can hold. InputError if plotly is not
+    plotly() before they draw a chart. They read `data`, which may be anything that JSON can hold.
+    InputError if plotly is not
     installed, or the file cannot be written.
     """
     check_installed()
