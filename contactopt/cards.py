@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+FORCES = {
+    ("mm", "MPa"): "N",
+    ("m", "Pa"): "N",
+    ("m", "kPa"): "kN",
+    ("m", "MPa"): "MN",
+    ("in", "psi"): "lbf",
+}
 
 
 def count(number: int, thing: str, things: str = "") -> str:
@@ -26,3 +34,9 @@ def card(title: str, rows: Mapping[str, object]) -> str:
         for name, value in rows.items()
     )
     return f"<table><caption>{html.escape(title)}</caption><tbody>{cells}</tbody></table>"
+
+
+def force_unit(units: Sequence[str]) -> str:
+    """The name of the unit of force that belongs to units of length and of stress."""
+    length, stress = units
+    return FORCES.get((length, stress), f"{stress} {length}^2")

@@ -10,19 +10,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from contactopt.cards import count
+from contactopt.cards import count, force_unit
 from contactopt.cli.test_set import problems
 from contactopt.errors import InputError
 from contactopt.methods.method import NATIVE
 from contactopt.readings.resultants import resultant_words
 
-FORCES = {
-    ("mm", "MPa"): "N",
-    ("m", "Pa"): "N",
-    ("m", "kPa"): "kN",
-    ("m", "MPa"): "MN",
-    ("in", "psi"): "lbf",
-}
 Command = Callable[[argparse.Namespace], int]
 
 
@@ -114,7 +107,7 @@ def _print_result(result: Any, out: str) -> None:
     by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
     print(f"method {s['method']}" + ("" if native else by))
     length, stress = result.scene.units
-    force = FORCES.get((length, stress), f"{stress} {length}^2")
+    force = force_unit((length, stress))
     approach = "" if s["approach"] is None else f"approach {s['approach']:.6g} {length}, "
     print(
         f"sum of normal forces {s['normal_force']:.6g} {force}, {approach}"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import force_unit
 from contactopt.figures.plots import contact_line, contact_place
 from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, make_axes
 from contactopt.files.writing import whole_file
@@ -113,5 +114,4 @@ def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
 def _units(path: PathResult) -> tuple[str, str]:
     """Names of the units of force and length."""
     length, stress = path.states[0].scene.units
-    newton = (length, stress) in (("mm", "MPa"), ("m", "Pa"))
-    return "N" if newton else f"{stress} {length}$^2$", length
+    return force_unit((length, stress)), length

@@ -71,9 +71,9 @@ def write_html(
     """Write a page that stands alone.
 
     `body` is HTML with every name in it escaped, between the header with its title, plain text, and
-    the programs: JavaScript files in contactopt/figures/pages, run in this order once `plotly` is
-    there, if they need it. They read `data`, which may be anything that JSON can hold. InputError
-    if plotly is not installed, or the file cannot be written.
+    the programs: JavaScript files in contactopt/figures/pages, run in this order. With `plotly`
+    they may await plotly() before they draw a chart. They read `data`, anything that JSON
+    can hold. InputError if plotly is not installed, or the file cannot be written.
     """
     packed = _plotly() if plotly else ""
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
@@ -86,7 +86,7 @@ def write_html(
         body,
         f'<script type="application/json" id="data">{encoded}</script>',
         f'<script type="text/plain" id="plotly">{packed}</script>',
-        f"<script>{texts['start.js']}\nstart(() => {{\n"
+        f"<script>{texts['start.js']}\nstart(async () => {{\n"
         + "\n".join(texts[name] for name in programs)
         + "\n});</script>",
         "</body></html>\n",

@@ -5,12 +5,14 @@ path, for the program in pages/view.js.
 from __future__ import annotations
 
 import csv
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from contactopt.cards import force_unit
 from contactopt.figures.html import packed, packed_short
 from contactopt.figures.output import SINGLE, STATES
 from contactopt.figures.pieces import (
@@ -64,13 +66,14 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         contacts.append({"name": name} | _contact(mesh, move, interface, path, own))
         first = own.stop
     return {
-        "units": summary["units"],
+        "units": [*summary["units"], force_unit(summary["units"])],
         "dim": len(axes),
         "axes": axes,
         "ring": summary["kind"] == "axisymmetric",
         "mirrors": mirrors,
         "box": box.tolist(),
         "near": near.tolist(),
+        "contact": _touching(pairs, box).tolist(),
         "scale": magnification(reach, largest, gap),
         "most_scale": 2.0 * magnification(reach, largest, 0.0),
         "top": highest_colour(stresses) if stresses else 1.0,
@@ -112,6 +115,21 @@ def _near_contact(contact: np.ndarray, box: np.ndarray) -> np.ndarray:
     if half <= 0 or half > float(np.ptp(box, axis=0).max()) / 4:
         return box
     centre = contact.mean(axis=0)
+    return np.stack([np.maximum(box[0], centre - half), np.minimum(box[1], centre + half)])
+
+
+def _touching(pairs: dict[str, Any], box: np.ndarray) -> np.ndarray:
+    """The box (2, 3) about the contacts that touch; about the largest pressure, where they reach
+    across half of all bodies.
+    """
+    points = np.concatenate([mesh.points for mesh in pairs.values()])
+    pressure = np.concatenate([mesh.point_data["contact_pressure"] for mesh in pairs.values()])
+    touching = points[pressure > 0] if np.any(pressure > 0) else points
+    size, half = float(np.ptp(box, axis=0).max()), 0.7 * float(np.ptp(touching, axis=0).max())
+    centre = (touching.min(axis=0) + touching.max(axis=0)) / 2
+    if half > size / 4:
+        centre, half = points[np.argmax(pressure)], size / 4
+    half = half or size / 20
     return np.stack([np.maximum(box[0], centre - half), np.minimum(box[1], centre + half)])
 
 
@@ -240,5 +258,12 @@ def _contact_states(path: dict[str, np.ndarray], own: slice) -> dict[str, np.nda
 def _history(file: Path) -> dict[str, list[float]]:
     with open(file, newline="") as table:
         rows = list(csv.DictReader(table))
-    keys = ("approach", "shift", "normal_force", "shear_force", "stick_nodes", "slip_nodes")
-    return {key: [float(row[key]) for row in rows] for key in keys}
+    return {key: found for key in rows[0] if (found := _numbers([row[key] for row in rows]))}
+
+
+def _numbers(texts: list[str]) -> list[float]:
+    """The numbers of a column; none where one of them is none or not finite."""
+    with suppress(ValueError):
+        values = [float(text) for text in texts]
+        return values if np.all(np.isfinite(values)) else []
+    return []

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import force_unit
 from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import check_installed, filled, write_html
@@ -61,7 +62,7 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
             f"'{folder}' is not the folder of a finished run ({how}); make one with: contactopt run"
             f" SCENE --out {folder}"
         ) from error
-    return write_html(file, title, body, data, ["view.js"])
+    return write_html(file, title, body, data, ["painter.js", "view.js"])
 
 
 def certificate_words(summary: dict[str, Any]) -> str:
@@ -116,17 +117,18 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
 
 def _summary_rows(summary: dict[str, Any]) -> dict[str, Any]:
     length, stress = summary["units"]
+    newton = force_unit((length, stress))
     rows = {
         "status": summary["status"],
         "unknowns of the bodies": summary["dofs"],
         "contacts": summary["contact_nodes"],
         "friction coefficient": f"{summary['mu']:g}",
         "method": f"{summary['method']}, {summary['outer_iterations']} iterations",
-        "sum of the normal forces": f"{summary['normal_force']:.5g} {stress} {length}^2",
+        "sum of the normal forces": f"{summary['normal_force']:.5g} {newton}",
         "largest pressure": f"{summary['max_pressure']:.5g} {stress}",
     }
     for name, force in resultant_words(summary).items():
-        rows[f"force on the upper body of {name}"] = f"{force} {stress} {length}^2"
+        rows[f"force on the upper body of {name}"] = f"{force} {newton}"
     for key, words in WORDS.items():
         if summary.get(key) is not None:
             rows[words] = f"{summary[key]:.5g} {length}"

@@ -27,8 +27,8 @@ contact i is
 which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a
 larger rho_i, because there a small error of the displacement is a large error of the force. The
 certificate is the largest of all e_i, of (|r_t| - mu r_n) / F, and of the relative errors |V_j' r +
-s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Where s_j is not zero F is at most F0 there: a body
-that flies away from all contacts, which makes L and F as large as one likes, balances nothing.
+s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Where s_j is not zero F is at most F0 there: a
+body that flies away from all contacts, which makes L and F as large as one likes, balances nothing.
 
 What a certificate of at most tol promises for Coulomb friction, at every contact:
 

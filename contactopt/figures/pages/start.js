@@ -9,7 +9,9 @@ function element(name, text = "", attributes = {}) {
 }
 
 function bytes(text) {
-  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const letters = atob(text), made = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) made[i] = letters.charCodeAt(i);
+  return made;
 }
 
 function unpack(packed) {  // the numbers of an array, without its shape
@@ -26,16 +28,17 @@ function plain(name) {  // as text in a chart: plotly reads tags and formulas in
   return String(name).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("$", "&#36;");
 }
 
+async function plotly() {  // unpacks the library of charts
+  const packed = bytes(document.getElementById("plotly").textContent);
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const script = document.createElement("script");
+  script.textContent = await new Response(stream).text();
+  document.head.append(script);
+}
+
 async function start(program) {
   try {
-    const packed = bytes(document.getElementById("plotly").textContent);
-    if (packed.length) {
-      const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-      const script = document.createElement("script");
-      script.textContent = await new Response(stream).text();
-      document.head.append(script);
-    }
-    program();
+    await program();
   } catch (fault) {
     const said = element("p", `This page could not be drawn: ${fault.message}. It needs a browser of 2023 or later.`, {id: "fault", role: "alert"});
     document.body.prepend(said);

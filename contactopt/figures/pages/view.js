@@ -1,5 +1,5 @@
 const data = JSON.parse(document.getElementById("data").textContent);
-const [LENGTH, STRESS] = data.units;
+const [LENGTH, STRESS, FORCE] = data.units;
 const flat = data.dim === 2;
 const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value.type ? unpack(value) : value]));
 const bodies = data.bodies.map((body) => ({...opened(body), values: opened(body.values), shown: true, corners: body.inside.shape[1]}));
@@ -9,8 +9,8 @@ const CONTACT = {
   gap: ["gap", LENGTH], slip: ["size of the slip", LENGTH],
 };
 const STATUS = ["open", "stick", "slip"];
-const now = {field: "von_mises", scale: data.scale, contact: "pressure", state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1};
-const view = document.getElementById("view");
+const now = {field: "von_mises", scale: data.scale, contact: "pressure", state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38};
+const view = document.getElementById("view"), config = {responsive: true, displaylogo: false};
 const control = (name) => document.getElementById(name);
 
 function label(name) {
@@ -57,17 +57,6 @@ function placed(item) {  // places of the nodes of all images shown, one image a
 
 const whole = (item, name) => (now.whole ? item[name] : Int32Array.from([...item[name], ...item[`cut_${name}`]]));  // with what lies in the planes of symmetry
 
-function lifted(xyz, cells) {  // places a little outside the surface, so that lines on it are not hidden
-  const size = Math.max(...data.box[0].map((low, c) => data.box[1][c] - low)), up = xyz.map((x) => new Float64Array(x.length));
-  if (flat) return [xyz[0], xyz[1], xyz[2].map(() => LIFT * size)];
-  for (let i = 0; i < cells.length; i += 3) {
-    const [a, b, d] = [cells[i], cells[i + 1], cells[i + 2]], e = xyz.map((x) => x[b] - x[a]), f = xyz.map((x) => x[d] - x[a]);
-    const normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]], length = Math.hypot(...normal) || 1;
-    for (const node of [a, b, d]) for (let c = 0; c < 3; c++) up[c][node] += normal[c] / length;
-  }
-  return xyz.map((x, c) => x.map((value, i) => value + (LIFT * size * up[c][i]) / (Math.hypot(up[0][i], up[1][i], up[2][i]) || 1)));
-}
-
 const repeated = (values, name = "") => (shownImages().length === 1 ? values : Float32Array.from(shownImages().flatMap((image) => [...values].map((value) => sign(name, image) * value))));
 const numbered = (cells, length) => (shownImages().length === 1 ? cells : Int32Array.from(shownImages().flatMap((_, k) => [...cells].map((node) => node + k * length))));
 
@@ -83,7 +72,7 @@ const TETRAHEDRA = [[0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [3, 4, 6, 7], [1, 
 
 function shaped(item, quantity) {  // what is drawn of an item: places, values, triangles, the node behind each place, and lines
   const xyz = placed(item), length = count(item), cells = facing(whole(item, "cells"), length);
-  const made = {xyz, values: repeated(...quantity), cells, from: null, lines: (pairs) => lines(lifted(xyz, cells), numbered(pairs, length))};
+  const made = {xyz, values: repeated(...quantity), cells, from: null, lines: (pairs) => numbered(pairs, length)};
   return now.cut === "" ? made : cut(item, made, length);
 }
 
@@ -132,18 +121,9 @@ function cut(item, whole, length) {  // what lies on one side of a plane, closed
       const [a, b] = [numbers[i], numbers[i + 1]], one = height(a) <= 0, other = height(b) <= 0;
       if (one && other) left.push(a, b); else if (one || other) left.push(one ? a : b, split(skin, a, b));
     }
-    return lines(lifted(xyz, cells), left);
+    return left;
   };
   return {xyz, values: found, cells, from: [...from, ...origins], lines: drawn};
-}
-
-const corners = (cells, offset) => Int32Array.from({length: cells.length / 3}, (_, i) => cells[3 * i + offset]);
-
-function lines(xyz, pairs) {
-  const made = [[], [], []];
-  for (let i = 0; i < pairs.length; i += 2)
-    for (let c = 0; c < 3; c++) made[c].push(xyz[c][pairs[i]], xyz[c][pairs[i + 1]], null);
-  return made;
 }
 
 function span(arrays) {
@@ -152,134 +132,114 @@ function span(arrays) {
   return low < high ? [low, high] : [low - 0.5, high + 0.5];
 }
 
-function bodyTraces() {
-  const shown = bodies.filter((body) => body.shown);
-  const [low, high] = shown.length ? span(shown.map((body) => values(body, now.field, true))) : [0, 1];
-  const top = now.field === "von_mises" ? Math.min(high, data.top) : high;
-  return shown.flatMap((body, index) => {
-    const shape = shaped(body, [values(body, now.field), now.field]), [x, y, z] = shape.xyz;
-    const made = [{
-      type: "mesh3d", name: plain(body.name), x, y, z, i: corners(shape.cells, 0), j: corners(shape.cells, 1), k: corners(shape.cells, 2),
-      intensity: shape.values, colorscale: "Viridis", cmin: now.field === "von_mises" ? 0 : low, cmax: top,
-      showscale: index === 0, opacity: now.clear ? 0.3 : 1, hoverinfo: "none", meta: {body: bodies.indexOf(body), from: shape.from},
-      lighting: flat ? {ambient: 1, diffuse: 0, specular: 0} : {ambient: 0.75, diffuse: 0.4, specular: 0},
-      colorbar: {orientation: "h", y: -0.02, yanchor: "top", thickness: 12, len: 0.9, title: {text: plain(label(now.field) + (data.moving && now.field.startsWith("stress_") ? ", last state" : "")), side: "top"}},
-    }];
-    for (const [name, width, shade] of [["lines", 1, "rgba(0,0,0,0.35)"], ["edges", 2, "rgba(0,0,0,0.8)"]]) {
-      if (!now[name]) continue;
-      const [ex, ey, ez] = shape.lines(name === "edges" ? whole(body, name) : body[name]);
-      made.push({type: "scatter3d", mode: "lines", x: ex, y: ey, z: ez, line: {color: shade, width}, hoverinfo: "skip", showlegend: false});
-    }
-    return made;
-  });
+const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true)};
+const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
+const BIN = 16;  // pixels, the side of a square of the picture that shows at most one arrow
+const painter = new Painter(view);
+let owners = [];  // [first number, item, node behind the corners of its triangles or its dots]
+
+function bodyColours() {
+  const shown = bodies.filter((body) => body.shown), [low, high] = shown.length ? span(shown.map((body) => values(body, now.field, true))) : [0, 1], mises = now.field === "von_mises";
+  return {table: TABLES.bodies, low: mises ? 0 : low, high: mises ? Math.min(high, data.top) : high};
 }
 
-function contactTraces() {
-  const shown = contacts.filter((pair) => pair.shown);
-  if (!shown.length) return [];
-  const [low, high] = now.contact === "status" ? [-0.5, 2.5] : span(shown.map((pair) => pair.states[now.contact]));
-  const scale = now.contact === "status"
-    ? [[0, COLOURS.grey], [1 / 3, COLOURS.grey], [1 / 3, COLOURS.blue], [2 / 3, COLOURS.blue], [2 / 3, COLOURS.orange], [1, COLOURS.orange]] : "Cividis";
-  const [name, unit] = CONTACT[now.contact];
-  const bar = {orientation: "h", y: 1.0, yanchor: "bottom", thickness: 12, len: 0.9, title: {text: plain(`contact: ${name}` + (unit ? ` [${unit}]` : "")), side: "top"}};
-  if (now.contact === "status") Object.assign(bar, {tickvals: [0, 1, 2], ticktext: STATUS});
-  return shown.flatMap((pair, index) => {
-    const shape = shaped(pair, [state(pair, now.contact)]), [x, y, z] = shape.xyz, made = [], meta = {contact: contacts.indexOf(pair), from: shape.from};
-    const look = {colorscale: scale, cmin: low, cmax: high, showscale: index === 0, colorbar: bar};
-    if (pair.cells.length) {
-      made.push({
-        type: "mesh3d", name: plain(pair.name), x, y, z, i: corners(shape.cells, 0), j: corners(shape.cells, 1), k: corners(shape.cells, 2), intensity: shape.values, ...look,
-        hoverinfo: "none", meta, lighting: {ambient: 1, diffuse: 0, specular: 0},
-      });
-    } else {
-      made.push({
-        type: "scatter3d", mode: "markers", name: plain(pair.name), x, y, z, hoverinfo: "none", meta,
-        marker: {size: 4, color: shape.values, ...look, line: {width: 0}},
-      });
-    }
-    if (now.arrows) made.push(...arrows(pair));
-    return made;
-  });
+function contactColours() {
+  if (now.contact === "status") return {table: TABLES.status, low: -0.5, high: 2.5, names: STATUS};
+  const [low, high] = span(contacts.filter((pair) => pair.shown).map((pair) => pair.states[now.contact]));
+  return {table: TABLES.contact, low, high};
 }
 
-function arrows(pair) {
-  const xyz = placed(pair), length = count(pair), force = state(pair, "vector"), status = state(pair, "status"), every = pair.states.vector, all = shownImages();
-  const touching = [...status.keys()].filter((i) => status[i] > 0), step = Math.ceil((touching.length * all.length) / (flat ? 30 : 400));
+function own(item, meta, cells) {  // numbers for the triangles of an item, or for its dots
+  const last = owners.at(-1), first = last ? last.first + last.length : 0;
+  owners.push({first, length: cells ? cells.length / 3 : meta.places[0].length, cells, ...meta});
+  return first;
+}
+
+function paintBody(body, colours) {
+  const shape = shaped(body, [values(body, now.field), now.field]), drawn = [["lines", 90, 1], ["edges", 20, 1.6]].filter(([name]) => now[name]).map(([name, ...look]) => [shape.lines(name === "edges" ? whole(body, name) : body[name]), ...look]);
+  const places = painter.places(shape.xyz), first = own(body, {body: bodies.indexOf(body), from: shape.from, places}, shape.cells);
+  painter.triangles(places, shape.cells, shape.values, {...colours, lit: !flat, sheer: now.clear, first});
+  for (const [pairs, ...look] of drawn) painter.lines(places, pairs, ...look);
+}
+
+function paintContact(pair, colours) {
+  const shape = shaped(pair, [state(pair, now.contact)]), places = painter.places(shape.xyz), meta = {contact: contacts.indexOf(pair), from: shape.from, places};
+  if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: 1, first: own(pair, meta, shape.cells)});
+  else painter.dots(places, shape.values, 3, {...colours, first: own(pair, meta)});
+}
+
+function arrows(pair) {  // of each square of the picture the largest force
+  const xyz = placed(pair), length = count(pair), force = state(pair, "vector"), status = state(pair, "status"), every = pair.states.vector, best = new Map();
   let largest = 1e-300;
   for (let i = 0; i < every.length; i += 3) largest = Math.max(largest, Math.hypot(every[i], every[i + 1], every[i + 2]));
-  const arrowLength = 0.15 * Math.max(...now.box[0].map((low, c) => now.box[1][c] - low));
-  const made = [[], [], []], tips = [[], [], []];
-  all.forEach((image, k) => {
-    for (let n = 0; n < touching.length; n += step) {
-      const i = touching[n];
-      if (now.cut !== "" && knifeAt().beyond(xyz[Number(now.cut)][k * length + i]) > 0) continue;
-      for (let c = 0; c < 3; c++) {
-        const turn = image.some(([axis]) => axis === c) ? -1 : 1, foot = xyz[c][k * length + i], tip = foot + (turn * arrowLength * force[3 * i + c]) / largest;
-        made[c].push(foot, tip, null);
-        tips[c].push(tip);
-      }
+  shownImages().forEach((image, k) => {
+    for (let i = 0; i < length; i++) {
+      const n = k * length + i, foot = painter.place(xyz[0][n], xyz[1][n], xyz[2][n]).map((value) => value / painter.dense), size = Math.hypot(...force.subarray(3 * i, 3 * i + 3));
+      if (!(status[i] > 0) || (now.cut !== "" && knifeAt().beyond(xyz[Number(now.cut)][n]) > 0)) continue;
+      const key = `${Math.floor(foot[0] / BIN)},${Math.floor(foot[1] / BIN)}`;
+      if (!(best.get(key)?.size >= size)) best.set(key, {size, foot, way: [0, 1, 2].map((c) => (image.some(([axis]) => axis === c) ? -1 : 1) * force[3 * i + c])});
     }
   });
-  const common = {hoverinfo: "skip", showlegend: false, type: "scatter3d"};
-  return [
-    {...common, mode: "lines", x: made[0], y: made[1], z: made[2], line: {color: "#000", width: 3}},
-    {...common, mode: "markers", x: tips[0], y: tips[1], z: tips[2], marker: {size: 2.5, color: "#000"}},
-  ];
+  const [right, up] = painter.axes, longest = (0.13 * Math.min(view.clientWidth, view.clientHeight)) / largest, along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  for (const {size, foot, way} of best.values()) if (size > 0.01 * largest) painter.arrow(foot, [longest * along(way, right), -longest * along(way, up)]);
 }
 
-function probeTrace() {
-  if (!now.probe) return [];
-  const item = now.probe.body === undefined ? contacts[now.probe.contact] : bodies[now.probe.body];
-  const [x, y, z] = placed(item), i = now.probe.node;
-  return [{type: "scatter3d", mode: "markers", x: [x[i]], y: [y[i]], z: [z[i]], hoverinfo: "skip", showlegend: false,
-    marker: {size: 8, color: "rgba(0,0,0,0)", line: {color: "#d00", width: 4}, symbol: "circle-open"}}];
+function room() {  // left, right, top and bottom of the picture between the colour bars and the labels [pixels of the page]
+  return [flat ? 64 : 20, view.clientWidth - 20, contacts.length ? 62 : 20, view.clientHeight - (bodies.length ? 56 : 8) - (flat ? 34 : 14)];
 }
 
-const axis = (name) => ({title: {text: plain(`${name} [${LENGTH}]`)}, showbackground: false, zeroline: false, showspikes: false, nticks: flat ? 5 : 8, ...(flat ? {tickangle: 0} : {})});
-const HOME = flat ? {eye: {x: 0, y: -0.07, z: 2.2}, up: {x: 0, y: 1, z: 0}, center: {x: 0, y: -0.07, z: 0}} : {eye: {x: -1.1, y: -1.5, z: 0.7}, up: {x: 0, y: 0, z: 1}, center: {x: 0, y: 0, z: 0}};
-const MARGIN = 0.05;  // of the size of the box, about it
-const FRONT = flat ? 0.54 : 0.42;
-const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
-const LIFT = 0.002;  // of the size of the box, by which lines stand off the surface
-
-function axesOfView() {  // unit vectors to the right and up in the first picture of solids
-  const {x, y, z} = HOME.eye, size = Math.hypot(x, y, z), flatSize = Math.hypot(x, y);
-  return [[-y / flatSize, x / flatSize, 0], [(-x * z) / flatSize / size, (-y * z) / flatSize / size, flatSize / size]];
+function aim() {  // turns the model, and makes the box fit
+  const {angle, height} = now, [c, s, h, v] = [Math.cos(angle), Math.sin(angle), Math.cos(height), Math.sin(height)];
+  const axes = flat ? [[1, 0, 0], [0, 1, 0], [0, 0, 1]] : [[-s, c, 0], [-c * v, -s * v, h], [c * h, s * h, v]];
+  const [low, high] = now.box, [left, right, top, bottom] = room();
+  const [wide, tall] = axes.map((way) => low.reduce((sum, value, i) => sum + Math.abs(way[i]) * (high[i] - value), 0));
+  const scale = (0.94 * now.zoom) / Math.max(wide / (right - left), tall / (bottom - top), 1e-300);
+  painter.look(axes, low.map((value, i) => (value + high[i]) / 2 + now.shift[i]), scale, [(left + right) / 2, (top + bottom) / 2]);
 }
 
-function boxed() {  // ranges of the axes, and the size of the picture: in a parallel projection that of the aspect ratio
-  const [low, high] = now.box, size = Math.max(...low.map((value, c) => high[c] - value)), rim = MARGIN * size, made = {"scene.aspectmode": "manual"};
-  // One unit of the aspect ratio is about FRONT of the height between the colour bars.
-  const height = view.clientHeight - 120, share = low.map((value, c) => (high[c] - value) / size + 2 * MARGIN);
-  const room = flat ? [0.72, 0.78] : [0.75, 0.78], [right, up] = flat ? [[1, 0, 0], [0, 1, 0]] : axesOfView();
-  const [across, tallest] = [right, up].map((way) => share.reduce((sum, value, c) => sum + Math.abs(way[c]) * value, 0));
-  const tall = Math.min(room[1] / tallest, (room[0] * view.clientWidth) / height / across) / FRONT;
-  ["x", "y", "z"].forEach((name, c) => {
-    const thin = flat && c === 2, a = thin ? -size / 10 : low[c] - rim, b = thin ? size / 10 : high[c] + rim;
-    made[`scene.${name}axis.range`] = [a, b];
-    made[`scene.aspectratio.${name}`] = (now.zoom * tall * (b - a)) / size;
-  });
-  return made;
-}
-const layout = {
-  margin: {l: 0, r: 0, t: 50, b: 70}, showlegend: false, uirevision: "kept",
-  scene: {
-    dragmode: flat ? "pan" : "orbit", xaxis: axis(data.axes[0]), yaxis: axis(data.axes[1]),
-    zaxis: flat ? {visible: false} : axis(data.axes[2]),
-    camera: {...HOME, projection: {type: "orthographic"}},
-  },
-};
-const config = {responsive: true, displaylogo: false};
-
-function deepen() {  // plotly's depth buffer reaches 1000 units either way; a picture of a few units needs a finer one to tell lines from surfaces
-  const plot = view._fullLayout?.scene?._scene?.glplot, {x, y, z} = view.layout.scene.aspectratio || {x: 1, y: 1, z: 1};
-  if (!plot || !plot.zFar) return;
-  plot.zFar = 8 * Math.max(x, y, z);
-  plot.redraw?.();
+function rulers() {  // coordinates of the mesh: along the rim of a plane picture, in space along edges of the box
+  const [left, right, top, bottom] = room(), name = (c) => `${data.axes[c]} [${LENGTH}]`, pixel = painter.scale / painter.dense, centre = painter.centre;
+  if (flat) {
+    const middle = [(left + right) / 2, (top + bottom) / 2], ends = [[left, right].map((x) => centre[0] + (x - middle[0]) / pixel), [bottom, top].map((y) => centre[1] - (y - middle[1]) / pixel)];
+    painter.stroke([[left, top], [left, bottom], [right, bottom]], "#888", 1);
+    for (const value of ticks(...ends[0], right - left > 500 ? 8 : 4)) { const x = middle[0] + (value - centre[0]) * pixel; painter.stroke([[x, bottom], [x, bottom + 4]], "#888", 1); painter.text(short(value), x, bottom + 12); }
+    for (const value of ticks(...ends[1], 6)) { const y = middle[1] - (value - centre[1]) * pixel; painter.stroke([[left - 4, y], [left, y]], "#888", 1); painter.text(short(value), left - 7, y, "right"); }
+    painter.text(name(0), middle[0], bottom + 28); painter.text(name(1), left - 50, top - 8, "left");
+    return;
+  }
+  const [low, high] = now.box, at = (...p) => painter.place(...p).slice(0, 2).map((value) => value / painter.dense);
+  for (let c = 0; c < 3; c++) {  // the lowest one of its four edges, and of upright ones the leftmost
+    if (!(high[c] > low[c])) continue;
+    const others = [0, 1, 2].filter((axis) => axis !== c), edges = [0, 1, 2, 3].map((corner) => { const p = [0, 0, 0]; others.forEach((axis, bit) => { p[axis] = [low, high][(corner >> bit) & 1][axis]; }); return p; });
+    const along = (p, value) => at(...p.map((x, axis) => (axis === c ? value : x))), middle = (low[c] + high[c]) / 2, rank = (p) => { const [x, y] = along(p, middle); return c === 2 ? -x : y; };
+    const edge = edges.reduce((a, b) => (rank(b) > rank(a) ? b : a)), [start, end] = [along(edge, low[c]), along(edge, high[c])], [mx, my] = along(edge, middle);
+    const side = c === 2 || mx < painter.middle[0] / painter.dense ? -1 : 1, align = side < 0 ? "right" : "left", long = Math.hypot(end[0] - start[0], end[1] - start[1]);
+    if (long < 30) continue;
+    painter.stroke([start, end], "#888", 1);
+    for (const value of ticks(low[c], high[c], Math.max(1, Math.min(6, long / 45)))) { const [x, y] = along(edge, value); painter.stroke([[x, y], [x + 4 * side, y + (c === 2 ? 0 : 3)]], "#888", 1); painter.text(short(value), x + 7 * side, y + (c === 2 ? 0 : 8), align); }
+    painter.text(name(c), mx + (c === 2 ? 42 : 36) * side, my + (c === 2 ? -16 : 26), "center");
+  }
 }
 
 function draw() {
-  Plotly.react(view, [...bodyTraces(), ...contactTraces(), ...probeTrace()], layout, config);
+  const body = bodyColours(), contact = contactColours(), pairs = contacts.filter((pair) => pair.shown);
+  owners = [];
+  painter.begin(); aim();
+  for (const item of bodies) if (item.shown) paintBody(item, body);
+  for (const pair of pairs) paintContact(pair, contact);
+  painter.end(room());
+  rulers();
+  if (now.arrows) pairs.forEach(arrows);
+  const [name, unit] = CONTACT[now.contact];
+  if (pairs.length) painter.bar(`contact: ${name}` + (unit ? ` [${unit}]` : ""), contact, 20);
+  if (bodies.length) {
+    painter.bar(label(now.field) + (data.moving && now.field.startsWith("stress_") ? ", last state" : ""), body, view.clientHeight - 32);
+    painter.text(now.scale === 1 ? "displacements to scale" : `displacements drawn x ${number(now.scale)}`, view.clientWidth - 8, room()[2] - 8, "right");
+  }
+  if (now.probe) {
+    const item = now.probe.body === undefined ? contacts[now.probe.contact] : bodies[now.probe.body], xyz = placed(item), [x, y] = painter.place(...xyz.map((own) => own[now.probe.node])).map((value) => value / painter.dense);
+    painter.stroke(Array.from({length: 33}, (_, i) => [x + 7 * Math.cos((i * Math.PI) / 16), y + 7 * Math.sin((i * Math.PI) / 16)]), "#d00", 2.5);
+  }
 }
 
 const rounded = (length) => (Math.abs(length) < ROUNDING * Math.max(...data.box[0].map((low, c) => data.box[1][c] - low)) ? 0 : length);
@@ -307,26 +267,68 @@ function probe(place) {
   }
 }
 
+function pan(x, y) {  // by so many pixels of the page
+  const [right, up] = painter.axes, pixel = painter.dense / painter.scale;
+  now.shift = now.shift.map((value, c) => value + (-x * right[c] + y * up[c]) * pixel);
+}
+
 function turn(about, up, closer) {
-  const camera = structuredClone(view.layout.scene.camera), {x, y, z} = camera.eye, distance = Math.hypot(x, y, z) * closer;
-  if (flat) {
-    const step = 0.1, centre = camera.center || {x: 0, y: 0, z: 0};
-    camera.center = {x: centre.x - about * step, y: centre.y + up * step, z: centre.z};
-    camera.eye = {x: camera.center.x, y: camera.center.y, z};
-  } else {
-    const angle = Math.atan2(y, x) + (about * Math.PI) / 12;
-    const height = Math.max(-1.5, Math.min(1.5, Math.asin(z / Math.hypot(x, y, z)) + (up * Math.PI) / 12));
-    camera.eye = {x: distance * Math.cos(height) * Math.cos(angle), y: distance * Math.cos(height) * Math.sin(angle), z: distance * Math.sin(height)};
-  }
+  if (flat) pan(-40 * about, 40 * up);
+  else { now.angle += (about * Math.PI) / 12; now.height = Math.max(-1.5, Math.min(1.5, now.height + (up * Math.PI) / 12)); }
   now.zoom /= closer;
-  Plotly.relayout(view, {"scene.camera": camera, ...boxed()});
+  draw();
 }
 
 function show(box) {
-  now.box = box;
-  now.zoom = 1;
+  Object.assign(now, {box, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38});
   draw();
-  Plotly.relayout(view, {"scene.camera": {...HOME, projection: {type: "orthographic"}}, ...boxed()});
+}
+
+function pick(x, y) {  // the node at a place of the picture [pixels of the page]
+  const column = Math.floor(x * painter.dense), row = Math.floor(y * painter.dense), reach = Math.ceil(4 * painter.dense);
+  let best = null;
+  for (let b = -reach; b <= reach; b++) for (let a = -reach; a <= reach; a++) {
+    if (row + b < 0 || row + b >= painter.height || column + a < 0 || column + a >= painter.width) continue;
+    const number = painter.owner[(row + b) * painter.width + column + a], far = Math.hypot(a, b);
+    if (number >= 0 && !(best?.far <= far)) best = {number, far};
+  }
+  if (!best) return null;
+  const {first, cells, from, places, body, contact} = owners.findLast((one) => one.first <= best.number), k = best.number - first, away = (i) => Math.hypot(places[0][i] - column, places[1][i] - row);
+  const corner = cells ? [...cells.slice(3 * k, 3 * k + 3)].reduce((a, b) => (away(b) < away(a) ? b : a)) : k, item = body === undefined ? contacts[contact] : bodies[body];
+  return {body, contact, node: (from ? from[corner] : corner) % count(item)};
+}
+
+function listen() {  // to mouse, pen and fingers
+  const fingers = new Map();
+  let moved = 0;
+  view.addEventListener("pointerdown", (event) => { view.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); moved = 0; });
+  view.addEventListener("pointermove", (event) => {
+    const before = fingers.get(event.pointerId);
+    if (!before) return;
+    const x = event.clientX - before.clientX, y = event.clientY - before.clientY, other = [...fingers.values()].find((one) => one.pointerId !== event.pointerId);
+    moved += Math.hypot(x, y);
+    fingers.set(event.pointerId, event);
+    if (other) now.zoom *= Math.hypot(event.clientX - other.clientX, event.clientY - other.clientY) / (Math.hypot(before.clientX - other.clientX, before.clientY - other.clientY) || 1);
+    if (flat || other || event.shiftKey || event.buttons === 2) pan(other ? x / 2 : x, other ? y / 2 : y);
+    else { now.angle -= x / 150; now.height = Math.max(-1.5, Math.min(1.5, now.height + y / 150)); }
+    requestDraw();
+  });
+  for (const name of ["pointerup", "pointercancel"]) view.addEventListener(name, (event) => {
+    if (fingers.delete(event.pointerId) && name === "pointerup" && moved < 4) { const found = pick(event.offsetX, event.offsetY); if (found) { probe(found); draw(); } }
+  });
+  view.addEventListener("contextmenu", (event) => event.preventDefault());
+  view.addEventListener("wheel", (event) => {  // towards the place of the pointer
+    const [x, y] = [event.offsetX - painter.middle[0] / painter.dense, event.offsetY - painter.middle[1] / painter.dense], factor = Math.exp(-event.deltaY / 600);
+    pan(x * (1 / factor - 1), y * (1 / factor - 1)); now.zoom *= factor;
+    event.preventDefault(); requestDraw();
+  }, {passive: false});
+}
+
+let asked = false;
+function requestDraw() {
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(() => { asked = false; draw(); });
 }
 
 function drawContact() {
@@ -356,20 +358,28 @@ function drawContact() {
   ], {...common, xaxis: {title: {text: plain(`place on the surface [${LENGTH}]`)}}, yaxis: {title: {text: plain(`[${STRESS}]`)}}}, config);
 }
 
-function drawPath() {
-  if (!data.history) return;
-  const h = data.history, i = now.state;
-  const sheared = Math.max(...h.shift) - Math.min(...h.shift) > 1e-6 * (Math.max(...h.approach) - Math.min(...h.approach));
-  const [a, b] = sheared ? ["shift", "shear_force"] : ["approach", "normal_force"];
-  Plotly.react(control("path-chart"), [
-    {type: "scatter", mode: "lines+markers", name: "states", x: h[a], y: h[b], line: {color: COLOURS.blue}, hovertemplate: "state %{pointNumber}<br>%{x:.4g}, %{y:.4g}<extra></extra>"},
-    {type: "scatter", mode: "markers", name: "this state", x: [h[a][i]], y: [h[b][i]], marker: {size: 13, color: COLOURS.orange}, hoverinfo: "skip"},
-  ], {margin: {l: 60, r: 15, t: 30, b: 50}, showlegend: false, uirevision: "kept",
-    xaxis: {title: {text: plain(`${a} [${LENGTH}]`)}}, yaxis: {title: {text: plain(`${b.replace("_", " ")} [${STRESS} ${LENGTH}^2]`)}}}, config);
-  control("state-words").textContent = `state ${i + 1} of ${data.states}: ${h.stick_nodes[i]} contacts stick, ${h.slip_nodes[i]} slip`;
+function columnLabel(name) {
+  const unit = {approach: LENGTH, shift: LENGTH, contact_half_width: LENGTH, stick_half_width: LENGTH, normal_force: FORCE, shear_force: FORCE}[name] ?? (/energy$|work$/.test(name) ? `${FORCE} ${LENGTH}` : name === "seconds" ? "s" : "");
+  return name.replaceAll("_", " ") + (unit && !name.includes("[") ? ` [${unit}]` : "");
 }
 
-function everything() { draw(); drawContact(); drawPath(); }
+function drawPath() {
+  if (!data.history) return;
+  const h = data.history, i = now.state, [a, b] = [control("across").value, control("upward").value], steps = h[b].map((_, k) => k + 1), x = a === "state" ? steps : h[a];
+  Plotly.react(control("path-chart"), [
+    {type: "scatter", mode: "lines+markers", name: "states", x, y: h[b], line: {color: COLOURS.blue}, hovertemplate: "state %{pointNumber}<br>%{x:.4g}, %{y:.4g}<extra></extra>"},
+    {type: "scatter", mode: "markers", name: "this state", x: [x[i]], y: [h[b][i]], marker: {size: 13, color: COLOURS.orange}, hoverinfo: "skip"},
+  ], {margin: {l: 60, r: 15, t: 30, b: 50}, showlegend: false,
+    xaxis: {title: {text: plain(columnLabel(a))}}, yaxis: {title: {text: plain(columnLabel(b))}}}, config);
+}
+
+function stateWords() {
+  if (!data.history) return;
+  const h = data.history, i = now.state, facts = [["stick_nodes", "contacts stick"], ["slip_nodes", "slip"]].filter(([name]) => h[name]).map(([name, words]) => `${h[name][i]} ${words}`).join(", ");
+  control("state-words").textContent = `state ${i + 1} of ${data.states}` + (facts ? `: ${facts}` : "");
+}
+
+function everything() { draw(); if (window.Plotly) { drawContact(); drawPath(); } }
 
 function choices(id, items, chosen, change) {
   const box = control(id);
@@ -409,15 +419,18 @@ const times = () => { control("scale-words").textContent = `displacements x ${nu
 slider.addEventListener("input", () => { now.scale = Number(slider.value); times(); draw(); });
 times();
 if (data.history) {
+  const columns = Object.keys(data.history), h = data.history, moves = (name) => h[name] && Math.max(...h[name]) - Math.min(...h[name]) > 1e-6 * (Math.max(...(h.approach || [1])) - Math.min(...(h.approach || [0])));
+  const [across, upward] = moves("shift") ? ["shift", "shear_force"] : h.approach && h.normal_force ? ["approach", "normal_force"] : ["state", columns[0]];
+  for (const [id, chosen] of [["across", across], ["upward", upward]]) choices(id, [...(id === "across" ? [["state", "state"]] : []), ...columns.map((name) => [name, columnLabel(name)])], chosen, () => {});
   const steps = control("state");
   steps.max = data.states - 1; steps.value = now.state;
-  steps.addEventListener("input", () => { now.state = Number(steps.value); everything(); if (now.probe) probe(now.probe); });
+  steps.addEventListener("input", () => { now.state = Number(steps.value); stateWords(); everything(); if (now.probe) probe(now.probe); });
 } else control("path").hidden = true;
 if (!bodies.length) control("body-controls").hidden = true;
 for (const [id, ...move] of [["left", -1, 0, 1], ["right", 1, 0, 1], ["up", 0, 1, 1], ["down", 0, -1, 1], ["closer", 0, 0, 0.8], ["farther", 0, 0, 1.25]])
   control(id).addEventListener("click", () => turn(...move));
 control("home").addEventListener("click", () => show(data.box));
-control("near").addEventListener("click", () => show(data.near));
+control("near").addEventListener("click", () => show(data.contact));
 const KEYS = {ArrowLeft: [-1, 0, 1], ArrowRight: [1, 0, 1], ArrowUp: [0, 1, 1], ArrowDown: [0, -1, 1], "+": [0, 0, 0.8], "=": [0, 0, 0.8], "-": [0, 0, 1.25]};
 view.addEventListener("keydown", (event) => { if (KEYS[event.key]) { turn(...KEYS[event.key]); event.preventDefault(); } });
 control("largest").addEventListener("click", () => {
@@ -432,16 +445,15 @@ control("peak").addEventListener("click", () => {
   if (best) probe({contact: best.contact, node: best.node});
   draw();
 });
-everything();
+listen();
+stateWords();
 show(now.box);
-view.on("plotly_relayout", deepen);
-deepen();
-view.on("plotly_click", ({points: [point]}) => {
-  if (!point.data.meta) return;
-  const {from, ...place} = point.data.meta, item = place.body === undefined ? contacts[place.contact] : bodies[place.body];
-  probe({...place, node: (from ? from[point.pointNumber] : point.pointNumber) % count(item)});
-  draw();
-});
+performance.mark("drawn");
+new ResizeObserver(requestDraw).observe(view);
+await new Promise((then) => setTimeout(then, 30));  // the picture is on the screen before the charts are made
+await plotly();
+drawContact();
+drawPath();
 control("contact-chart").on("plotly_click", ({points: [point]}) => {
   const {contact, order} = point.data.meta;
   probe({contact, node: order ? order[point.pointNumber] : point.pointNumber});

@@ -1,0 +1,153 @@
+// A picture of triangles, lines and dots in a canvas, with a depth buffer of its own. It asks no graphics card, so that every browser shows the same.
+const PALETTES = {
+  viridis: ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"],
+  cividis: ["00224e", "123570", "3b496c", "575d6d", "707173", "8a8678", "a59c74", "c3b369", "e1cc55", "fee838"],
+};
+
+function palette(colours, bands = false) {  // 256 colours as bytes, between the given ones or in bands
+  const known = colours.map((text) => [0, 2, 4].map((at) => parseInt(text.slice(at, at + 2), 16)));
+  return Uint8Array.from({length: 768}, (_, i) => {
+    const place = (Math.floor(i / 3) / 255) * (known.length - 1), c = i % 3, first = Math.min(Math.floor(place), known.length - 2);
+    return bands ? known[Math.min(known.length - 1, Math.floor((Math.floor(i / 3) / 256) * known.length))][c] : known[first][c] + (place - first) * (known[first + 1][c] - known[first][c]);
+  });
+}
+
+class Painter {
+  constructor(canvas) { this.canvas = canvas; this.context = canvas.getContext("2d", {willReadFrequently: true}); }
+
+  begin() {  // an empty picture, as large as the canvas is on the screen
+    const dense = Math.min(window.devicePixelRatio || 1, 2), width = Math.max(1, Math.round(this.canvas.clientWidth * dense)), height = Math.max(1, Math.round(this.canvas.clientHeight * dense));
+    if (!this.image || width !== this.width || height !== this.height) {
+      Object.assign(this, {width, height, depth: new Float32Array(width * height), owner: new Int32Array(width * height), image: this.context.createImageData(width, height)});
+      this.pixels = new Uint32Array(this.image.data.buffer);
+      Object.assign(this.canvas, {width, height});
+    }
+    this.dense = dense;
+    this.depth.fill(-Infinity); this.owner.fill(-1); this.pixels.fill(0xffffffff);
+  }
+
+  look(axes, centre, scale, middle) {  // unit vectors to the right, up and to the eye; the point in the middle [pixels of the page]
+    Object.assign(this, {axes, centre, scale: scale * this.dense, middle: middle.map((value) => value * this.dense)});
+  }
+
+  place(x, y, z) {  // in the picture, and its distance towards the eye [pixels]
+    const [right, up, eye] = this.axes, a = (x - this.centre[0]) * this.scale, b = (y - this.centre[1]) * this.scale, c = (z - this.centre[2]) * this.scale;
+    return [this.middle[0] + right[0] * a + right[1] * b + right[2] * c, this.middle[1] - up[0] * a - up[1] * b - up[2] * c, eye[0] * a + eye[1] * b + eye[2] * c];
+  }
+
+  places(xyz) {
+    const made = [0, 1, 2].map(() => new Float64Array(xyz[0].length));
+    for (let i = 0; i < xyz[0].length; i++) { const at = this.place(xyz[0][i], xyz[1][i], xyz[2][i]); for (let c = 0; c < 3; c++) made[c][i] = at[c]; }
+    return made;
+  }
+
+  // Triangles coloured by values between low and high; of `sheer` ones a quarter of the pixels. `first` is the number of the first one for `owner`.
+  triangles([px, py, pz], cells, values, {table, low, high, lit = true, sheer = false, towards = 0, first = 0}) {
+    const {width, height, depth, pixels, owner} = this, step = 255 / (high - low);
+    for (let t = 0; t < cells.length; t += 3) {
+      const a = cells[t], b = cells[t + 1], c = cells[t + 2], ax = px[a], ay = py[a], az = pz[a] + towards;
+      const bx = px[b] - ax, by = py[b] - ay, cx = px[c] - ax, cy = py[c] - ay, area = bx * cy - cx * by;
+      if (!(Math.abs(area) > 1e-9)) continue;
+      const top = Math.max(0, Math.ceil(ay + Math.min(0, by, cy) - 0.5)), bottom = Math.min(height - 1, Math.floor(ay + Math.max(0, by, cy) - 0.5));
+      if (top > bottom) continue;
+      const bz = pz[b] + towards - az, cz = pz[c] + towards - az, zx = (bz * cy - cz * by) / area, zy = (cz * bx - bz * cx) / area;
+      const av = (values[a] - low) * step, bv = (values[b] - values[a]) * step, cv = (values[c] - values[a]) * step, vx = (bv * cy - cv * by) / area, vy = (cv * bx - bv * cx) / area;
+      const light = lit ? 0.62 + 0.38 / Math.sqrt(1 + zx * zx + zy * zy) : 1, ends = [[0, 0, bx, by], [bx, by, cx, cy], [cx, cy, 0, 0]];
+      for (let y = top; y <= bottom; y++) {
+        const down = y + 0.5 - ay;
+        let left = Infinity, right = -Infinity;
+        for (const [x1, y1, x2, y2] of ends) if ((y1 <= down) !== (y2 <= down)) { const x = x1 + ((down - y1) * (x2 - x1)) / (y2 - y1); left = Math.min(left, x); right = Math.max(right, x); }
+        const from = Math.max(0, Math.ceil(ax + left - 0.5001)), to = Math.min(width - 1, Math.floor(ax + right - 0.4999));
+        for (let x = from, k = y * width + from; x <= to; x++, k++) {
+          const across = x + 0.5 - ax, z = az + zx * across + zy * down;
+          if (z <= depth[k] || (sheer && (x | y) & 1)) continue;
+          const v = av + vx * across + vy * down, n = 3 * (v > 0 ? (v < 255 ? Math.round(v) : 255) : 0);
+          depth[k] = z;
+          owner[k] = first + t / 3;
+          pixels[k] = v === v ? 0xff000000 | ((table[n + 2] * light) << 16) | ((table[n + 1] * light) << 8) | (table[n] * light) : 0xff999999;
+        }
+      }
+    }
+  }
+
+  lines([px, py, pz], pairs, grey, thick, towards = 2) {  // a little nearer to the eye than the surface that they lie on
+    const {width, height, depth, pixels} = this, colour = 0xff000000 | (grey << 16) | (grey << 8) | grey, wide = Math.max(1, Math.round(thick * this.dense));
+    for (let i = 0; i < pairs.length; i += 2) {
+      const a = pairs[i], b = pairs[i + 1], dx = px[b] - px[a], dy = py[b] - py[a], dz = pz[b] - pz[a];
+      let low = 0, high = 1;  // the part of the line inside the picture
+      for (const [start, way, end] of [[px[a], dx, width], [py[a], dy, height]]) {
+        if (Math.abs(way) < 1e-12) { if (!(start >= 0 && start <= end)) high = -1; continue; }
+        low = Math.max(low, Math.min(-start / way, (end - start) / way)); high = Math.min(high, Math.max(-start / way, (end - start) / way));
+      }
+      if (!(low <= high)) continue;
+      const steps = Math.max(1, Math.ceil((high - low) * Math.max(Math.abs(dx), Math.abs(dy))));
+      for (let n = 0; n <= steps; n++) {
+        const s = low + ((high - low) * n) / steps, x0 = Math.floor(px[a] + s * dx - (wide - 1) / 2), y0 = Math.floor(py[a] + s * dy - (wide - 1) / 2), z = pz[a] + s * dz + towards;
+        for (let y = Math.max(0, y0); y < Math.min(height, y0 + wide); y++) for (let x = Math.max(0, x0); x < Math.min(width, x0 + wide); x++) {
+          const k = y * width + x;
+          if (z > depth[k]) { depth[k] = z - towards; pixels[k] = colour; }
+        }
+      }
+    }
+  }
+
+  dots([px, py, pz], values, radius, {table, low, high, towards = 4, first = 0}) {
+    const {width, height, depth, pixels, owner} = this, size = radius * this.dense;
+    for (let i = 0; i < px.length; i++) {
+      if (!Number.isFinite(px[i] + py[i])) continue;
+      const n = 3 * Math.max(0, Math.min(255, Math.round(((values[i] - low) * 255) / (high - low)))), z = pz[i] + towards;
+      for (let y = Math.max(0, Math.ceil(py[i] - size)); y <= Math.min(height - 1, py[i] + size); y++) for (let x = Math.max(0, Math.ceil(px[i] - size)); x <= Math.min(width - 1, px[i] + size); x++) {
+        const k = y * width + x;
+        if (Math.hypot(x - px[i], y - py[i]) > size || z <= depth[k]) continue;
+        depth[k] = z; owner[k] = first + i;
+        pixels[k] = 0xff000000 | (table[n + 2] << 16) | (table[n + 1] << 8) | table[n];
+      }
+    }
+  }
+
+  end([left, right, top, bottom]) {  // shows the picture within these limits; from here the context draws in pixels of the page
+    this.context.setTransform(1, 0, 0, 1, 0, 0);
+    this.context.fillStyle = "#fff";
+    this.context.fillRect(0, 0, this.width, this.height);
+    this.context.putImageData(this.image, 0, 0, ...[left, top, right - left, bottom - top].map((value) => Math.round(value * this.dense)));
+    this.context.setTransform(this.dense, 0, 0, this.dense, 0, 0);
+  }
+
+  text(words, x, y, align = "center", halo = true) {
+    const {context} = this;
+    Object.assign(context, {font: "12px system-ui, sans-serif", textAlign: align, textBaseline: "middle", fillStyle: "#1b1b1b", strokeStyle: "#fff", lineWidth: 3});
+    if (halo) context.strokeText(words, x, y);
+    context.fillText(words, x, y);
+  }
+
+  stroke(points, colour, width) {
+    const {context} = this;
+    Object.assign(context, {strokeStyle: colour, lineWidth: width, lineCap: "round"});
+    context.beginPath();
+    points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+    context.stroke();
+  }
+
+  arrow([x, y], [dx, dy]) {
+    const length = Math.hypot(dx, dy), head = Math.min(6, 0.5 * length), [a, b] = length > 0 ? [(dx * head) / length, (dy * head) / length] : [0, 0];
+    for (const [colour, width] of [["#fff", 3.2], ["#000", 1.4]]) {
+      this.stroke([[x, y], [x + dx, y + dy]], colour, width);
+      this.stroke([[x + dx - a - b / 2, y + dy - b + a / 2], [x + dx, y + dy], [x + dx - a + b / 2, y + dy - b - a / 2]], colour, width);
+    }
+  }
+
+  bar(words, {table, low, high, names}, y) {  // of the colours, with ticks
+    const {context} = this, wide = this.width / this.dense, left = 0.06 * wide, length = 0.88 * wide;
+    for (let i = 0; i < length; i++) { const n = 3 * Math.floor((255 * i) / length); context.fillStyle = `rgb(${table[n]},${table[n + 1]},${table[n + 2]})`; context.fillRect(left + i, y, 1.5, 10); }
+    this.text(words, wide / 2, y - 9);
+    for (const value of names ? names.keys() : ticks(low, high, wide > 600 ? 7 : 4)) this.text(names ? names[value] : short(value), left + (length * (value - low)) / (high - low), y + 19);
+  }
+}
+
+function ticks(low, high, most) {  // round numbers between two numbers
+  const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough)), step = [1, 2, 5, 10].find((m) => m * power >= rough * 0.999) * power;
+  const first = Math.ceil(low / step - 1e-9), count = Math.floor(high / step + 1e-9) - first + 1;
+  return Array.from({length: Math.max(0, Math.min(count, 50))}, (_, i) => (first + i) * step);
+}
+
+const short = (value) => String(Number(value.toPrecision(6))).replace("-", "\u2212");
