@@ -164,7 +164,8 @@ print(
     f"{len(table)} runs; columns such as {', '.join(['problem', 'method', 'status', 'residual', 'solve_seconds'])}"
 )
 
-assert len(table) == 4 * 2 * (3 + 8)
+# A run that takes longer than a second is not repeated.
+assert 4 * (3 + 8) < len(table) <= 4 * 2 * (3 + 8)
 
 # %% [markdown]
 # ## The elastic problems

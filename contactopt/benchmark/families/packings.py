@@ -62,14 +62,14 @@ def packing(
     free[:, dim - 1] = -1.0
     free += shake * 0.3 * rng.normal(size=free.shape)
     free[fixed] = 0.0
+    inertial = sp.diags_array(inverse.ravel())
     if spin:  # (m I + 2 m spin [[0, -1], [1, 0]])^-1 m in the first two directions
         turned = np.eye(dim + turns)
         turned[:2, :2] = np.linalg.inv([[1, -2 * spin], [2 * spin, 1]])
         turned = sp.kron(sp.eye_array(len(places)), turned, format="csr")
-    else:
-        turned = sp.eye_array(free.size, format="csr")
-    W = H @ turned @ sp.diags_array(inverse.ravel()) @ H.T
-    q = (H @ (turned @ free.ravel())).reshape(-1, dim)
+        inertial, free = turned @ inertial, (turned @ free.ravel()).reshape(free.shape)
+    W = H @ inertial @ H.T
+    q = (H @ free.ravel()).reshape(-1, dim)
     q[:, 0] += np.maximum(0.0, rng.normal(size=len(q)) - 0.5) * 0.2  # some are not touching yet
     return InterfaceProblem(sp.csr_array(W), q, Coulomb(np.full(len(q), mu)))
 

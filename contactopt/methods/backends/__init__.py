@@ -50,8 +50,7 @@ class Backend:
 
     def tightened(self) -> Backend:
         """The same backend, asked for a thousand times the accuracy."""
-        tight = {key: value / 1e3 for key, value in self.settings.items() if value == TIGHT}
-        return replace(self, settings=dict(self.settings) | tight)
+        return replace(self, settings=_tightened(self.settings))
 
     def timed(self) -> dict[str, Any]:
         """Its settings, with the time that is left to the solve where it takes a limit."""
@@ -134,6 +133,17 @@ CONIC: dict[str, Backend] = {
         Backend("moreau", "conic", "moreau", "moreau", _MOREAU, clock="time_limit"),
     )
 }
+
+
+def _tightened(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings, those in tables of them included, with a thousandth of the usual tolerance."""
+    made = dict(settings)
+    for key, value in settings.items():
+        if isinstance(value, Mapping):
+            made[key] = _tightened(value)
+        elif value == TIGHT:
+            made[key] = value / 1e3
+    return made
 
 
 def attempts(
