@@ -119,6 +119,12 @@ def test_problems_that_nobody_solves_rank_nobody():
     assert list(found["of"]) == [1, 1] and list(found.index) == ["b", "a"]
 
 
+def test_a_table_without_any_success_is_a_table_all_the_same():
+    table = pd.DataFrame([*rows("a", [(1e-6, 1.0, 0.1)]), *rows("b", [(1e-6, 2.0, 0.2)])])
+    found = leader_table(table)
+    assert list(found["solved"]) == ["0 of 0", "0 of 0"]
+
+
 def test_two_reruns_agree_as_kendall_says():
     halves = reruns(campaign(np.random.default_rng(2), repeats=4))
     assert all(set(half["repeat"] % 2) == {n} for n, half in enumerate(halves))

@@ -99,7 +99,7 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
             "wall mean": (np.exp(walls.mean()) - SHIFT).reindex(logs.columns).to_numpy(),
             "memory": points.groupby("method")["memory"].max().reindex(logs.columns).to_numpy(),
             "over claim": ratio.reindex(logs.columns).to_numpy(),
-            "rank": means.rank(method="min").astype(int).to_numpy(),
+            "rank": means.rank(method="min", na_option="bottom").astype(int).to_numpy(),
             "best": low,
             "worst": high,
         }

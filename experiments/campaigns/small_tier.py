@@ -23,8 +23,10 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     found = points(table)
     leaders = ranking(found, ACCURACY).set_index("method")
     auto = leaders.loc["auto"]
-    told = [
-        f"The table holds the runs on {table['problem'].nunique()} problems of the set.",
+    told = [f"The table holds the runs on {table['problem'].nunique()} problems of the set."]
+    if not auto["of"] > 0:
+        return [*told, "No solver reached the certificate 1e-6 on any of them."]
+    told += [
         f"`auto` reaches the certificate 1e-6 on {int(auto['solved'])} of the {int(auto['of'])}"
         f" problems that some solver solves. Its mean CPU time over them is"
         f" {auto['over the least']:.2g} times the least of all {len(leaders)} solvers.",
