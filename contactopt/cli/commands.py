@@ -177,6 +177,32 @@ def simplify(options: argparse.Namespace) -> int:
     return 0
 
 
+def export(options: argparse.Namespace) -> int:
+    """Write a scene for another code: a deck of CalculiX, or its interface problem for FCLib."""
+    from contactopt.files.writing import whole_file
+    from contactopt.runner import scene_of
+
+    scene = scene_of(options.scene, **_arguments_of(options.set))
+    ending = {"calculix": "inp", "fclib": "hdf5"}[options.to]
+    path = Path(options.out or f"out/{Path(options.scene).stem}.{ending}")
+    if options.to == "calculix":
+        from contactopt.bodies.calculix_deck import deck
+
+        text = deck(scene, options.factor)
+        with whole_file(path) as file:
+            file.write_text(text)
+        told = f"a deck of CalculiX: ccx {path.with_suffix('')}"
+    else:
+        from contactopt.coupling.reduction import reduce
+        from contactopt.fclib import write
+
+        problem = reduce(scene).explicit()
+        write(problem, path, scene.name)
+        told = f"its interface problem for FCLib, {count(problem.contacts, 'contact')}"
+    print(f"{path} is {told}")
+    return 0
+
+
 def new(options: argparse.Namespace) -> int:
     """Write an example of a scene file."""
     from contactopt.scenes.example import write_example
@@ -285,6 +311,7 @@ COMMANDS: dict[str, Command] = {
     "view": view,
     "show": show,
     "simplify": simplify,
+    "export": export,
     "new": new,
     "bench": bench,
     "report": report,

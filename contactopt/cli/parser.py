@@ -34,6 +34,8 @@ COMMANDS = {
     " arguments, its source, and what is known exactly",
     "simplify": "say what may be left out of a scene, why it"
     " may be left out, and which error that makes",
+    "export": "write a scene for another code: a deck of CalculiX with its contacts, or its"
+    " interface problem for FCLib",
     "new": "write an example of a scene file, to start from",
     "bench": "compare methods: make all runs that an experiment"
     " file describes, and a report about them",
@@ -77,7 +79,7 @@ def make_parser() -> argparse.ArgumentParser:
         description = f"{what[0].upper()}{what[1:]}."
         made[name] = found.add_parser(name, help=what, description=description, parents=[common])
         made[name].set_defaults(command=commands.COMMANDS[name])
-    for name in ("run", "show", "simplify"):
+    for name in ("run", "show", "simplify", "export"):
         _scene(made[name])
     _run(made["run"])
     _bench(made["bench"])
@@ -89,6 +91,7 @@ def make_parser() -> argparse.ArgumentParser:
     _flag(view, "--no-open", help="make the page, but do not open it in the browser")
     without = "look only for symmetries, without the proof that takes a solution"
     _flag(made["simplify"], "--no-solve", help=without)
+    _export(made["export"])
     made["new"].add_argument(
         "file",
         metavar="FILE",
@@ -151,6 +154,15 @@ def _run(run: argparse.ArgumentParser) -> None:
     ranks = "number of processes that share the bodies (needs mpi4py)"
     run.add_argument("--ranks", type=int, metavar="N", help=ranks)
     _flag(run, "--json", help="print the summary as JSON and nothing else")
+
+
+def _export(export: argparse.ArgumentParser) -> None:
+    what = "what is written"
+    export.add_argument("--to", choices=("calculix", "fclib"), required=True, help=what)
+    what = "name of the file (default: out/SCENE.inp or out/SCENE.hdf5)"
+    export.add_argument("--out", metavar="FILE", help=what)
+    what = "penalty stiffness of CalculiX's contacts, over modulus and element size (default: 100)"
+    export.add_argument("--factor", type=float, default=100.0, metavar="X", help=what)
 
 
 def _bench(bench: argparse.ArgumentParser) -> None:

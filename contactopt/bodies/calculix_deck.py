@@ -1,0 +1,240 @@
+"""Input decks of CalculiX (ccx), so that anyone can check a scene with another code.
+
+A deck has the nodes, elements, supports, plates and loads of our assembled bodies. Linear elements
+in ccx are CPE3 and CPE4 in plane strain, C3D4 and C3D8 in space, with full integration and no
+incompatible modes, as here. The axisymmetric ones are wedges of two degrees, which are not our
+elements, and no deck is written with them. Tractions and body forces become the nodal forces f
+that we use. The nodes of a plate move together by equations, and its total force acts on one of
+them. A half model carries half of the force: ccx knows nothing of `copies`.
+
+Contact in ccx is a penalty: pressure = K overclosure, and stick with the slope K / 10, which the
+manual advises. K = factor E / h, with h the mean size of the slave's faces and E the smaller
+modulus. At a factor of 100 the nodal forces of a flat punch differ from ours by half a percent of
+their peak at most (reports/calculix). On a pin in a bush ccx measures gaps between polygons, and
+its forces approach ours as the mesh gets finer (tests/test_calculix_deck.py). The carrier of the
+contacts is the slave. The master also has the faces around the contact boundary: a node that slides
+over an edge is lost.
+
+Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from contactopt.bodies import assemble
+from contactopt.bodies.assembled_elastic import AssembledElastic
+from contactopt.bodies.assembly import Assembly
+from contactopt.checks import check_number
+from contactopt.errors import InputError
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import Scene
+
+FACTOR = 100.0
+LEAST = 0.001  # increment of the load at which ccx gives up; the first is the whole load
+SMOOTH = 0.7  # cosine of the angle up to which a face beside the contact boundary goes on with it
+# corners of a cell -> those of its faces, in the order in which ccx numbers them
+FACES = {
+    (2, 3): ((0, 1), (1, 2), (2, 0)),
+    (2, 4): ((0, 1), (1, 2), (2, 3), (3, 0)),
+    (3, 4): ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    (3, 8): (
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
+    ),
+}  # fmt: skip
+BRICK = [0, 1, 4, 2, 3, 5, 7, 6]  # corners of scikit-fem's hexahedron, around two opposite faces
+# corners of a cell of the other orientation
+TURNED = {(2, 3): [0, 2, 1], (2, 4): [0, 3, 2, 1], (3, 4): [0, 2, 1, 3],
+          (3, 8): [0, 3, 2, 1, 4, 7, 6, 5]}  # fmt: skip
+
+
+def deck(scene: Scene, factor: float = FACTOR) -> str:
+    """Write a scene as an input deck of CalculiX.
+
+    Parameters
+    ----------
+    scene : The scene: elastic bodies with linear elements, Coulomb's law with one number mu.
+    factor : Penalty stiffness of the contacts, in units of E / h.
+
+    Returns
+    -------
+    The deck, which ccx runs unchanged. ccx prints the displacements of all nodes, U, and the forces
+    of supports, plates and loads on them, RF, into its .dat file.
+
+    Raises
+    ------
+    InputError : For what a deck cannot say.
+    """
+    _check(scene)
+    check_number("the penalty factor of a deck of CalculiX", factor, low=0.0)
+    bodies: list[_Numbered] = []
+    for part in scene.parts:
+        made = assemble(scene, part, scene.elements, scene.zone)
+        assert isinstance(made, AssembledElastic)
+        bodies.append(_Numbered(made.body, scene, bodies[-1].after if bodies else (0, 0)))
+    named = {body.name: body for body in bodies}
+    lines = [f"** {scene.name}, written by contactopt", "*NODE, NSET=NODES"]
+    for step in (_Numbered.nodes, _Numbered.elements, _Numbered.held, _Numbered.plates):
+        for body in bodies:
+            lines += step(body)
+    for number, pair in enumerate(scene.pairs, 1):
+        lines += _contact(scene, pair, named, factor, number)
+    lines += ["*STEP, INC=1000", f"*STATIC\n1., 1., {LEAST}"]
+    for body in bodies:
+        lines += body.loads()
+    lines += ["*NODE PRINT, NSET=NODES\nU, RF", "*NODE FILE\nU, RF", "*EL FILE\nS", "*END STEP"]
+    return "\n".join(lines) + "\n"
+
+
+def _check(scene: Scene) -> None:
+    """Raise InputError for what a deck cannot say."""
+    for part in scene.parts:
+        if not (part.elastic and part.meshed):
+            raise InputError(
+                f"body '{part.name}' has no mesh, and a deck of CalculiX needs one; make it a Part,"
+                " stiff where it is rigid."
+            )
+    if scene.kind == "axisymmetric":
+        raise InputError(
+            "CalculiX has other axisymmetric elements, and would not solve this scene; export a"
+            " scene in plane strain or in space."
+        )
+    if scene.degree != 1:
+        raise InputError("a deck of CalculiX is written with linear elements; give degree = 1.")
+    for pair in scene.pairs:
+        if pair.law != "coulomb" or callable(pair.mu) or np.ndim(pair.mu) > 0:
+            raise InputError(
+                f"contact '{pair.name}': a deck of CalculiX knows Coulomb's law with one number mu."
+            )
+
+
+class _Numbered:
+    """An assembled body whose nodes and elements are numbered after those of the bodies before.
+
+    cells  (corners, elements) nodes of the body, in the order and orientation of ccx
+    """
+
+    def __init__(self, body: Assembly, scene: Scene, before: tuple[int, int]):
+        mesh = body.basis.mesh
+        self.body, self.name, self.scene, self.mesh = body, body.name, scene, mesh
+        self.first_node, self.first_element = before
+        self.after = before[0] + mesh.p.shape[1], before[1] + mesh.t.shape[1]
+        cells = mesh.t[BRICK] if len(mesh.t) == 8 else mesh.t
+        self.shape = mesh.p.shape[0], len(cells)
+        # the edges that meet at the first corner span a positive volume
+        ends = {(2, 3): (1, 2), (2, 4): (1, 3), (3, 4): (1, 2, 3), (3, 8): (1, 3, 4)}[self.shape]
+        edges = mesh.p[:, cells[list(ends)]] - mesh.p[:, cells[:1]]
+        volumes = np.linalg.det(edges.transpose(2, 0, 1))
+        self.cells = np.where(volumes < 0, cells[TURNED[self.shape]], cells)
+
+    def nodes(self) -> Iterator[str]:
+        for number, x in enumerate(self.mesh.p.T, self.first_node + 1):
+            yield ", ".join([str(number), *map(_number, x)])
+
+    def elements(self) -> Iterator[str]:
+        """Elements, material and section."""
+        name, material = f"BODY{self.first_element + 1}", self.body.material
+        kind = "C3D" if self.scene.dim == 3 else "CPE"
+        yield f"*ELEMENT, TYPE={kind}{len(self.cells)}, ELSET={name}"
+        for number, cell in enumerate(self.cells.T + self.first_node + 1, self.first_element + 1):
+            yield ", ".join(map(str, [number, *cell]))
+        constants = f"{_number(material.E)}, {_number(material.nu)}"
+        yield f"*MATERIAL, NAME={name}\n*ELASTIC\n{constants}"
+        yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"
+        if self.scene.dim == 2:
+            yield _number(self.scene.thickness)
+
+    def _places(self, mask: np.ndarray) -> Iterator[tuple[str, int]]:
+        """'node, component' of the unknowns in a mask (n,), and their numbers."""
+        for component, row in enumerate(self.body.unknowns, 1):
+            for node in np.flatnonzero(mask[row]):
+                yield f"{self.first_node + node + 1}, {component}", int(row[node])
+
+    def held(self) -> Iterator[str]:
+        """Displacements that supports and plates prescribe."""
+        held = np.ones(len(self.body.load), dtype=bool)
+        held[self.body.free] = False
+        held[np.flatnonzero(abs(self.body.motion).sum(axis=1))] = False
+        if held.any():
+            yield "*BOUNDARY"
+        for place, unknown in self._places(held):
+            yield f"{place}, {place.split()[-1]}, {_number(self.body.prescribed[unknown])}"
+
+    def plates(self) -> Iterator[str]:
+        """The nodes of a plate move as its first one does."""
+        for column in self.body.motion.T:
+            first, *others = (place for place, _ in self._places(column != 0))
+            for place in others:
+                yield f"*EQUATION\n2\n{place}, 1., {first}, -1."
+
+    def loads(self) -> Iterator[str]:
+        """Nodal forces of one image, and the total forces of plates."""
+        share = 1.0 / self.scene.copies
+        yield from ["*CLOAD"] if self.body.load.any() or len(self.body.plate_forces) else []
+        for place, unknown in self._places(self.body.load != 0):
+            yield f"{place}, {_number(self.body.load[unknown] * share)}"
+        for column, force in zip(self.body.motion.T, self.body.plate_forces):
+            place, _ = next(self._places(column != 0))
+            yield f"{place}, {_number(force * share)}"
+
+    def facets(self, boundary: str, around: bool) -> np.ndarray:
+        """Facets of a boundary; with those around it that go on smoothly, if asked for."""
+        mesh, own = self.mesh, np.asarray(self.mesh.boundaries[boundary])
+        if not around:
+            return own
+        outer = mesh.boundary_facets()
+        beside = outer[np.isin(mesh.facets[:, outer], mesh.facets[:, own]).any(axis=0)]
+        normals = self.body.basis.mapping.normals(
+            np.full((mesh.dim(), len(beside), 1), 0.0), mesh.f2t[0, beside], beside, mesh.t2f
+        )[:, :, 0]
+        mean = normals[:, np.isin(beside, own)].mean(axis=1)
+        return np.asarray(beside[np.isin(beside, own) | (mean @ normals > SMOOTH)])
+
+    def surface(self, name: str, facets: np.ndarray) -> Iterator[str]:
+        """A surface of ccx, by elements and the numbers of their faces."""
+        yield f"*SURFACE, NAME={name}, TYPE=ELEMENT"
+        elements = self.mesh.f2t[0, facets]
+        ends = np.sort(self.mesh.facets[:, facets], axis=0)
+        for number, corners in enumerate(FACES[self.shape], 1):
+            here = np.sort(self.cells[list(corners)][:, elements], axis=0)
+            for element in elements[(here == ends).all(axis=0)]:
+                yield f"{self.first_element + element + 1}, S{number}"
+
+    def size(self, facets: np.ndarray) -> float:
+        """Mean length of edges, or root of the mean area of faces, of some facets."""
+        ends = self.mesh.p[:, self.mesh.facets[:, facets]]
+        first, last = ends[:, 1] - ends[:, 0], ends[:, -1] - ends[:, 0]
+        if self.shape[0] == 2:
+            return float(np.linalg.norm(first, axis=0).mean())
+        half = np.linalg.norm(np.cross(first.T, last.T), axis=1) / (1 if len(ends[0]) == 4 else 2)
+        return float(np.sqrt(half.mean()))
+
+
+def _contact(
+    scene: Scene, pair: Contact, bodies: dict[str, _Numbered], factor: float, number: int
+) -> Iterator[str]:
+    """Surfaces, law of contact and friction of a pair."""
+    parts = scene.meshed
+    sides = [(bodies[name], surface or parts[name].contact)
+             for name, surface in zip(pair.bodies, pair.surfaces)]  # fmt: skip
+    (slave, on), (master, under) = sides[::-1] if pair.carrier == "lower" else sides
+    facets = slave.facets(on, around=False)
+    yield from slave.surface(f"SLAVE{number}", facets)
+    yield from master.surface(f"MASTER{number}", master.facets(under, around=True))
+    modulus = min(slave.body.material.E, master.body.material.E)
+    stiffness = factor * modulus / slave.size(facets)
+    yield f"*SURFACE INTERACTION, NAME=LAW{number}"
+    yield f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{_number(stiffness)}"
+    mu: Any = pair.mu
+    if mu > 0:
+        yield f"*FRICTION\n{_number(float(mu))}, {_number(stiffness / 10)}"
+    yield f"*CONTACT PAIR, INTERACTION=LAW{number}, TYPE=SURFACE TO SURFACE"
+    yield f"SLAVE{number}, MASTER{number}"
+
+
+def _number(value: float) -> str:
+    """At most 20 characters with a decimal point: ccx takes others for names or components."""
+    return f"{value:.12e}"
