@@ -1,4 +1,4 @@
-"""A scene as a deck of CalculiX: where ccx is installed, it runs unchanged and the reactions agree."""
+"""A deck of CalculiX: where ccx is installed, it runs unchanged and the reactions agree."""
 
 import shutil
 import subprocess
