@@ -505,7 +505,7 @@ def test_folders_that_cannot_be_written(tmp_path, capsys):
 def test_killed_processes_cost_their_own_run_only(tmp_path):
     """SIGKILL to the processes that run methods, then to the whole campaign, at random moments."""
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 30")), tmp_path / "out"
-    expected = {r.key for r in read_experiment(path).runs()}
+    expected = read_experiment(path).runs()
     rng = np.random.default_rng(5)
     command = bench(path, out, "--resume")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -526,13 +526,37 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
         assert process.wait(120) == (0 if rounds == 2 else -signal.SIGKILL)
     rows = list(lines(out / "rows.jsonl"))
     keys = [row["key"] for row in rows]
-    assert len(keys) == len(set(keys)) and set(keys) == expected
+    slow = pool.History(rows)  # runs that a busy machine made so long that they are not repeated
+    least = {r.key for r in expected if not slow.repeated(r)}
+    assert len(keys) == len(set(keys)) and least <= set(keys) <= {r.key for r in expected}
     failed = [row for row in rows if not row["success"]]
     assert (
         len(failed) <= killed
         and {row["status"] for row in failed} <= {"out_of_memory"}
         and killed >= 2
     )
+
+
+GROWN = []
+
+
+def grow(size: int) -> int:
+    """Keep so many bytes for ever; the number of the process."""
+    GROWN.append(np.ones(size // 8))
+    time.sleep(0.4)
+    return os.getpid()
+
+
+def test_a_process_that_grows_goes_on():
+    """The library of processes would recycle one that grew by 300 MB in more than a second, and a
+    call at that moment was told as a crash, or waited for ever.
+    """
+    grown = process.Process()
+    try:
+        numbers = {grown.ask(60, "grow", grow, 150 * 10**6) for _ in range(6)}
+    finally:
+        grown.kill()
+    assert len(numbers) == 1
 
 
 def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch):
