@@ -16,14 +16,15 @@ import numpy as np
 import psutil
 import pytest
 
-from contactopt import InputError, benchmark
-from contactopt.benchmark import pool, problems, process, store
+from contactopt import InputError, benchmark, solve
+from contactopt.benchmark import pool, problems, process, store, worker
 from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.reports import read_layout
 from contactopt.benchmark.runs import MethodSpec, Run
 from contactopt.benchmark.store import lines
 from contactopt.cli import main
+from contactopt.linear.convolution import Convolution
 from contactopt.methods.backends import child
 from tests.test_benchmark import SMALL, bench, count, run, written
 
@@ -557,6 +558,22 @@ def test_a_process_that_grows_goes_on():
     finally:
         grown.kill()
     assert len(numbers) == 1
+
+
+def test_a_half_space_goes_to_other_processes_by_its_kernel():
+    """No array is made of its Q, so that its size is no limit."""
+    (spec,) = problems.named(
+        "family", "by_products", {"of": "hertz-half-space", "elements": 16}, Path(".")
+    )
+    builder = process.Process()
+    try:
+        made, facts = builder.ask(60, "build", worker.build, spec, (), False, 4.0)
+    finally:
+        builder.kill()
+    assert facts["contacts"] == made.contacts and made.q.size > worker.MOST_ROWS
+    assert isinstance(made.Q, Convolution) and solve(made).solved
+    x = np.random.default_rng(0).normal(size=made.q.size)
+    assert np.array_equal(made.Q @ x, spec.build({}).Q @ x)
 
 
 def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch):

@@ -165,7 +165,7 @@ def prepare(noise: str, parent: int) -> None:
     """Make the new process ready: it ends with the process of the number `parent`, leaves Ctrl-C to
     it, and prints into the file `noise`.
 
-    loky would end a process that has grown by 300 MB, as large problems let it grow, and a call that
+    loky would end a process that has grown by 300 MB, as large problems let it grow. A call that
     comes at that moment gets no answer. Limits of memory are the campaign's own.
     """
     from loky import process_executor
