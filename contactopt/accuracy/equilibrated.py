@@ -1,0 +1,422 @@
+"""A stress in exact equilibrium with loads and contact pressure, made element by element.
+
+The stress s(u) of finite elements jumps between elements. Here a symmetric stress s* close to it is
+made, for which in every element and across every facet
+
+    div s* + f = 0,    s* n = t on loaded and contact boundaries,    s* n continuous,
+
+exactly so for constant body forces f and tractions t that are linear on each facet. Nothing is
+solved on the whole body. There are two steps.
+
+1. Tractions between elements. On each facet F the traction is linear, and known by its moments m_Fa
+   (dim,) with the hat functions phi_a of the vertices a of F. They hold every element E in balance
+   if at each of its vertices a
+
+       sum over the facets F of E at a  of  +-m_Fa  =  int_E s(u) grad phi_a - f phi_a.
+
+   Rigid motions of E are combinations of its hat functions, so that forces and moments on E balance.
+   The equations of one vertex have a solution because u balances the hat function there (Galerkin);
+   of all solutions the one is taken that is nearest to the mean of s(u) n from both sides.
+2. The stress within elements, by the composite elements of Johnson and Mercier: each triangle or
+   tetrahedron is cut at its centroid into dim + 1 parts, on which s* is linear. Tractions on the
+   boundary and f determine it. It is the image of a stress on the reference element,
+   s = B s^ B' / |det B|, where x = B x^ + b, which keeps symmetry, divergence and tractions. So one
+   small matrix, made once, serves all elements.
+
+Sources: Ladeveze, Leguillon (1983), Error estimate procedure in the finite element method and
+applications, SIAM J. Numer. Anal. 20, for the tractions; Johnson, Mercier (1978), Some equilibrium
+finite element methods for two-dimensional elasticity problems, Numer. Math. 30; Gopalakrishnan,
+Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from contactopt.material import Material, lame
+
+BLOCK = 20_000  # elements at a time
+ALONG = 1e-9  # of a unit vector: components below are zero
+TINY = 1e-13  # of the diagonal, added so that functions without stress do no harm
+
+
+@dataclass(frozen=True, eq=False)
+class Simplices:
+    """Straight-edged triangles or tetrahedra, with displacements and stresses on them.
+
+    mesh  of scikit-fem, whose vertices are p (dim, vertices) and t (dim + 1, e)
+    """
+
+    mesh: Any
+
+    @cached_property
+    def dim(self) -> int:
+        return len(self.mesh.p)
+
+    @cached_property
+    def _map(self) -> np.ndarray:
+        """(e, dim, dim) the matrices B from the reference element."""
+        x = self.mesh.p[:, self.mesh.t]
+        return np.moveaxis(x[:, 1:] - x[:, :1], 2, 0)
+
+    @cached_property
+    def _ratio(self) -> np.ndarray:
+        """(e,) |det B|."""
+        return np.abs(np.linalg.det(self._map))
+
+    @cached_property
+    def volume(self) -> np.ndarray:
+        """(e,) [length^dim]."""
+        return self._ratio / (2 if self.dim == 2 else 6)
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """(e, dim + 1, dim) gradients of the hat functions."""
+        inner = np.linalg.inv(self._map)
+        return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+
+    @cached_property
+    def others(self) -> np.ndarray:
+        """(dim + 1, dim) for each local vertex the others, which span the facet opposite it."""
+        every = np.arange(self.dim + 1)
+        return np.array([every[every != o] for o in every])
+
+    @cached_property
+    def opposite(self) -> np.ndarray:
+        """(dim + 1, e) the facet of the mesh opposite each vertex."""
+        local = [tuple(facet) for facet in self.mesh.refdom.facets]
+        return np.asarray(self.mesh.t2f[[local.index(tuple(own)) for own in self.others]])
+
+    @cached_property
+    def slots(self) -> np.ndarray:
+        """(dim + 1, dim, e) the place that each of `others` has among the vertices of its facet."""
+        corners = self.mesh.facets[:, self.opposite]
+        return np.stack(
+            [
+                [np.argmax(corners[:, o] == self.mesh.t[a], axis=0) for a in own]
+                for o, own in enumerate(self.others)
+            ]
+        )
+
+    @cached_property
+    def sign(self) -> np.ndarray:
+        """(dim + 1, e) 1 where the normal of the facet points out of the element, else -1."""
+        return np.where(self.mesh.f2t[0, self.opposite] == np.arange(len(self.volume)), 1.0, -1.0)
+
+    @cached_property
+    def outward(self) -> np.ndarray:
+        """(dim + 1, e, dim) outward normals times the measure of the facets."""
+        return -self.dim * np.moveaxis(self.volume[:, None, None] * self.slopes, 1, 0)
+
+    @cached_property
+    def between(self) -> tuple[np.ndarray, np.ndarray]:
+        """Local vertices (2, j) at the ends of the edges of an element, and the edges (j, e)."""
+        flat = self.dim == 2
+        ends = self.mesh.refdom.facets if flat else self.mesh.refdom.edges
+        return np.array(ends).T, np.asarray(self.mesh.t2f if flat else self.mesh.t2e)
+
+    def quadratic(self, nodal: np.ndarray) -> np.ndarray:
+        """Displacements (dim, vertices and edges) of nodal ones, which may be those of vertices."""
+        count = self.mesh.nvertices
+        if nodal.shape[1] > count:
+            return nodal
+        edges = self.mesh.facets if self.dim == 2 else self.mesh.edges
+        return np.concatenate([nodal, nodal[:, edges].mean(axis=1)], axis=1)
+
+    def stress(self, material: Material, nodal: np.ndarray) -> np.ndarray:
+        """The stress (e, dim + 1, dim, dim), at the vertices of each element between which it is
+        linear, of a displacement of vertices and edges.
+        """
+        lam, shear = lame(material)
+        d, t, G = self.dim, self.mesh.t, self.slopes
+        ends, edges = self.between
+        at_vertex, at_edge = nodal[:, t], nodal[:, self.mesh.nvertices + edges]
+        at_edge = at_edge - (at_vertex[:, ends[0]] + at_vertex[:, ends[1]]) / 2
+        gradient = np.repeat(np.einsum("cae,eai->eci", at_vertex, G)[:, None], d + 1, axis=1)
+        for (i, j), own in zip(ends.T, at_edge.transpose(1, 2, 0)):
+            # the bubble 4 l_i l_j has the slope 4 grad l_j at vertex i
+            gradient[:, i] += 4 * own[:, :, None] * G[:, j, None, :]
+            gradient[:, j] += 4 * own[:, :, None] * G[:, i, None, :]
+        strain = (gradient + gradient.swapaxes(2, 3)) / 2
+        trace = np.trace(strain, axis1=2, axis2=3)[..., None, None]
+        return 2 * shear * strain + lam * trace * np.eye(d)
+
+    def data(self, moments: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """(e, inputs) what determines the composite stress on the reference element.
+
+        Parameters
+        ----------
+        moments : (dim + 1, dim, e, dim) of tractions with the hat functions of `others` on the
+            facets of each element, whose normals point out of it.
+        force : (dim,) or (e, dim) per volume.
+        """
+        own = moments.reshape(-1, *moments.shape[2:])
+        body = np.broadcast_to(self._ratio[:, None] * force, own.shape[1:])
+        both = np.concatenate([own, body[None]]).transpose(1, 2, 0)  # in the axes of space
+        return np.linalg.solve(self._map, both).transpose(0, 2, 1).reshape(len(self._ratio), -1)
+
+    def data_of(self, stress: np.ndarray) -> np.ndarray:
+        """The same for a stress (e, dim + 1, dim, dim) that is linear on each element."""
+        force = -np.einsum("eaij,eaj->ei", stress, self.slopes)
+        return self.data(self._moments(stress), force)
+
+    def _moments(self, stress: np.ndarray) -> np.ndarray:
+        """(dim + 1, dim, e, dim) as in data(), of a linear stress."""
+        found = []
+        for own, normal in zip(self.others, self.outward):
+            t = np.einsum("eaij,ej->aei", stress[:, own], normal)
+            found.append((t + t.sum(axis=0)) / (self.dim * (self.dim + 1)))
+        return np.array(found)
+
+    def metric(self, material: Material, chosen: slice = slice(None)) -> np.ndarray:
+        """H (e, inputs, inputs): y' H y = int s : C^-1 : s for the composite stress s of data y, of
+        some elements [per thickness].
+        """
+        d, (E, nu) = self.dim, (material.E, material.nu)
+        pairs, parts = _pairs(d), _reference(d)[1]
+        base = np.zeros((len(pairs), d, d))
+        for number, (i, j) in enumerate(pairs):
+            base[number, i, j] = base[number, j, i] = 1.0
+        B, ratio = self._map[chosen], self._ratio[chosen]
+        G = B.swapaxes(1, 2) @ B
+        turned = np.einsum("eij,ajk->eaik", G, base)
+        traces = np.trace(turned, axis1=2, axis2=3)
+        # in plane strain the trace in space is 1 + nu times that in the plane
+        factor = nu * (1 + nu) if d == 2 else nu
+        form = (1 + nu) * np.einsum("eaij,ebji->eab", turned, turned)
+        form -= factor * traces[:, :, None] * traces[:, None]
+        form *= (self.volume[chosen] / ratio**2 / E)[:, None, None]
+        size = parts.shape[-1]
+        flat = form.reshape(len(form), -1) @ parts.reshape(-1, size * size)
+        return np.asarray(flat.reshape(-1, size, size))
+
+    def energies(self, material: Material, data: np.ndarray) -> np.ndarray:
+        """(e,) y' H y of all elements."""
+        found = [
+            np.einsum("ei,eij,ej->e", data[own], self.metric(material, own), data[own])
+            for own in self._blocks
+        ]
+        return np.concatenate(found)
+
+    @property
+    def _blocks(self) -> list[slice]:
+        return [slice(i, i + BLOCK) for i in range(0, len(self.volume), BLOCK)]
+
+    def equilibrated(
+        self,
+        material: Material,
+        stress: np.ndarray,
+        force: np.ndarray,
+        held: np.ndarray,
+        moments: np.ndarray,
+    ) -> tuple[np.ndarray, float]:
+        """The data (e, inputs) of the stress s* of the head of this module.
+
+        Parameters
+        ----------
+        material : Of the body.
+        stress : (e, dim + 1, dim, dim) of finite elements, at the vertices of each element.
+        force : (dim,) per volume.
+        held : (facets, dim) components in which a boundary facet is held, its traction unknown.
+        moments : (facets, dim, dim) of the other boundary facets: vertex by vertex those of the
+            traction with the hat functions [force per thickness].
+
+        Returns
+        -------
+        The data, and the largest force by which the hat function of a vertex was out of balance,
+        over that of an element.
+        """
+        known = (self.mesh.f2t[1] < 0)[:, None] & ~held
+        m, unbalanced = self._tractions(stress, force, known, moments)
+        given = self.data_of(stress)
+        if self.dim == 2:
+            m += self._nearer(material, self.data(self._outward(m), force) - given, known)
+        return self.data(self._outward(m), force), unbalanced
+
+    def _outward(self, m: np.ndarray) -> np.ndarray:
+        """Moments (facets, dim, dim) as the elements see them."""
+        return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
+
+    def _nearer(self, material: Material, missing: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """What to add to the moments of plane tractions so that the stress whose data are `missing`
+        gets the least energy.
+
+        A stress without body force derives from a function A of Airy, cubic on the three parts of
+        each triangle and smooth across all edges. With the gradients g at the vertices and the mean
+        h of the gradient along an edge, whose unit tangent t points from the first vertex to the
+        second, and R the turn by which the normal is R t up to sign, the moments on the edge are
+
+            R (h - g_1)  and  R (g_2 - h),     h = (A_2 - A_1) / |edge| t + k n.
+
+        Unknowns are A and g at the vertices and k on the edges; those that move a traction that is
+        known are zero.
+        """
+        mesh, count, facets = self.mesh, self.mesh.nvertices, self.mesh.facets
+        t = mesh.p[:, facets[1]] - mesh.p[:, facets[0]]
+        length = np.linalg.norm(t, axis=0)
+        t = t / length
+        n = np.array([t[1], -t[0]])
+        owner = mesh.p[:, mesh.t[:, mesh.f2t[0]]].mean(axis=1)
+        way = np.where(np.sum(n * (mesh.p[:, facets[0]] - owner), axis=0) > 0, 1.0, -1.0)
+        D = np.zeros((facets.shape[1], 2, 2, 7))  # moments by g_1, g_2, A_1, A_2, k
+        for i, turn in enumerate((1.0, -1.0)):  # R takes component 1 - i to i
+            D[:, 0, i, 1 - i] = -turn
+            D[:, 1, i, 3 - i] = turn
+            along = turn * t[1 - i] / length
+            D[:, 0, i, 4:] = np.stack([-along, along, turn * n[1 - i]], axis=1)
+            D[:, 1, i, 4:] = -D[:, 0, i, 4:]
+        D *= way[:, None, None, None]
+        v, w = facets
+        edge = np.arange(facets.shape[1])
+        unknown = np.stack(
+            [2 * v, 2 * v + 1, 2 * w, 2 * w + 1, 2 * count + v, 2 * count + w, 3 * count + edge]
+        )
+        size = 3 * count + facets.shape[1]
+        fixed = np.zeros(size, dtype=bool)
+        for c in range(2):
+            own = np.flatnonzero(known[:, c])
+            fixed[2 * facets[:, own] + 1 - c] = True
+            fixed[3 * count + own[np.abs(n[1 - c, own]) > ALONG]] = True
+            fixed[2 * count + facets[:, own[np.abs(t[1 - c, own]) > ALONG]]] = True
+        rows = (np.arange(4 * facets.shape[1])[:, None] + np.zeros(7, dtype=int)).ravel()
+        columns = np.repeat(unknown.T[:, None], 4, axis=1).ravel()
+        change = sp.csr_matrix((D.ravel(), (rows, columns)), (4 * facets.shape[1], size))
+        change = change[:, np.flatnonzero(~fixed)]
+        K, slope = self._facet_energy(material, missing)
+        reduced = (change.T @ K @ change).tocsc()
+        reduced += sp.diags(TINY * reduced.diagonal(), format="csc")
+        solve = splu(
+            reduced, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        return np.asarray(-(change @ solve.solve(change.T @ slope))).reshape(-1, 2, 2)
+
+    def _facet_energy(
+        self, material: Material, missing: np.ndarray
+    ) -> tuple[sp.csr_matrix, np.ndarray]:
+        """Second and first derivatives of the energy of the stress by the moments of facets."""
+        d, count = self.dim, len(self.volume)
+        place = (self.opposite[:, None] * d + self.slots).reshape(-1, count)  # moment of each input
+        index = (place[..., None] * d + np.arange(d)).transpose(1, 0, 2).reshape(count, -1)
+        inner = np.linalg.inv(self._map)
+        values, slope, used = [], np.zeros(self.mesh.facets.shape[1] * d * d), index.shape[1]
+        signs = np.repeat(self.sign.T, d * d, axis=1)
+        for own in self._blocks:
+            H = self.metric(material, own)
+            back = inner[own]
+            g = np.einsum("eij,ej->ei", H[:, :used], missing[own])
+            g = (g.reshape(len(g), -1, d) @ back).reshape(len(g), -1) * signs[own]
+            slope += np.bincount(index[own].ravel(), g.ravel(), len(slope))
+            H = H[:, :used, :used].reshape(len(H), used // d, d, used // d, d)
+            H = np.einsum("epiqj,eik,ejl->epkql", H, back, back, optimize=True)
+            H = H.reshape(-1, used, used) * signs[own, :, None] * signs[own, None]
+            values.append(H)
+        rows = np.repeat(index, used, axis=1).ravel()
+        columns = np.tile(index, (1, used)).ravel()
+        data = np.concatenate(values).ravel()
+        return sp.csr_matrix((data, (rows, columns)), (len(slope), len(slope))), slope
+
+    def _tractions(
+        self, stress: np.ndarray, force: np.ndarray, known: np.ndarray, moments: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Moments (facets, dim, dim) of tractions that hold all elements in balance."""
+        d, mesh, count = self.dim, self.mesh, len(self.volume)
+        inner = mesh.f2t[1] >= 0
+        m = np.zeros((len(inner), d, d))
+        for o, own in enumerate(self._moments(stress)):
+            share = self.sign[o] * np.where(inner[self.opposite[o]], 0.5, 1.0)
+            for slot, moment in zip(self.slots[o], own):
+                np.add.at(m, (self.opposite[o], slot), share[:, None] * moment)
+        m = np.where(known[:, None], moments, m)
+        needed = np.einsum("eij,eaj->eai", stress.mean(axis=1), self.slopes) - force / (d + 1)
+        needed = needed * self.volume[:, None, None]
+        size = float(np.abs(needed).max(initial=0.0)) or 1.0
+        rows, columns, signs = [], [], []
+        for o, own in enumerate(self.others):
+            for a, slot in zip(own, self.slots[o]):
+                needed[:, a] -= self.sign[o][:, None] * m[self.opposite[o], slot]
+                rows.append(np.arange(count) * (d + 1) + a)
+                columns.append(self.opposite[o] * d + slot)
+                signs.append(self.sign[o])
+        entries = np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))
+        balance = sp.csc_matrix(entries, (count * (d + 1), len(inner) * d))
+        left, worst, solve, before = needed.reshape(-1, d), 0.0, None, None
+        for c in range(d):
+            chosen = np.flatnonzero(np.repeat(~known[:, c], d))
+            if before is None or not np.array_equal(chosen, before):
+                own, before = balance[:, chosen], chosen
+                solve = _least(own)
+            assert solve is not None
+            change = own.T @ solve(left[:, c])
+            m[..., c].reshape(-1)[chosen] += change
+            worst = max(worst, float(np.abs(left[:, c] - own @ change).max(initial=0.0)))
+        return m, worst / size
+
+
+def _least(balance: sp.csc_matrix) -> Any:
+    """The inverse of D D' for the balance D of elements by facets, where the equations of a vertex
+    that nothing holds have one that follows from the others.
+    """
+    D = (balance @ balance.T).tocsc()
+    count, group = connected_components(D, directed=False)
+    # where each facet at a vertex joins two elements, the sum of all equations is zero
+    alone = np.abs(np.asarray(balance.sum(axis=0)).ravel())
+    free = np.bincount(group, abs(balance) @ alone, count) == 0
+    first = np.unique(group, return_index=True)[1][free]
+    ground = np.zeros(D.shape[0])
+    ground[first] = 1.0
+    return splu(D + sp.diags(ground, format="csc"), permc_spec="MMD_AT_PLUS_A").solve
+
+
+def _pairs(d: int) -> list[tuple[int, int]]:
+    """The components of a symmetric matrix."""
+    return [(i, j) for i in range(d) for j in range(i, d)]
+
+
+@cache
+def _reference(d: int) -> tuple[np.ndarray, np.ndarray]:
+    """The stress of Johnson and Mercier on the reference element: its components (part, vertex of
+    the part, component, input) from the moments of its tractions and a body force, and the integral
+    (component, component, input, input) of their products over the volume.
+    """
+    x = np.concatenate([np.zeros((1, d)), np.eye(d)])
+    pairs, n = _pairs(d), d + 1
+    volume = 1 / (2 if d == 2 else 6) / n
+    slopes = []
+    for s in range(n):
+        corners = x.copy()
+        corners[s] = x.mean(axis=0)
+        slopes.append(np.linalg.inv(np.column_stack([np.ones(n), corners]))[1:].T)
+    stress = np.zeros((n, n, d, d, n, n, len(pairs)))  # unknowns -> the symmetric stress
+    for number, (i, j) in enumerate(pairs):
+        for s, v in np.ndindex(n, n):
+            stress[s, v, i, j, s, v, number] = stress[s, v, j, i, s, v, number] = 1.0
+    stress = stress.reshape(n, n, d, d, -1)
+    equations, data, inputs = [], [], n * d * d + d
+
+    def demand(rows: np.ndarray, first: int = -1) -> None:
+        """Rows are zero, or equal to the inputs from the first one on."""
+        equations.append(rows)
+        data.append(np.eye(d, inputs, first) if first >= 0 else np.zeros((d, inputs)))
+
+    for s in range(n):
+        demand(-np.einsum("vijk,vj->ik", stress[s], slopes[s]), n * d * d)
+        own = [v for v in range(n) if v != s]
+        for a, v in enumerate(own):
+            tested = (stress[s, v] + stress[s, own].sum(axis=0)) / (d * (d + 1))
+            demand(np.einsum("ijk,j->ik", tested, -d * volume * slopes[s][s]), (s * d + a) * d)
+        for t in range(s):
+            for one, other in [(s, t), *((v, v) for v in own if v != t)]:
+                jump = stress[s, one] - stress[t, other]
+                demand(np.einsum("ijk,j->ik", jump, slopes[s][t]))
+    solved = np.linalg.pinv(np.concatenate(equations), rcond=1e-12) @ np.concatenate(data)
+    found = solved.reshape(n, n, len(pairs), inputs)
+    both = (found, found.sum(axis=1, keepdims=True))  # int l_a l_b = V (1 + delta) / ...
+    parts = sum(np.einsum("svak,svbl->abkl", own, own) for own in both)
+    return found, parts / (n * n * (n + 1))
