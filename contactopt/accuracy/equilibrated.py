@@ -5,8 +5,8 @@ made, for which in every element and across every facet
 
     div s* + f = 0,    s* n = t on loaded and contact boundaries,    s* n continuous,
 
-exactly so for constant body forces f and tractions t that are linear on each facet. Nothing is
-solved on the whole body. There are two steps.
+exactly so for constant body forces f and tractions t that are linear on each facet. There are three
+steps, of which the last is for the plane alone.
 
 1. Tractions between elements. On each facet F the traction is linear, and known by its moments m_Fa
    (dim,) with the hat functions phi_a of the vertices a of F. They hold every element E in balance
@@ -14,14 +14,19 @@ solved on the whole body. There are two steps.
 
        sum over the facets F of E at a  of  +-m_Fa  =  int_E s(u) grad phi_a - f phi_a.
 
-   Rigid motions of E are combinations of its hat functions, so that forces and moments on E balance.
-   The equations of one vertex have a solution because u balances the hat function there (Galerkin);
-   of all solutions the one is taken that is nearest to the mean of s(u) n from both sides.
+   Rigid motions of E are combinations of its hat functions, so forces and moments on E balance.
+   The equations of one vertex have a solution because u balances the hat function there
+   (Galerkin); of all solutions the one is taken that is nearest to the mean of s(u) n from both
+   sides.
 2. The stress within elements, by the composite elements of Johnson and Mercier: each triangle or
    tetrahedron is cut at its centroid into dim + 1 parts, on which s* is linear. Tractions on the
    boundary and f determine it. It is the image of a stress on the reference element,
    s = B s^ B' / |det B|, where x = B x^ + b, which keeps symmetry, divergence and tractions. So one
-   small matrix, made once, serves all elements.
+   small matrix, made once, serves all elements: H gives the energy int s : C^-1 : s = y' H y of
+   the data y of an element, its tractions and body force.
+3. The nearest such stress. In the plane all stresses without loads derive from functions of Airy.
+   Of these the one is added that makes the energy of s* - s(u) least, a sparse linear system. Long
+   thin elements, on which tractions bend, would be far from s(u) without it.
 
 Sources: Ladeveze, Leguillon (1983), Error estimate procedure in the finite element method and
 applications, SIAM J. Numer. Anal. 20, for the tractions; Johnson, Mercier (1978), Some equilibrium
@@ -32,7 +37,7 @@ Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,6 +45,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from contactopt.accuracy.composite_element import components, reference_energy
 from contactopt.material import Material, lame
 
 BLOCK = 20_000  # elements at a time
@@ -180,7 +186,7 @@ class Simplices:
         some elements [per thickness].
         """
         d, (E, nu) = self.dim, (material.E, material.nu)
-        pairs, parts = _pairs(d), _reference(d)[1]
+        pairs, parts = components(d), reference_energy(d)
         base = np.zeros((len(pairs), d, d))
         for number, (i, j) in enumerate(pairs):
             base[number, i, j] = base[number, j, i] = 1.0
@@ -197,10 +203,10 @@ class Simplices:
         flat = form.reshape(len(form), -1) @ parts.reshape(-1, size * size)
         return np.asarray(flat.reshape(-1, size, size))
 
-    def energies(self, material: Material, data: np.ndarray) -> np.ndarray:
-        """(e,) y' H y of all elements."""
+    def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """(e,) y' H z of all elements."""
         found = [
-            np.einsum("ei,eij,ej->e", data[own], self.metric(material, own), data[own])
+            np.einsum("ei,eij,ej->e", one[own], self.metric(material, own), other[own])
             for own in self._blocks
         ]
         return np.concatenate(found)
@@ -372,51 +378,3 @@ def _least(balance: sp.csc_matrix) -> Any:
     ground = np.zeros(D.shape[0])
     ground[first] = 1.0
     return splu(D + sp.diags(ground, format="csc"), permc_spec="MMD_AT_PLUS_A").solve
-
-
-def _pairs(d: int) -> list[tuple[int, int]]:
-    """The components of a symmetric matrix."""
-    return [(i, j) for i in range(d) for j in range(i, d)]
-
-
-@cache
-def _reference(d: int) -> tuple[np.ndarray, np.ndarray]:
-    """The stress of Johnson and Mercier on the reference element: its components (part, vertex of
-    the part, component, input) from the moments of its tractions and a body force, and the integral
-    (component, component, input, input) of their products over the volume.
-    """
-    x = np.concatenate([np.zeros((1, d)), np.eye(d)])
-    pairs, n = _pairs(d), d + 1
-    volume = 1 / (2 if d == 2 else 6) / n
-    slopes = []
-    for s in range(n):
-        corners = x.copy()
-        corners[s] = x.mean(axis=0)
-        slopes.append(np.linalg.inv(np.column_stack([np.ones(n), corners]))[1:].T)
-    stress = np.zeros((n, n, d, d, n, n, len(pairs)))  # unknowns -> the symmetric stress
-    for number, (i, j) in enumerate(pairs):
-        for s, v in np.ndindex(n, n):
-            stress[s, v, i, j, s, v, number] = stress[s, v, j, i, s, v, number] = 1.0
-    stress = stress.reshape(n, n, d, d, -1)
-    equations, data, inputs = [], [], n * d * d + d
-
-    def demand(rows: np.ndarray, first: int = -1) -> None:
-        """Rows are zero, or equal to the inputs from the first one on."""
-        equations.append(rows)
-        data.append(np.eye(d, inputs, first) if first >= 0 else np.zeros((d, inputs)))
-
-    for s in range(n):
-        demand(-np.einsum("vijk,vj->ik", stress[s], slopes[s]), n * d * d)
-        own = [v for v in range(n) if v != s]
-        for a, v in enumerate(own):
-            tested = (stress[s, v] + stress[s, own].sum(axis=0)) / (d * (d + 1))
-            demand(np.einsum("ijk,j->ik", tested, -d * volume * slopes[s][s]), (s * d + a) * d)
-        for t in range(s):
-            for one, other in [(s, t), *((v, v) for v in own if v != t)]:
-                jump = stress[s, one] - stress[t, other]
-                demand(np.einsum("ijk,j->ik", jump, slopes[s][t]))
-    solved = np.linalg.pinv(np.concatenate(equations), rcond=1e-12) @ np.concatenate(data)
-    found = solved.reshape(n, n, len(pairs), inputs)
-    both = (found, found.sum(axis=1, keepdims=True))  # int l_a l_b = V (1 + delta) / ...
-    parts = sum(np.einsum("svak,svbl->abkl", own, own) for own in both)
-    return found, parts / (n * n * (n + 1))
