@@ -240,5 +240,23 @@ class Bound:
         return self._balanced(t, duals.dual.s, duals.bodies), z, t[:, 0], c
 
 
+def bounded(
+    solved: Solved, quantity: Quantity, value: float
+) -> tuple[float | None, float | None, str]:
+    """Guaranteed bounds of the relative errors of a quantity with this value, and of the
+    displacement in the energy norm; and one sentence that says what is missing where one is None.
+    """
+    try:
+        bound = Bound(solved)
+        energy = bound.error / bound.norm if bound.norm > 0 else None
+    except InputError as error:
+        return None, None, str(error)
+    try:
+        middle, width = bound.of(quantity)
+    except InputError as error:
+        return None, energy, str(error)
+    return (abs(middle - value) + width) / (abs(value) or 1.0), energy, ""
+
+
 def _minus(one: Data, other: Data) -> Data:
     return [None if a is None else a - b for a, b in zip(one, other)]

@@ -6,7 +6,7 @@ made, for which in every element and across every facet
     div s* + f = 0,    s* n = t on loaded and contact boundaries,    s* n continuous,
 
 exactly so for constant body forces f and tractions t that are linear on each facet. There are three
-steps, of which the last is for the plane alone.
+steps.
 
 1. Tractions between elements. On each facet F the traction is linear, and known by its moments m_Fa
    (dim,) with the hat functions phi_a of the vertices a of F. They hold every element E in balance
@@ -24,9 +24,10 @@ steps, of which the last is for the plane alone.
    s = B s^ B' / |det B|, where x = B x^ + b, which keeps symmetry, divergence and tractions. So one
    small matrix, made once, serves all elements: H gives the energy int s : C^-1 : s = y' H y of
    the data y of an element, its tractions and body force.
-3. The nearest such stress. In the plane all stresses without loads derive from functions of Airy.
+3. A stress nearer to s(u). In the plane all stresses without loads derive from functions of Airy.
    Of these the one is added that makes the energy of s* - s(u) least, a sparse linear system. Long
-   thin elements, on which tractions bend, would be far from s(u) without it.
+   thin elements, on which tractions bend, would be far from s(u) without it. In space a few steps
+   of conjugate gradients make that energy less with tractions that leave every vertex in balance.
 
 Sources: Ladeveze, Leguillon (1983), Error estimate procedure in the finite element method and
 applications, SIAM J. Numer. Anal. 20, for the tractions; Johnson, Mercier (1978), Some equilibrium
@@ -42,10 +43,10 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from contactopt.accuracy.composite_element import components, reference_energy
+from contactopt.accuracy.vertex_balance import Balance
 from contactopt.material import Material, lame
 
 BLOCK = 20_000  # elements at a time
@@ -240,19 +241,38 @@ class Simplices:
         over that of an element.
         """
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
-        m, unbalanced = self._tractions(stress, force, known, moments)
-        given = self.data_of(stress)
-        if self.dim == 2:
-            m += self._nearer(material, self.data(self._outward(m), force) - given, known)
+        balance = Balance(self._at_vertices, known)
+        m, unbalanced = self._tractions(
+            stress, force, np.where(known[:, None], moments, np.nan), balance
+        )
+        missing = self.data(self._outward(m), force) - self.data_of(stress)
+        K, slope = self._facet_energy(material, missing)
+        m += (self._by_airy(K, slope, known) if self.dim == 2 else balance.least(K, slope)).reshape(
+            m.shape
+        )
         return self.data(self._outward(m), force), unbalanced
+
+    @cached_property
+    def _at_vertices(self) -> sp.csc_matrix:
+        """(e (dim + 1), facets dim) from the moments of one component of tractions to the forces at
+        the vertices of the elements.
+        """
+        d, count = self.dim, len(self.volume)
+        rows, columns, signs = [], [], []
+        for o, own in enumerate(self.others):
+            for a, slot in zip(own, self.slots[o]):
+                rows.append(np.arange(count) * (d + 1) + a)
+                columns.append(self.opposite[o] * d + slot)
+                signs.append(self.sign[o])
+        entries = np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))
+        return sp.csc_matrix(entries, (count * (d + 1), self.mesh.facets.shape[1] * d))
 
     def _outward(self, m: np.ndarray) -> np.ndarray:
         """Moments (facets, dim, dim) as the elements see them."""
         return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
 
-    def _nearer(self, material: Material, missing: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """What to add to the moments of plane tractions so that the stress whose data are `missing`
-        gets the least energy.
+    def _by_airy(self, K: sp.csr_matrix, slope: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """What to add to the moments of plane tractions so that m' K m / 2 + slope' m is least.
 
         A stress without body force derives from a function A of Airy, cubic on the three parts of
         each triangle and smooth across all edges. With the gradients g at the vertices and the mean
@@ -295,13 +315,12 @@ class Simplices:
         columns = np.repeat(unknown.T[:, None], 4, axis=1).ravel()
         change = sp.csr_matrix((D.ravel(), (rows, columns)), (4 * facets.shape[1], size))
         change = change[:, np.flatnonzero(~fixed)]
-        K, slope = self._facet_energy(material, missing)
         reduced = (change.T @ K @ change).tocsc()
         reduced += sp.diags(TINY * reduced.diagonal(), format="csc")
         solve = splu(
             reduced, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
-        return np.asarray(-(change @ solve.solve(change.T @ slope))).reshape(-1, 2, 2)
+        return np.asarray(-(change @ solve.solve(change.T @ slope)))
 
     def _facet_energy(
         self, material: Material, missing: np.ndarray
@@ -329,52 +348,22 @@ class Simplices:
         return sp.csr_matrix((data, (rows, columns)), (len(slope), len(slope))), slope
 
     def _tractions(
-        self, stress: np.ndarray, force: np.ndarray, known: np.ndarray, moments: np.ndarray
+        self, stress: np.ndarray, force: np.ndarray, given: np.ndarray, balance: Balance
     ) -> tuple[np.ndarray, float]:
-        """Moments (facets, dim, dim) of tractions that hold all elements in balance."""
-        d, mesh, count = self.dim, self.mesh, len(self.volume)
-        inner = mesh.f2t[1] >= 0
-        m = np.zeros((len(inner), d, d))
+        """Moments (facets, dim, dim) of tractions that hold all elements in balance, and by how
+        much they do not; nan where they are not given.
+        """
+        d, mesh = self.dim, self.mesh
+        m = np.zeros(given.shape)
         for o, own in enumerate(self._moments(stress)):
-            share = self.sign[o] * np.where(inner[self.opposite[o]], 0.5, 1.0)
+            share = self.sign[o] * np.where(mesh.f2t[1, self.opposite[o]] >= 0, 0.5, 1.0)
             for slot, moment in zip(self.slots[o], own):
                 np.add.at(m, (self.opposite[o], slot), share[:, None] * moment)
-        m = np.where(known[:, None], moments, m)
+        m = np.where(np.isnan(given), m, given)
         needed = np.einsum("eij,eaj->eai", stress.mean(axis=1), self.slopes) - force / (d + 1)
-        needed = needed * self.volume[:, None, None]
+        needed = (needed * self.volume[:, None, None]).reshape(-1, d)
+        left = needed - balance.matrix @ m.reshape(-1, d)
+        change = balance.made(left)
+        left = left - balance.matrix @ change
         size = float(np.abs(needed).max(initial=0.0)) or 1.0
-        rows, columns, signs = [], [], []
-        for o, own in enumerate(self.others):
-            for a, slot in zip(own, self.slots[o]):
-                needed[:, a] -= self.sign[o][:, None] * m[self.opposite[o], slot]
-                rows.append(np.arange(count) * (d + 1) + a)
-                columns.append(self.opposite[o] * d + slot)
-                signs.append(self.sign[o])
-        entries = np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))
-        balance = sp.csc_matrix(entries, (count * (d + 1), len(inner) * d))
-        left, worst, solve, before = needed.reshape(-1, d), 0.0, None, None
-        for c in range(d):
-            chosen = np.flatnonzero(np.repeat(~known[:, c], d))
-            if before is None or not np.array_equal(chosen, before):
-                own, before = balance[:, chosen], chosen
-                solve = _least(own)
-            assert solve is not None
-            change = own.T @ solve(left[:, c])
-            m[..., c].reshape(-1)[chosen] += change
-            worst = max(worst, float(np.abs(left[:, c] - own @ change).max(initial=0.0)))
-        return m, worst / size
-
-
-def _least(balance: sp.csc_matrix) -> Any:
-    """The inverse of D D' for the balance D of elements by facets, where the equations of a vertex
-    that nothing holds have one that follows from the others.
-    """
-    D = (balance @ balance.T).tocsc()
-    count, group = connected_components(D, directed=False)
-    # where each facet at a vertex joins two elements, the sum of all equations is zero
-    alone = np.abs(np.asarray(balance.sum(axis=0)).ravel())
-    free = np.bincount(group, abs(balance) @ alone, count) == 0
-    first = np.unique(group, return_index=True)[1][free]
-    ground = np.zeros(D.shape[0])
-    ground[first] = 1.0
-    return splu(D + sp.diags(ground, format="csc"), permc_spec="MMD_AT_PLUS_A").solve
+        return m + change.reshape(m.shape), float(np.abs(left).max(initial=0.0)) / size

@@ -60,6 +60,9 @@ class Estimate:
     geometry_error  part of it that no refinement removes, because the meshes do not tell the shape
                     of a boundary [-]
     order           observed order of convergence; None if it was not observed
+    bound           guaranteed bound of the error over the value [-], and energy_bound, that of the
+                    displacement in the energy norm, both for the mesh's own shape
+                    (contactopt.accuracy.bound); None where `unbounded` says why there is none
     reached         whether the error is at most the target
     message         one sentence that says how the search ended
     levels          all solves, in their order
@@ -74,9 +77,20 @@ class Estimate:
     grading_error: float | None
     geometry_error: float
     order: float | None
+    bound: float | None
+    energy_bound: float | None
+    unbounded: str
     reached: bool
     message: str
     levels: tuple[Level, ...]
+
+    @property
+    def guarantee(self) -> str:
+        """What is guaranteed, in words."""
+        energy = f"of the energy norm {self.energy_bound:.1e}" if self.energy_bound else ""
+        if self.bound is not None:
+            return f"bound: the relative error is at most {self.bound:.1e}, {energy}"
+        return f"estimate, no bound: {self.unbounded}" + (f" Bound {energy}." if energy else "")
 
     def __repr__(self) -> str:
         first, last = self.levels[0], self.levels[-1]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
 from contactopt.accuracy.estimate import Estimate, Judged, Level
 from contactopt.accuracy.everywhere import Everywhere
@@ -275,6 +276,7 @@ class _Loop:
             judged.grading / scale if signed else None,
             geometry / scale if np.isfinite(geometry) else 1.0,
             judged.order,
+            *bounded(self.solved, self.quantity, value),
             reached,
             message,
             tuple(self.levels),
