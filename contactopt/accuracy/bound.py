@@ -92,11 +92,14 @@ class Bound:
         displaced = scene.reduction.displaced(scene.solution)
         before = scene.nodal(displaced)
         self.displacement = scene.admissible(before)
-        own, self.strained = self._strained(before), self._strained(self.displacement)
+        self.strained = self._strained(self.displacement)
         self.balanced = self._balanced(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
-        self.mesh, self.norm = self.size(self.missing), self.size(own)
-        self.moved = self.size(_minus(self.strained, own))
+        self.mesh = self.size(self.missing)
+        added = [new - old for new, old in zip(self.displacement, before)]
+        self.moved = self.size(self._strained(added))
+        energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]
+        self.norm = float(np.sqrt(2 * sum(energies)))
         works = scene.works(self.displacement)
         self.contact, self.friction = (float(np.sqrt(2 * max(work, 0.0))) for work in works)
         u, r = scene.reduction.seen(displaced), scene.tractions * scene.problem.areas[:, None]

@@ -182,7 +182,7 @@ class Simplices:
             found.append((t + t.sum(axis=0)) / (self.dim * (self.dim + 1)))
         return np.array(found)
 
-    def metric(self, material: Material, chosen: slice = slice(None)) -> np.ndarray:
+    def metric(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
         """H (e, inputs, inputs): y' H y = int s : C^-1 : s for the composite stress s of data y, of
         some elements [per thickness].
         """
@@ -193,24 +193,27 @@ class Simplices:
             base[number, i, j] = base[number, j, i] = 1.0
         B, ratio = self._map[chosen], self._ratio[chosen]
         G = B.swapaxes(1, 2) @ B
-        turned = np.einsum("eij,ajk->eaik", G, base)
+        turned = G[:, None] @ base
         traces = np.trace(turned, axis1=2, axis2=3)
         # in plane strain the trace in space is 1 + nu times that in the plane
         factor = nu * (1 + nu) if d == 2 else nu
-        form = (1 + nu) * np.einsum("eaij,ebji->eab", turned, turned)
+        rows = turned.reshape(-1, len(pairs), d * d)
+        columns = turned.swapaxes(2, 3).reshape(rows.shape)
+        form = (1 + nu) * rows @ columns.swapaxes(1, 2)
         form -= factor * traces[:, :, None] * traces[:, None]
         form *= (self.volume[chosen] / ratio**2 / E)[:, None, None]
         size = parts.shape[-1]
-        flat = form.reshape(len(form), -1) @ parts.reshape(-1, size * size)
+        flat = form.reshape(-1, len(pairs) ** 2) @ parts.reshape(-1, size * size)
         return np.asarray(flat.reshape(-1, size, size))
 
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(e,) y' H z of all elements."""
-        found = [
-            np.einsum("ei,eij,ej->e", one[own], self.metric(material, own), other[own])
-            for own in self._blocks
-        ]
-        return np.concatenate(found)
+        out = np.zeros(len(one))
+        there = np.flatnonzero(np.any(one != 0, axis=1) & np.any(other != 0, axis=1))
+        for own in np.split(there, range(BLOCK, len(there), BLOCK)):
+            turned = self.metric(material, own) @ other[own, :, None]
+            out[own] = np.sum(one[own] * turned[..., 0], axis=1)
+        return out
 
     @property
     def _blocks(self) -> list[slice]:
