@@ -42,7 +42,8 @@ nothing. The energy is such a quantity with a(v, u - v) in its place, up to |u -
 Coulomb's law is treated as Tresca's with g = mu p*. What follows is that the error of p* changes g:
 the left side of (*) loses 2 int mu (p* - p) (|[u_t]| - |[v_t]|). If this is at most
 kappa (|u - v|^2 + |s(u) - s*|^2) with kappa < 1, small friction, the bound grows by
-1 / (1 - kappa)^1/2. kappa is proportional to mu.
+1 / (1 - kappa)^1/2. On a mesh kappa is at most 2 mu / mu', where mu' is the friction coefficient
+below which `contactopt diagnose` says that the solution is unique.
 
 The bound is of the problem whose boundary is that of the mesh. It does not cover straight edges in
 place of a curve. Integrals over contact facets are taken over SPLIT parts of each; there
@@ -56,6 +57,7 @@ for contact problems, Math. Comp. 78.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -71,7 +73,7 @@ from contactopt.solving.solve_scene import Solved
 UNBALANCED = 1e-6  # of the force of an element: so much a vertex may be out of balance
 ALL = 1e-9  # by how much shares that add up to one may miss it
 TINY, HUGE = 1e-200, 1e200
-TRIED = 2  # adjoints of a quantity, the second with what the first one tells
+TRIED = 3  # adjoints of a quantity, each with what the one before tells
 ENERGY = "energy"
 LINEAR = "approach", "shift", "normal_force", "resultant"
 Data = list[Any]  # for every body what determines a composite stress; None for a rigid one
@@ -229,14 +231,18 @@ class Bound:
         z = scene.nodal(duals.fields)
         z = [own.copy() for own in z]
         for pair in scene.pairs:
-            near = np.zeros(len(p), dtype=bool)
-            near[pair.contacts[:, (p[pair.contacts] > 0).any(axis=0)]] = True
-            closed = near[pair.contacts].T @ nodes > 1 - ALL
+            pressed = (p[pair.contacts] > 0).T  # (f, v)
             gap = np.maximum(pair.jump(self.displacement, nodes)[0], 0.0)
-            most = np.where(closed, 0.0, limit * gap)
             value = pair.jump(z, nodes, True)[0] + omega[pair.contacts].T @ nodes
-            pair.lift(z, np.clip(value, -most, most) - value)
-            away = ~closed[:, :d].all(axis=1)
+            most = np.where(pressed @ nodes > 1 - ALL, 0.0, limit * gap)
+            wanted = np.clip(value, -most, most)
+            for node, ends in enumerate(combinations(range(d), 2), d):
+                for end, other in (ends, ends[::-1]):  # next to the pressure in proportion
+                    share = gap[:, node] / np.maximum(gap[:, end], TINY)
+                    beside = pressed[:, other] & ~pressed[:, end]
+                    wanted[beside, node] = (share * wanted[:, end])[beside]
+            pair.lift(z, wanted - value)
+            away = ~pressed.all(axis=1)
             value = (pair.jump(z, at, True)[0] + omega[pair.contacts].T @ at)[away]
             gap = pair.jump(self.displacement, at)[0][away]
             c = max(c, float(np.max(np.abs(value) / np.maximum(gap, TINY), initial=0.0)))

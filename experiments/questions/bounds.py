@@ -1,0 +1,315 @@
+"""Is the guaranteed bound of the error never violated, how much larger than the error is it, and
+what does it cost?
+
+The exact solution is known for one family of scenes, a column under its own weight between smooth
+walls. For all others its place is taken by quadratic displacements on meshes whose elements have a
+quarter of the size (a half of it in space). Their distance from the solution is at most the
+distance of the exact one plus their own error, which has a bound as well. So a bound is proved to
+be violated if it is less than that distance minus the bound of the fine solution, and it counts
+here as violated if it is less than the distance itself.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import skfem
+
+from contactopt import Material
+from contactopt.accuracy.bound import Bound
+from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.loop import refine
+from contactopt.errors import InputError
+from contactopt.meshes.mesh_refinement import split
+from contactopt.readings.quantities import find_quantity
+from contactopt.scenes import make_scene
+from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
+from contactopt.solving.limits import Limits
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
+from experiments.report import COLOURS, measure, paper_axes
+
+LAWS = (("frictionless", 0.0), ("tresca", 10.0), ("coulomb", 0.3))
+COARSE, FINER = {2: 6, 3: 3}, {2: 2, 3: 1}  # elements along an edge, and halvings of the reference
+SOFT, STIFF = 1000.0, 3000.0  # Young's moduli [stress]
+UNKNOWNS = 10_000
+REPEATED = 3
+
+
+def box(dim: int, n: int, up: float, seed: int, across: int = 1) -> Any:
+    """A unit cube above (up = 1) or below (-1) the plane of contact, whose inner nodes are moved at
+    random; elements are `across` times as long up as they are wide.
+    """
+    ticks = [np.linspace(0, 1, n + 1)] * (dim - 1)
+    kind = skfem.MeshTri if dim == 2 else skfem.MeshTet
+    mesh = kind.init_tensor(*ticks, up * np.linspace(0, 1, n // across + 1))
+    p, shake = mesh.p.copy(), 0.15 / n * (across == 1)
+    inner = np.all((np.abs(p) > 1e-9) & (np.abs(p) < 1 - 1e-9), axis=0)
+    p[:, inner] += shake * np.random.default_rng(seed).uniform(-1, 1, p[:, inner].shape)
+    names: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "contact": lambda x: np.abs(x[-1]) < 1e-9,
+        "far": lambda x: np.abs(x[-1] - up) < 1e-9,
+        "right": lambda x: np.abs(x[0] - 1) < 1e-9,
+        "left": lambda x: np.abs(x[0]) < 1e-9,
+    }
+    if dim == 3:
+        names["front"] = lambda x: np.abs(x[1]) < 1e-9
+    return kind(p, mesh.t).with_boundaries(names)
+
+
+def held(dim: int, load: str, up: str) -> dict[str, tuple[Any, ...]]:
+    """Supports and loads of the upper body."""
+    planes = (Support("left", {"x": 0.0}), Support("front", {"y": 0.0}))[: dim - 1]
+    wall = (*planes, Support("right"))
+    return {
+        "pushed": {"supports": (*planes, Support("far", {"x": 0.0, up: -0.1}))},
+        "plate": {"supports": planes, "loads": (Plate("far", {up: -100.0}),)},
+        "pressed": {"supports": wall, "loads": (Traction("far", (0.0, -100.0)),)},
+        "heavy": {"supports": wall, "loads": (BodyForce((0.0, -150.0)),)},
+        "sheared": {"supports": (Support("far", {"x": 0.05, up: -0.1}),)},
+    }[load]
+
+
+def on_floor(
+    load: str, degree: int, law: str, mu: float, dim: int = 2, nu: float = 0.3, across: int = 1
+) -> Scene:
+    """A block on a rigid floor that curves away from it."""
+    up = "xyz"[dim - 1]
+    mesh = box(dim, COARSE[dim] * (2 if across > 1 else 1), 1.0, 0, across)
+    floor = Rigid("floor", normal=(0.0,) * (dim - 1) + (1.0,), gap=rounded)
+    block = Part("block", mesh, Material(SOFT, nu), **held(dim, load, up))
+    kind = "plane-strain" if dim == 2 else "solid"
+    return Scene(f"{load}, floor", block, floor, mu, kind, law=law, degree=degree)
+
+
+def rounded(x: np.ndarray) -> np.ndarray:
+    return np.asarray(0.1 * np.sum(x[:-1] ** 2, axis=0))
+
+
+def two_blocks(load: str, degree: int, law: str, mu: float, dim: int = 2) -> Scene:
+    """Two blocks, the upper one with a lower side that is bent upwards (in space flat)."""
+    up = "xyz"[dim - 1]
+    upper, lower = (box(dim, COARSE[dim], sign, seed) for sign, seed in ((1.0, 1), (-1.0, 2)))
+    if dim == 2:
+        p = upper.p.copy()
+        p[1] += 0.05 * p[0] ** 2 * (1 - p[1])
+        upper = replace(upper, doflocs=p)
+    planes = (Support("left", {"x": 0.0}), Support("front", {"y": 0.0}))[: dim - 1]
+    top = Part("upper", upper, Material(SOFT, 0.3), **held(dim, load, up))
+    free = load == "sheared"
+    below = (Support("far"),) if free else (*planes, Support("far"))
+    bottom = Part("lower", lower, Material(STIFF, 0.3), below)
+    kind = "plane-strain" if dim == 2 else "solid"
+    return Scene(f"{load}, two blocks", top, bottom, mu, kind, law=law, degree=degree)
+
+
+def scenes() -> Iterator[Scene]:
+    """The cases."""
+    for degree in (1, 2):
+        for law in LAWS:
+            for load in ("pushed", "plate", "pressed", "heavy", "sheared"):
+                yield on_floor(load, degree, *law)
+            for load in ("pushed", "plate", "sheared"):
+                yield two_blocks(load, degree, *law)
+            yield replace(on_floor("pressed", degree, *law, nu=0.48), name="nu = 0.48, floor")
+            yield replace(on_floor("pushed", degree, *law, across=4), name="long elements, floor")
+            yield replace(on_floor("plate", degree, *law, dim=3), name="plate, floor, space")
+        yield replace(two_blocks("pushed", degree, *LAWS[1], dim=3), name="pushed, blocks, space")
+
+
+def finer(scene: Scene) -> Scene:
+    """The scene of the reference."""
+    for _ in range(FINER[scene.dim]):
+        scene = scene.with_parts(
+            lambda part: replace(part, mesh=split(part.mesh, {})) if part.elastic else part
+        )
+    return replace(scene, degree=2)
+
+
+def carried(coarse: Simplices, nodal: np.ndarray, fine: Simplices) -> np.ndarray:
+    """A displacement at the nodes of a finer mesh, each looked for in the element about it."""
+    mesh, places = fine.mesh, fine.quadratic(fine.mesh.p)
+    holder = coarse.mesh.element_finder()(*mesh.p[:, mesh.t].mean(axis=1))
+    own = np.zeros(places.shape[1], dtype=int)
+    for nodes in (*mesh.t, *(mesh.nvertices + fine.between[1])):
+        own[nodes] = holder
+    origin = coarse.mesh.p[:, coarse.mesh.t[0, own]]
+    shares = np.einsum("nai,in->an", coarse.slopes[own], places - origin)
+    shares[0] += 1
+    corners = nodal[:, coarse.mesh.t[:, own]]
+    out = np.einsum("an,can->cn", shares * (2 * shares - 1), corners)
+    ends, edges = coarse.between
+    for (i, j), edge in zip(ends.T, edges[:, own]):
+        out += 4 * shares[i] * shares[j] * nodal[:, coarse.mesh.nvertices + edge]
+    return np.asarray(out)
+
+
+def distance(bound: Bound, fine: Bound, exact: Callable[..., Any] | None = None) -> float:
+    """Energy norm of the difference between a solution and the fine or an exact one."""
+    total, pairs = 0.0, zip(bound.scene.bodies, bound.scene.cells, fine.scene.cells)
+    one, other = (
+        b.scene.nodal(b.scene.reduction.displaced(b.scene.solution)) for b in (bound, fine)
+    )
+    for i, (body, coarse, cells) in enumerate(pairs):
+        if coarse is None:
+            continue
+        wanted = other[i] if exact is None else exact(cells.quadratic(cells.mesh.p))
+        missing = wanted - carried(coarse, one[i], cells)
+        data = cells.data_of(cells.stress(body.body.material, missing))
+        total += bound.scene.factor * cells.products(body.body.material, data, data).sum()
+    return float(np.sqrt(total))
+
+
+def column() -> tuple[Scene, Callable[[np.ndarray], np.ndarray]]:
+    """A column under its own weight on a floor, and its exact displacement."""
+    mesh, material, weight = box(2, COARSE[2], 1.0, 0), Material(SOFT, 0.3), 150.0
+    sides = tuple(Support(name, {"x": 0.0}) for name in ("left", "right"))
+    part = Part("block", mesh, material, sides, (BodyForce((0.0, -weight)),))
+    scene = Scene("column, floor", part, Rigid("floor"), 0.0, law="frictionless")
+    modulus = SOFT * 0.7 / (1.3 * 0.4)
+
+    def exact(x: np.ndarray) -> np.ndarray:
+        return np.stack([0 * x[0], weight / modulus * (x[1] ** 2 / 2 - x[1])])
+
+    return scene, exact
+
+
+def case(scene: Scene, exact: Callable[..., Any] | None = None) -> dict[str, Any]:
+    """One row: the error, its bound and its parts, and the same of a quantity."""
+    solved, fine = solve_scene(scene), solve_scene(finer(scene))
+    bound, best = Bound(solved), Bound(fine)
+    error = distance(bound, best, exact)
+    row: dict[str, Any] = {"scene": scene.name, "degree": scene.degree, "law": scene.pairs[0].law}
+    row |= {"error": error, "bound": bound.error, "ratio": bound.error / error}
+    row |= {part: getattr(bound, part) for part in ("mesh", "contact", "friction", "moved")}
+    row["reference's bound"] = best.error
+    plate = any(isinstance(load, Plate) for part in scene.meshed.values() for load in part.loads)
+    quantity = find_quantity("approach" if plate else "normal_force", scene)
+    row |= {"quantity": quantity.name, "its error": "", "its bound": "", "its ratio": ""}
+    try:
+        middle, width = bound.of(quantity)
+    except InputError:
+        return row
+    values = [quantity.read(own.reduction, own.solution).value for own in (solved, fine)]
+    inside, off = abs(middle - values[1]) <= width, abs(values[0] - values[1])
+    most = width + abs(middle - values[0])
+    return row | {
+        "its error": off,
+        "its bound": most if inside else -most,
+        "its ratio": most / off,
+    }
+
+
+def bounds() -> list[dict[str, Any]]:
+    return [case(*column()), *(case(scene) for scene in scenes())]
+
+
+def _seconds(work: Callable[[], Any]) -> float:
+    """Median of the CPU time [s]."""
+    spent = []
+    for _ in range(REPEATED):
+        begin = time.process_time()
+        work()
+        spent.append(time.process_time() - begin)
+    return float(np.median(spent))
+
+
+def costs() -> list[dict[str, Any]]:
+    """What the bound costs beside the solve, CPU time."""
+    made: list[tuple[str, Scene, int]] = []
+    for degree, n in ((1, 128), (2, 48)):
+        for mu in (0.0, 0.5):
+            scene = make_scene("punch-2d", simplices=True, degree=degree, mu=mu)
+            made.append((f"punch-2d, triangles of degree {degree}, mu = {mu:g}", scene, n))
+    for degree, n in ((1, 10), (2, 5)):
+        scene = make_scene("punch-3d", simplices=True, degree=degree, mu=0.5)
+        made.append((f"punch-3d, tetrahedra of degree {degree}, mu = 0.5", scene, n))
+    rows = []
+    for name, scene, n in made:
+        solved = solve_scene(scene, n)
+        whole, own = _seconds(partial(solve_scene, scene, n)), _seconds(partial(Bound, solved))
+        bound = Bound(solved)
+        rows.append(
+            {"scene": name, "unknowns": solved.reduction.dofs, "solve [s]": whole, "bound [s]": own,
+             "ratio": own / whole, "bound of the energy norm": bound.error / bound.norm}
+        )  # fmt: skip
+    return rows
+
+
+def stopping() -> list[dict[str, Any]]:
+    """CPU time of a search whose solvers stop in time, and with the usual tolerance."""
+    rows = []
+    for name, solver, accuracy, most in (
+        ("punch-3d", "multigrid", 1e-2, 40_000),
+        ("cattaneo-3d", "multigrid", 1e-2, 40_000),
+        ("punch-2d", "auto", 2e-3, 40_000),
+    ):
+        found: dict[bool, tuple[float, Any, Solved]] = {}
+        for usual in (True, False):
+            options = Options(solver=solver, tol=1.000001e-8 if usual else 1e-8)
+            begin = time.process_time()
+            solved, estimate = refine(
+                [make_scene(name)], "energy", accuracy, options, Limits(unknowns=most)
+            )
+            found[usual] = time.process_time() - begin, estimate, solved
+        (before, one, _), (after, other, solved) = found[True], found[False]
+        rows.append(
+            {"scene": name, "unknowns": solved.reduction.dofs, "usual [s]": before,
+             "in time [s]": after, "saved": 1 - after / before,
+             "error of the mesh": other.error, "change by stopping": other.value / one.value - 1}
+        )  # fmt: skip
+    return rows
+
+
+def figures(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
+    figure, axes = paper_axes(2, wide=True)
+    for ax, error, bound, what, line in (
+        (axes[0], "error", "bound", "energy norm, degree", 3),
+        (axes[1], "its error", "its bound", "approach and normal force, degree", 10),
+    ):
+        for degree, colour in zip((1, 2), COLOURS):
+            rows = [row for row in tables["bounds"] if row["degree"] == degree and row[error] != ""]
+            x, y = (np.array([abs(row[key]) for row in rows]) for key in (error, bound))
+            ax.loglog(x, y, "o", color=colour, label=f"{what} {degree}", alpha=0.7)
+        ends = np.array(ax.get_xlim())
+        ax.loglog(ends, ends, "k-", lw=0.8)
+        ax.loglog(ends, line * ends, "k:", lw=0.8)
+        ax.text(ends[1], ends[1], " 1", va="center")
+        ax.text(ends[1], line * ends[1], f" {line}", va="center")
+        ax.set(xlabel="error", ylabel="bound")
+        ax.legend(frameon=False)
+    return {"bounds": figure}
+
+
+TEXT = """
+FINDINGS
+
+![bounds](bounds.png)
+
+## The cases
+
+`ratio` is the bound over the error. `mesh`, `contact`, `friction` and `moved` are the parts of the
+bound, as in `contactopt.accuracy.bound`; all are norms of energy. A negative bound of a quantity
+would say that its interval misses the reference.
+
+{bounds}
+
+## Cost
+
+{costs}
+
+## Solvers that stop in time
+
+A search for an accuracy stops its solvers at a residual of a tenth of the accuracy, at most 1e-5.
+
+{stopping}
+"""
+TITLE = "Guaranteed bounds of the error"
+
+if __name__ == "__main__":
+    tables = {"bounds": bounds, "costs": costs, "stopping": stopping}
+    measure("bounds", TITLE, TEXT, tables, figures)
