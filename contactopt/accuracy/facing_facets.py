@@ -26,6 +26,7 @@ from contactopt.solving.solve_scene import Solved
 LAWS = "frictionless", "tresca", "coulomb"
 NEAR = 1e-6  # vertices and contacts coincide within this fraction of the surface
 FLAT = 1e-9  # by how much the normals of a flat contact surface differ
+CLEAR = 1.5  # of the bubbles that a facet beside the pressure needs, so that it stays open
 SPLIT = {2: 16, 3: 4}  # parts of an edge of a contact facet for integrals over it
 
 
@@ -305,6 +306,7 @@ class PressedScene:
             least = np.maximum(missing[:, :d], 0.0) @ nodes
             pair.lift(out, np.where(closed, missing, np.maximum(missing, least)))
             more = np.maximum(np.max(-pair.jump(out, at)[0] / bubble, axis=1), 0.0)
+            more[~closed.all(axis=1)] *= CLEAR
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out
 
