@@ -62,7 +62,9 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy.facing_facets import PressedScene, facet_nodes, facet_rule
+from contactopt.accuracy.facing_facets import facet_nodes
+from contactopt.accuracy.pressed_scene import PressedScene
+from contactopt.accuracy.uneven_traction import uneven_traction
 from contactopt.derivatives.interface import sensitivity
 from contactopt.derivatives.states import Duals
 from contactopt.errors import InputError
@@ -82,7 +84,7 @@ Data = list[Any]  # for every body what determines a composite stress; None for 
 class Bound:
     """A guaranteed bound of a solution; all norms are of energy [(force length)^1/2].
 
-    mesh      |s* - s(v)|
+    mesh      |s* - s(v)|, of which `joint` is what a mortar coupling adds
     contact   root of twice the work of p* in the gap;   friction  and of that of friction
     solver    root of what these works are at the contacts alone, which a solver could make zero
     moved     |v - u_h|;   norm  |u_h|
@@ -97,7 +99,8 @@ class Bound:
         self.strained = self._strained(self.displacement)
         self.balanced = self._balanced(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
-        self.mesh = self.size(self.missing)
+        self.joint = uneven_traction(scene)
+        self.mesh = self.size(self.missing) + self.joint
         added = [new - old for new, old in zip(self.displacement, before)]
         self.moved = self.size(self._strained(added))
         energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]
@@ -186,7 +189,13 @@ class Bound:
                 f"there is no bound of the {kind}, only of {', '.join(LINEAR)}, energy."
             )
         if np.any(problem.law.rough):
-            raise InputError(f"with friction there is no bound of the {kind}, only of its energy.")
+            raise InputError(
+                f"with friction there is no bound of the {kind}, only of the energy norm."
+            )
+        if any(pair.joined for pair in scene.pairs):
+            raise InputError(
+                f"with mortar there is no bound of the {kind}, only of the energy norm."
+            )
         state = State(scene.reduction, scene.solution)
         seeds = quantity.slopes(state)
         by = {"reactions": seeds.reactions, "multipliers": seeds.multipliers}
@@ -223,17 +232,16 @@ class Bound:
         this module. Both are cut off where c would be more than `limit`.
         """
         scene, d = self.scene, self.scene.problem.dim
-        at, nodes = facet_rule(d)[0], facet_nodes(d)
-        t, p = scene.share[:, None] * duals.dual.q, scene.tractions[:, 0]
+        nodes, p = facet_nodes(d), scene.tractions[:, 0]
+        t = scene.share[:, None] * duals.dual.q
         t[:, 0] = np.clip(t[:, 0], -limit * p, limit * p)
         t = scene.balanced(t, motions)
         c = float(np.max(np.abs(t[p > 0, 0]) / p[p > 0], initial=0.0))
-        z = scene.nodal(duals.fields)
-        z = [own.copy() for own in z]
+        z = [own.copy() for own in scene.nodal(duals.fields)]
         for pair in scene.pairs:
-            pressed = (p[pair.contacts] > 0).T  # (f, v)
-            gap = np.maximum(pair.jump(self.displacement, nodes)[0], 0.0)
-            value = pair.jump(z, nodes, True)[0] + omega[pair.contacts].T @ nodes
+            pressed = (pair.of_contacts(p) > 0).T  # (f, v)
+            gap = np.maximum(pair.jump(self.displacement, pair.nodes)[0], 0.0)
+            value = pair.jump(z, pair.nodes, True)[0] + pair.at_points(omega, pair.nodes)
             most = np.where(pressed @ nodes > 1 - ALL, 0.0, limit * gap)
             wanted = np.clip(value, -most, most)
             for node, ends in enumerate(combinations(range(d), 2), d):
@@ -243,8 +251,8 @@ class Bound:
                     wanted[beside, node] = (share * wanted[:, end])[beside]
             pair.lift(z, wanted - value)
             away = ~pressed.all(axis=1)
-            value = (pair.jump(z, at, True)[0] + omega[pair.contacts].T @ at)[away]
-            gap = pair.jump(self.displacement, at)[0][away]
+            value = (pair.jump(z, pair.rule, True)[0] + pair.at_points(omega, pair.rule))[away]
+            gap = pair.jump(self.displacement, pair.rule)[0][away]
             c = max(c, float(np.max(np.abs(value) / np.maximum(gap, TINY), initial=0.0)))
         return self._balanced(t, duals.dual.s, duals.bodies), z, t[:, 0], c
 

@@ -248,12 +248,12 @@ class Simplices:
         m, unbalanced = self._tractions(
             stress, force, np.where(known[:, None], moments, np.nan), balance
         )
-        missing = self.data(self._outward(m), force) - self.data_of(stress)
-        K, slope = self._facet_energy(material, missing)
+        missing = self.data(self.seen(m), force) - self.data_of(stress)
+        K, slope = self.facet_energy(material, missing)
         m += (self._by_airy(K, slope, known) if self.dim == 2 else balance.least(K, slope)).reshape(
             m.shape
         )
-        return self.data(self._outward(m), force), unbalanced
+        return self.data(self.seen(m), force), unbalanced
 
     @cached_property
     def _at_vertices(self) -> sp.csc_matrix:
@@ -270,7 +270,7 @@ class Simplices:
         entries = np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))
         return sp.csc_matrix(entries, (count * (d + 1), self.mesh.facets.shape[1] * d))
 
-    def _outward(self, m: np.ndarray) -> np.ndarray:
+    def seen(self, m: np.ndarray) -> np.ndarray:
         """Moments (facets, dim, dim) as the elements see them."""
         return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
 
@@ -325,7 +325,7 @@ class Simplices:
         )
         return np.asarray(-(change @ solve.solve(change.T @ slope)))
 
-    def _facet_energy(
+    def facet_energy(
         self, material: Material, missing: np.ndarray
     ) -> tuple[sp.csr_matrix, np.ndarray]:
         """Second and first derivatives of the energy of the stress by the moments of facets."""
