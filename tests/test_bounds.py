@@ -47,9 +47,9 @@ def on_floor(degree=1, law="frictionless", mu=0.0, plate=True, scale=1.0, n=5):
     return Scene("s", Part("b", mesh, MATERIAL, supports, loads), floor, mu, law=law, degree=degree)
 
 
-def two_blocks(degree=1, law="coulomb", mu=0.3, n=5):
+def two_blocks(degree=1, law="coulomb", mu=0.3, n=5, below=5):
     top = Part("upper", block(n, 1.0, 1), MATERIAL, (Support("far", {"x": 0.05, "y": -0.1}),))
-    low = Part("lower", block(n, -1.0, 2), Material(3000.0, 0.2), (Support("far"),))
+    low = Part("lower", block(below, -1.0, 2), Material(3000.0, 0.2), (Support("far"),))
     return Scene("s", top, low, mu, law=law, degree=degree)
 
 
@@ -96,8 +96,18 @@ def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
         (on_floor(1, "tresca", 8.0, plate=False), 8.0),
         (two_blocks(1, "tresca", 8.0), 8.0),
         (two_blocks(2, "tresca", 8.0), 8.0),
+        (two_blocks(1, "tresca", 8.0, below=7), 8.0),
+        (two_blocks(2, "frictionless", 0.0, below=4), 0.0),
     ],
-    ids=["linear", "quadratic", "tresca", "two blocks", "quadratic two blocks"],
+    ids=[
+        "linear",
+        "quadratic",
+        "tresca",
+        "matching",
+        "quadratic matching",
+        "mortar",
+        "coarse below",
+    ],
 )
 def test_no_dual_energy_exceeds_a_primal_one(scene, limit):
     """J of any admissible displacement is at least -J* of any admissible stress: that of each mesh
@@ -106,7 +116,7 @@ def test_no_dual_energy_exceeds_a_primal_one(scene, limit):
     coarse, best = Bound(solve_scene(scene)), Bound(fine(scene))
     (low, high), (below, above) = (between(bound, limit) for bound in (coarse, best))
     assert low <= above <= high and below <= high
-    assert high - low < 8 * (high - above) and above - below < 0.3 * (high - low)
+    assert high - low < 12 * (high - above) and above - below < 0.3 * (high - low)
 
 
 def between(bound, limit):

@@ -90,7 +90,7 @@ class FacingFacets:
             self.sides = self.sides[::-1]
         meshes = [cells[side.body].mesh for side in self.sides]
         if len(self.sides) == 2 and not self.joined:
-            self.sides[1] = _aligned(*self.sides, meshes[1])
+            self.sides[1] = _aligned(self.sides[0], self.sides[1], meshes[1])
         if not self.joined and any(np.any(side.contacts < 0) for side in self.sides):
             raise InputError(f"{name}: a bound needs a contact at every vertex of its surfaces.")
         first = solved.reduction.problem.pairs[number].start
@@ -170,7 +170,7 @@ class FacingFacets:
             "Ss,vSs,wSs,vSd->wSd", points.weights, points.at[0], points.at[number], t, optimize=True
         )
         out = np.zeros((len(t), len(side.facets), len(self.frame)))
-        np.add.at(out, (slice(None), points.facets[number]), side.sign * own)
+        np.add.at(out.swapaxes(0, 1), points.facets[number], side.sign * own.swapaxes(0, 1))
         return out
 
 

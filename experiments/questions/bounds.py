@@ -29,6 +29,7 @@ from contactopt.errors import InputError
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity, value_of
 from contactopt.scenes import make_scene
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
@@ -91,10 +92,14 @@ def rounded(x: np.ndarray) -> np.ndarray:
     return np.asarray(0.1 * np.sum(x[:-1] ** 2, axis=0))
 
 
-def two_blocks(load: str, degree: int, law: str, mu: float, dim: int = 2) -> Scene:
-    """Two blocks, the upper one with a lower side that is bent upwards (in space flat)."""
-    up = "xyz"[dim - 1]
-    upper, lower = (box(dim, COARSE[dim], sign, seed) for sign, seed in ((1.0, 1), (-1.0, 2)))
+def two_blocks(
+    load: str, degree: int, law: str, mu: float, dim: int = 2, below: int | None = None
+) -> Scene:
+    """Two blocks, the upper one with a lower side that is bent upwards (in space flat), joined by
+    mortar if a number of elements `below` is given.
+    """
+    up, number = "xyz"[dim - 1], (COARSE[dim], below or COARSE[dim])
+    upper, lower = (box(dim, n, sign, seed) for n, sign, seed in zip(number, (1.0, -1.0), (1, 2)))
     if dim == 2:
         p = upper.p.copy()
         p[1] += 0.05 * p[0] ** 2 * (1 - p[1])
@@ -102,10 +107,11 @@ def two_blocks(load: str, degree: int, law: str, mu: float, dim: int = 2) -> Sce
     planes = (Support("left", {"x": 0.0}), Support("front", {"y": 0.0}))[: dim - 1]
     top = Part("upper", upper, Material(SOFT, 0.3), **held(dim, load, up))
     free = load == "sheared"
-    below = (Support("far"),) if free else (*planes, Support("far"))
-    bottom = Part("lower", lower, Material(STIFF, 0.3), below)
+    bottom = Part("lower", lower, Material(STIFF, 0.3), ((), planes)[not free] + (Support("far"),))
     kind = "plane-strain" if dim == 2 else "solid"
-    return Scene(f"{load}, two blocks", top, bottom, mu, kind, law=law, degree=degree)
+    contact = Contact("upper", "lower", mu, law, coupling="mortar" if below else "auto")
+    name = f"{load}, " + (f"mortar {number[0]} on {below}" if below else "two blocks")
+    return Scene(name, kind=kind, bodies=(top, bottom), contacts=(contact,), degree=degree)
 
 
 def scenes() -> Iterator[Scene]:
@@ -116,6 +122,8 @@ def scenes() -> Iterator[Scene]:
                 yield on_floor(load, degree, *law)
             for load in ("pushed", "plate", "sheared"):
                 yield two_blocks(load, degree, *law)
+            yield two_blocks("pushed", degree, *law, below=7)
+            yield two_blocks("plate", degree, *law, below=4)
             yield replace(on_floor("pressed", degree, *law, nu=0.48), name="nu = 0.48, floor")
             yield replace(on_floor("pushed", degree, *law, across=4), name="long elements, floor")
             yield replace(on_floor("plate", degree, *law, dim=3), name="plate, floor, space")
@@ -186,7 +194,9 @@ def case(scene: Scene, exact: Callable[..., Any] | None = None) -> dict[str, Any
     error = distance(bound, best, exact)
     row: dict[str, Any] = {"scene": scene.name, "degree": scene.degree, "law": scene.pairs[0].law}
     row |= {"error": error, "bound": bound.error, "ratio": bound.error / error}
-    row |= {part: getattr(bound, part) for part in ("mesh", "contact", "friction", "moved")}
+    row |= {
+        part: getattr(bound, part) for part in ("mesh", "joint", "contact", "friction", "moved")
+    }
     row["reference's bound"] = best.error
     plate = any(isinstance(load, Plate) for part in scene.meshed.values() for load in part.loads)
     quantity = find_quantity("approach" if plate else "normal_force", scene)
@@ -303,9 +313,9 @@ FINDINGS
 
 ## The cases
 
-`ratio` is the bound over the error. `mesh`, `contact`, `friction` and `moved` are the parts of the
-bound, as in `contactopt.accuracy.bound`; all are norms of energy. A negative bound of a quantity
-would say that its interval misses the reference.
+`ratio` is the bound over the error. `mesh`, of which `joint` is a part, `contact`, `friction` and
+`moved` are the parts of the bound, as in `contactopt.accuracy.bound`; all are norms of energy.
+A negative bound of a quantity would say that its interval misses the reference.
 
 {bounds}
 
