@@ -190,14 +190,15 @@ def test_what_has_no_bound_is_refused(scene, words):
 def test_a_quantity_without_a_bound_is_refused():
     scene = on_floor(1, "coulomb", 0.3)
     solved = solve_scene(scene)
-    assert "with friction" in bounded(solved, find_quantity("approach", scene), 1.0)[2]
-    bound, energy, why = bounded(solved, find_quantity("pressure", scene), 1.0)
-    assert bound is None and 0 < energy < 1 and "no bound of the pressure" in why
+    assert "contactopt diagnose" in bounded(solved, find_quantity("approach", scene), 1.0).missing
+    found = bounded(solved, find_quantity("pressure", scene), 1.0)
+    assert found.bound is None and "no bound of the pressure" in found.missing
+    assert 0 < found.energy["mesh"] < found.energy["error"] < 1
 
 
 def test_a_search_says_bound_or_estimate():
     scene = on_floor()
     _, found = refine([scene], "approach", 0.02, adaptive=True)
-    assert found.guarantee.startswith("bound:") and found.bound < 0.1
+    assert found.guarantee.sentence.startswith("bound:") and found.guarantee.bound < 0.1
     _, found = refine([make_scene("sphere")], "approach", 0.05)
-    assert found.guarantee.startswith("estimate, no bound: a bound needs plane strain or space")
+    assert found.guarantee.sentence.startswith("estimate, no bound: a bound needs plane strain")

@@ -62,6 +62,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.accuracy.estimate import Guarantee
 from contactopt.accuracy.facing_facets import facet_nodes
 from contactopt.accuracy.pressed_scene import PressedScene
 from contactopt.accuracy.uneven_traction import uneven_traction
@@ -116,6 +117,12 @@ class Bound:
     def error(self) -> float:
         """The bound of |u - u_h|."""
         return float(np.sqrt(self.mesh**2 + self.contact**2 + self.friction**2) + self.moved)
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """The bound and its parts over the norm of the solution [-]."""
+        names = "error", "mesh", "contact", "friction", "moved", "solver"
+        return {name: getattr(self, name) / self.norm for name in names}
 
     def size(self, data: Data) -> float:
         """The norm of a composite stress."""
@@ -189,8 +196,10 @@ class Bound:
                 f"there is no bound of the {kind}, only of {', '.join(LINEAR)}, energy."
             )
         if np.any(problem.law.rough):
+            small = "; it assumes small friction, which contactopt diagnose tests"
+            small = small if problem.law.proportional else ""
             raise InputError(
-                f"with friction there is no bound of the {kind}, only of the energy norm."
+                f"with friction there is no bound of the {kind}, only of the energy norm{small}."
             )
         if any(pair.joined for pair in scene.pairs):
             raise InputError(
@@ -257,22 +266,18 @@ class Bound:
         return self._balanced(t, duals.dual.s, duals.bodies), z, t[:, 0], c
 
 
-def bounded(
-    solved: Solved, quantity: Quantity, value: float
-) -> tuple[float | None, float | None, str]:
-    """Guaranteed bounds of the relative errors of a quantity with this value, and of the
-    displacement in the energy norm; and one sentence that says what is missing where one is None.
-    """
+def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
+    """What is guaranteed of a quantity with this value, and of the displacement."""
     try:
         bound = Bound(solved)
-        energy = bound.error / bound.norm if bound.norm > 0 else None
     except InputError as error:
-        return None, None, str(error)
+        return Guarantee(missing=str(error))
+    terms = bound.terms if bound.norm > 0 else {}
     try:
         middle, width = bound.of(quantity)
     except InputError as error:
-        return None, energy, str(error)
-    return (abs(middle - value) + width) / (abs(value) or 1.0), energy, ""
+        return Guarantee(energy=terms, missing=str(error))
+    return Guarantee((abs(middle - value) + width) / (abs(value) or 1.0), terms)
 
 
 def _minus(one: Data, other: Data) -> Data:

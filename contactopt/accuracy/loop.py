@@ -290,7 +290,7 @@ class _Loop:
             judged.grading / scale if signed else None,
             geometry / scale if np.isfinite(geometry) else 1.0,
             judged.order,
-            *bounded(self.solved, self.quantity, value),
+            bounded(self.solved, self.quantity, value),
             reached,
             message,
             tuple(self.levels),

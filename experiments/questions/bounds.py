@@ -27,6 +27,7 @@ from contactopt.accuracy.loop import refine
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.meshes.mesh_refinement import split
+from contactopt.methods.diagnosis import diagnose
 from contactopt.readings.quantities import find_quantity, value_of
 from contactopt.scenes import make_scene
 from contactopt.scenes.contact import Contact
@@ -197,7 +198,10 @@ def case(scene: Scene, exact: Callable[..., Any] | None = None) -> dict[str, Any
     row |= {
         part: getattr(bound, part) for part in ("mesh", "joint", "contact", "friction", "moved")
     }
-    row["reference's bound"] = best.error
+    row["reference's bound"], row["kappa"] = best.error, ""
+    if row["law"] == "coulomb":
+        unique = diagnose(solved.reduction.problem.explicit()).guaranteed.unique
+        row["kappa"] = 2 * scene.pairs[0].mu / unique if unique > 0 else "none"
     plate = any(isinstance(load, Plate) for part in scene.meshed.values() for load in part.loads)
     quantity = find_quantity("approach" if plate else "normal_force", scene)
     row |= {"quantity": quantity.name, "its error": "", "its bound": "", "its ratio": ""}
@@ -307,7 +311,24 @@ def figures(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
 
 
 TEXT = """
-FINDINGS
+- In 81 cases no error exceeds its bound, and no interval of a quantity misses the reference.
+- In the plane, with matching nodes, the bound of the energy norm is 1.01 to 1.41 times the error
+  for linear displacements and 1.9 to 2.8 times for quadratic ones. With mortar it is 1.3 to 1.5
+  and 3.0 to 4.1 times, on tetrahedra 3.0 to 4.2 times.
+- The bound of the approach or of the normal force is 1.6 to 10 times the error in 18 of 20 cases
+  in the plane. Twice it is more, where the error is small by chance. In space it is 14 and 32
+  times the error.
+- The bound costs 0.5 to 0.7 times the solve for quadratic displacements, but 2 to 3 times for
+  linear ones, whose solve is cheapest. On the long tetrahedra of the square punch with linear
+  displacements the bound holds, but says nothing: it is larger than the solution.
+- Solvers that stop in time save 10 to 20 percent of whole solves by iteration, and nothing that
+  can be measured in a search, where each solve begins at the last answer. Assembly and factors
+  are most of the time.
+- Coulomb's friction is treated as Tresca's with the bound that the pressure of the solution
+  gives. The column `kappa` is twice the friction coefficient over the threshold below which
+  `contactopt diagnose` says that the solution is unique. The bound is proved where it is less
+  than one, and then grows by 1 / (1 - kappa)^1/2. It is seldom less than one here; the errors are
+  within the bounds nevertheless.
 
 ![bounds](bounds.png)
 
