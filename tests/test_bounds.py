@@ -14,7 +14,7 @@ from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.scenes.scene import BodyForce
-from contactopt.solving.solve_scene import solve_scene
+from contactopt.solving.solve_scene import Options, solve_scene
 
 MATERIAL = Material(1000.0, 0.3)
 
@@ -202,3 +202,10 @@ def test_a_search_says_bound_or_estimate():
     assert found.guarantee.sentence.startswith("bound:") and found.guarantee.bound < 0.1
     _, found = refine([make_scene("sphere")], "approach", 0.05)
     assert found.guarantee.sentence.startswith("estimate, no bound: a bound needs plane strain")
+
+
+def test_a_search_stops_its_solvers_in_time_unless_a_tolerance_is_asked_for():
+    """The residual is a tenth of the accuracy at most, and small enough for derivatives."""
+    for tol, most in ((1e-8, 1e-5), (1e-12, 1e-12)):
+        solved, found = refine([on_floor()], "energy", 0.05, Options(tol=tol), adaptive=True)
+        assert found.reached and solved.solution.residual <= most

@@ -76,6 +76,7 @@ from contactopt.solving.solve_scene import Solved
 UNBALANCED = 1e-6  # of the force of an element: so much a vertex may be out of balance
 ALL = 1e-9  # by how much shares that add up to one may miss it
 TINY, HUGE = 1e-200, 1e200
+MOST = {2: 150_000, 3: 25_000}  # elements of a search with a bound, some 1 GB of memory
 TRIED = 3  # adjoints of a quantity, each with what the one before tells
 ENERGY = "energy"
 LINEAR = "approach", "shift", "normal_force", "resultant"
@@ -268,6 +269,11 @@ class Bound:
 
 def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
     """What is guaranteed of a quantity with this value, and of the displacement."""
+    meshes = [getattr(body, "body", None) for body in solved.reduction.bodies]
+    elements = sum(own.basis.mesh.nelements for own in meshes if own is not None)
+    most = MOST[solved.reduction.scene.dim]
+    if elements > most:
+        return Guarantee(missing=f"a search takes no bound of more than {most:,} elements.")
     try:
         bound = Bound(solved)
     except InputError as error:

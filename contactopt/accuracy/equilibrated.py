@@ -49,7 +49,7 @@ from contactopt.accuracy.composite_element import components, reference_energy
 from contactopt.accuracy.vertex_balance import Balance
 from contactopt.material import Material, lame
 
-BLOCK = 20_000  # elements at a time
+BLOCK = 8192  # elements at a time
 ALONG = 1e-9  # of a unit vector: components below are zero
 TINY = 1e-13  # of the diagonal, added so that functions without stress do no harm
 
@@ -332,23 +332,21 @@ class Simplices:
         d, count = self.dim, len(self.volume)
         place = (self.opposite[:, None] * d + self.slots).reshape(-1, count)  # moment of each input
         index = (place[..., None] * d + np.arange(d)).transpose(1, 0, 2).reshape(count, -1)
-        inner = np.linalg.inv(self._map)
-        values, slope, used = [], np.zeros(self.mesh.facets.shape[1] * d * d), index.shape[1]
-        signs = np.repeat(self.sign.T, d * d, axis=1)
+        used, signs = index.shape[1], np.repeat(self.sign.T, d * d, axis=1)
+        size = self.mesh.facets.shape[1] * d * d
+        slope, K = np.zeros(size), sp.csr_matrix((size, size))
         for own in self._blocks:
-            H = self.metric(material, own)
-            back = inner[own]
+            H, at, sign = self.metric(material, own), index[own], signs[own]
+            back = np.linalg.inv(self._map[own])
             g = np.einsum("eij,ej->ei", H[:, :used], missing[own])
-            g = (g.reshape(len(g), -1, d) @ back).reshape(len(g), -1) * signs[own]
-            slope += np.bincount(index[own].ravel(), g.ravel(), len(slope))
+            g = (g.reshape(len(g), -1, d) @ back).reshape(len(g), -1) * sign
+            slope += np.bincount(at.ravel(), g.ravel(), size)
             H = H[:, :used, :used].reshape(len(H), used // d, d, used // d, d)
             H = np.einsum("epiqj,eik,ejl->epkql", H, back, back, optimize=True)
-            H = H.reshape(-1, used, used) * signs[own, :, None] * signs[own, None]
-            values.append(H)
-        rows = np.repeat(index, used, axis=1).ravel()
-        columns = np.tile(index, (1, used)).ravel()
-        data = np.concatenate(values).ravel()
-        return sp.csr_matrix((data, (rows, columns)), (len(slope), len(slope))), slope
+            H = H.reshape(-1, used, used) * sign[:, :, None] * sign[:, None]
+            place = np.repeat(at, used, axis=1).ravel(), np.tile(at, (1, used)).ravel()
+            K = K + sp.csr_matrix((H.ravel(), place), (size, size))
+        return K, slope
 
     def _tractions(
         self, stress: np.ndarray, force: np.ndarray, given: np.ndarray, balance: Balance
