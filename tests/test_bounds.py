@@ -13,6 +13,7 @@ from contactopt.accuracy.loop import refine
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce
 from contactopt.solving.solve_scene import Options, solve_scene
 
@@ -51,6 +52,17 @@ def two_blocks(degree=1, law="coulomb", mu=0.3, n=5, below=5):
     top = Part("upper", block(n, 1.0, 1), MATERIAL, (Support("far", {"x": 0.05, "y": -0.1}),))
     low = Part("lower", block(below, -1.0, 2), Material(3000.0, 0.2), (Support("far"),))
     return Scene("s", top, low, mu, law=law, degree=degree)
+
+
+def narrower():
+    """A punch on a wider block, whose edge lies within a facet."""
+    mesh = block(6, 1.0, 1)
+    mesh = replace(mesh, doflocs=mesh.p * [[0.63], [1.0]])
+    wall, pushed = Support("left", {"x": 0.0}), Support("far", {"y": -0.1})
+    top = Part("upper", mesh, MATERIAL, (wall, pushed))
+    low = Part("lower", block(5, -1.0, 2), Material(3000.0, 0.2), (wall, Support("far")))
+    contact = Contact("upper", "lower", 0.0, "frictionless", coupling="mortar", carrier="upper")
+    return Scene("s", bodies=(top, low), contacts=(contact,))
 
 
 def fine(scene, times=2):

@@ -36,21 +36,22 @@ def uneven_traction(scene: Any) -> float:
         corners, outer, rest = [], [], []
         for f in np.unique(pair.rule.facets[1]):
             own = pair.rule.facets[1] == f
-            x, values = pair.ends.at[1][1, own].ravel(), ends[own].reshape(-1, d)
+            x = pair.ends.at[1][1, own]  # (pieces, 2)
             a, b = pair.points[1][..., f].T
             length = float(np.linalg.norm(b - a))
             # per length of this side; straight surfaces that face each other have one ratio
-            ratio = pair.rule.weights[own].sum() / (
-                length * np.abs(np.diff(pair.ends.at[1][1, own])).sum()
-            )
-            at = np.unique(np.concatenate([[0.0, 1.0], x]))
+            ratio = pair.rule.weights[own].sum() / (length * np.abs(np.diff(x)).sum())
+            at = np.unique(np.concatenate([[0.0, 1.0], x.ravel()]))
             at = at[np.concatenate([[True], np.diff(at) > SAME])]
             if len(at) < 3:
                 continue
-            near = np.argmin(np.abs(at[:, None] - x), axis=1)
-            found = np.where(np.abs(at - x[near])[:, None] < SAME, ratio * values[near], 0.0)
+            found = np.zeros((len(at) - 1, 2, d))  # of pieces that face nothing
+            order, turn = np.argsort(x.min(axis=1)), np.argsort(x, axis=1)[..., None]
+            sorted_ends = np.take_along_axis(ends[own], turn, axis=1)[order]
+            found[np.searchsorted(at, x.mean(axis=1)[order]) - 1] = ratio * sorted_ends
             even = np.array([[4.0, -2.0], [-2.0, 4.0]]) / length @ moments[:, f]
-            missing = found - (1 - at[:, None]) * even[0] - at[:, None] * even[1]
+            shares = np.stack([at[:-1], at[1:]], axis=1)[..., None]
+            missing = found - (1 - shares) * even[0] - shares * even[1]
             own_vertices = side.vertices[:, f]
             element = cells.mesh.t[:, cells.mesh.f2t[0, side.facets[f]]]
             tip = cells.mesh.p[:, np.setdiff1d(element, own_vertices)[0]]
@@ -58,7 +59,7 @@ def uneven_traction(scene: Any) -> float:
             for i in range(len(at) - 1):
                 corners.append([places[i], places[i + 1], tip])
                 outer.append(f)
-                rest.append(missing[i : i + 2])
+                rest.append(missing[i])
         if corners:
             energy = _least_energy(np.array(corners), np.array(outer), np.array(rest), material)
             total += scene.factor * energy
