@@ -261,16 +261,7 @@ def _plain(value: Any) -> Any:
 
 
 def refusals(table: pd.DataFrame) -> list[str]:
-    """Say in a sentence each why runs were refused or could not be built, with their number.
-
-    Parameters
-    ----------
-    table : The table of a campaign.
-
-    Returns
-    -------
-    The sentences, the most frequent reason first.
-    """
+    """Say in a sentence each why runs were refused or could not be built, most frequent first."""
     left = table[table["status"].isin(["refused", "not_built"])]
     reasons = Counter(str(message) for message in left["message"])
     return [

@@ -98,15 +98,8 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
 def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     """Check that a part's mesh fits the kind of the scene and has all boundaries that are named.
 
-    Parameters
-    ----------
-    scene, part : The scene, and an elastic body of it.
-    mesh : Its mesh.
-
-    Raises
-    ------
-    InputError : If the mesh has another dimension, elements that are not known, numbers that are
-        not finite, points on the wrong side of an axis of revolution, or lacks a named boundary.
+    InputError if it has another dimension, elements that are not known, numbers that are not
+    finite, points on the wrong side of an axis of revolution, or lacks a named boundary.
     """
     if (
         not isinstance(mesh, skfem.Mesh)

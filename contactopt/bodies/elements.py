@@ -79,18 +79,7 @@ class Trace(NamedTuple):
 
 
 def weight_at(weight: Weight, x: np.ndarray) -> np.ndarray | float:
-    """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an
-    axisymmetric scene.
-
-    Parameters
-    ----------
-    weight : The constant, and whether the scene is axisymmetric.
-    x : (dim, ...) places [length].
-
-    Returns
-    -------
-    The measure (...) in an axisymmetric scene, else one number.
-    """
+    """The measure of the integrals at places x (dim, ...): a constant, times r if axisymmetric."""
     factor, axisymmetric = weight
     return factor * x[0] if axisymmetric else factor
 
@@ -108,13 +97,8 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
 
 
 def forget(mapping: skfem.mapping.Mapping) -> None:
-    """Free the Jacobians that scikit-fem keeps of all elements it was asked for.
-
-    They take a quarter of the memory of the stiffness, and nothing asks for them again.
-
-    Parameters
-    ----------
-    mapping : Of a mesh.
+    """Free the Jacobians that scikit-fem keeps of all elements it was asked for: a quarter of the
+    memory of the stiffness, which nothing asks for again.
     """
     getattr(mapping, "_cache", {}).clear()
 
@@ -232,17 +216,8 @@ def contact_trace(
 def face_nodes(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the nodes and the normals of the faces of a boundary.
-
-    Parameters
-    ----------
-    basis : The displacement basis of the body.
-    degree : Its degree, 1 or 2.
-    boundary : (f,) numbers of the facets of the mesh.
-
-    Returns
-    -------
-    Nodes (f, j) of each face, corners first in cyclic order, and mean outward normals (dim, f).
+    """Nodes (f, j) of the faces of a boundary (f,), corners first in cyclic order, and their mean
+    outward normals (dim, f).
     """
     name = basis.mesh.refdom.__name__
     shape, places = SHAPES[name][1][degree](), FACES[name][2]

@@ -192,18 +192,8 @@ class RemotePart(Part):
 
 
 def spread(scene: Scene, team: Team) -> Scene:
-    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on.
-
+    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on, as RemotePart.
     All other bodies stay on rank 0.
-
-    Parameters
-    ----------
-    scene : The scene, which stays as it is.
-    team : The ranks.
-
-    Returns
-    -------
-    The scene with RemotePart in place of the bodies on other ranks.
     """
     elastic = list(scene.meshed)
 

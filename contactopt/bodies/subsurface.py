@@ -25,22 +25,11 @@ PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2)
 
 
 def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]) -> np.ndarray:
-    """Compute the stress tensors below the points of a half-space.
+    """Stress tensors (j, n0[, n1], 3, 3) below the points of a half-space at depths (j,), in the
+    axes of the scene [stress].
 
-    Parameters
-    ----------
-    body : The half-space; not a periodic one.
-    force : (k, dim) forces on its points in its components [force].
-    depths : (j,) depths below the surface [length], at least half a spacing.
-
-    Returns
-    -------
-    (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid
-    [stress]. In plane strain the third axis is that across the plane.
-
-    Raises
-    ------
-    InputError : For a periodic surface and for depths that are too small.
+    The forces (k, dim) are in the components of the body. In plane strain the third axis is that
+    across the plane. InputError for a periodic surface and for depths of less than half a spacing.
     """
     if body.part.periodic:
         raise InputError(
@@ -69,16 +58,7 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Compute von Mises stresses.
-
-    Parameters
-    ----------
-    stress : (..., 3, 3) stress tensors [stress].
-
-    Returns
-    -------
-    (...) von Mises stresses [stress].
-    """
+    """The von Mises stresses (...) of stress tensors (..., 3, 3)."""
     deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1))))
 

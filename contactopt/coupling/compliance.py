@@ -154,21 +154,13 @@ def _rows(B: sp.csr_matrix) -> np.ndarray:
 def estimate_diagonal(
     product: Product, weights: Sequence[np.ndarray], moves: np.ndarray
 ) -> np.ndarray:
-    """The diagonal of Q from one product with a column for each pair of surfaces.
+    """The diagonal (k dim,) of Q from one product with a column for each pair of surfaces; exactly
+    0 outside the mask `moves`.
 
     The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared
-    out by the weights. Each pair has signs of its own: a thin body between two pairs moves one of
-    them by forces on the other as far as by its own, and such a share may be negative.
-
-    Parameters
-    ----------
-    product : The product with Q.
-    weights : (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
-    moves : (k dim,) mask of the components that can move.
-
-    Returns
-    -------
-    array (k dim,) : The estimate [length / force], 0 where a component cannot move.
+    out by its weights, those of `nodal_weights`. Each pair has signs of its own: a thin body
+    between two pairs moves one of them by forces on the other as far as by its own, and such a
+    share may be negative.
     """
     dim = len(moves) // max(sum(len(own) for own in weights), 1)
     ends = np.cumsum([0, *(dim * len(own) for own in weights)])

@@ -90,16 +90,8 @@ def couple(
 ) -> Coupling:
     """Make the coupling of a pair of surfaces of two assembled bodies.
 
-    Parameters
-    ----------
-    scene, pair : The scene and one of its pairs.
-    upper, lower : Its bodies.
-    kind : A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes
-        where they match, or where a body has no mesh, and otherwise mortar.
-
-    Returns
-    -------
-    The contacts, and the maps from the bodies' displacements to theirs. InputError for an unknown
+    `kind` is a name in COUPLINGS or 'auto', by default that of the pair. 'auto' is matching nodes
+    where they match, or where a body has no mesh, and otherwise mortar. InputError for an unknown
     kind, and for surfaces that this kind cannot couple.
     """
     kind = kind or pair.coupling

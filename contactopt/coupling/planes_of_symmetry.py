@@ -52,16 +52,7 @@ class SymmetryPlane:
     offset: float
 
     def contains(self, points: np.ndarray, size: float) -> np.ndarray:
-        """Tell which points lie in the plane.
-
-        Parameters
-        ----------
-        points, size : Points (dim, k), and the size of the surface that they belong to [length].
-
-        Returns
-        -------
-        (k,) mask.
-        """
+        """Which of the points (dim, k), on a surface of that size [length], lie in the plane."""
         return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 

@@ -132,30 +132,13 @@ class Reduction:
         return sum(body.unknowns for body in self.bodies)
 
     def own_multipliers(self, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Split the multipliers of the problem body by body.
-
-        Parameters
-        ----------
-        multipliers : (p,) multipliers of the problem.
-
-        Returns
-        -------
-        The multipliers (p_b,) of each body.
-        """
+        """The multipliers (p_b,) of each body, out of those of the problem."""
         ends = np.cumsum([len(body.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
-        """Compute the displacements of every body, once for each solution. Bodies whose
-        displacements came with the contact forces are not solved at all.
-
-        Parameters
-        ----------
-        solution : A solution of the problem.
-
-        Returns
-        -------
-        U (n_b,) of each body [length].
+        """The displacements U (n_b,) of each body [length], computed once for each solution. Bodies
+        whose displacements came with the contact forces are not solved at all.
         """
         if solution in self._known:
             return self._known[solution]

@@ -38,16 +38,7 @@ def time_left() -> float:
 
 @contextmanager
 def until(moment: float) -> Iterator[None]:
-    """Set the deadline for the `with` block. An earlier one of an outer solve stays.
-
-    Parameters
-    ----------
-    moment : The deadline, a value of time.perf_counter() [s].
-
-    Yields
-    ------
-    Nothing.
-    """
+    """Set the deadline, a time.perf_counter() [s], in the block; an earlier one stays."""
     token = _deadline.set(min(moment, _deadline.get()))
     try:
         yield

@@ -29,17 +29,8 @@ def flexible_gmres(product: Act, inverse: Act, right: Vector, weights: Vector, r
     """Solve A x = b by GMRES with a preconditioner that may change, to |W (b - A x)| <= rtol |W b|
     with W = diag(weights).
 
-    Parameters
-    ----------
-    product : x -> A x.
-    inverse : r -> an approximation of A^-1 r.
-    right, weights : Right-hand side b, and positive weights of its entries; both are arrays (n,) or
-        both are Stacked.
-    rtol : Relative size of the residual.
-
-    Returns
-    -------
-    The solution x, or the best after RUNS runs of RESTART iterations.
+    `inverse` approximates A^-1. The right side b and the positive weights are both arrays (n,) or
+    both Stacked. The best x after RUNS runs of RESTART iterations comes back.
     """
     x, residual = 0.0 * right, right
     goal = rtol * norm(weights * right)

@@ -97,9 +97,7 @@ def _balancing(
 
 
 class Balanced:
-    """The solution of (Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is
-    factorised once.
-    """
+    """(Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is factorised once."""
 
     def __init__(self, problem: InterfaceProblem, rho: float):
         (k, d), self.V = problem.q.shape, problem.V

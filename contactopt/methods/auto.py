@@ -172,9 +172,7 @@ class _Robust:
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
     def jammed(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
-        """Without end: paths drawn at random, and the gentle proximal loop from the best point so
-        far.
-        """
+        """Paths drawn at random and the gentle proximal loop from the best point, without end."""
         problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
             if self.conic and restarts:
@@ -207,9 +205,7 @@ class _Robust:
     def interior(
         self, start: Iterate, points: Iterator[tuple[Iterate, float]]
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Points with their errors and, where they came near to a solution, a few proximal steps
-        for the last digits.
-        """
+        """Points with their errors and, near a solution, a few proximal steps."""
         found, best = yield from _followed(points, lambda steps, since: False)
         reached = found or start
         if best < constants.CLOSE:

@@ -63,9 +63,7 @@ class Normal(Components):
 
 
 class Tangential(Components):
-    """The tangential program, until a step moves r_t by no more than `accuracy` of its size: a
-    hundredth of what the last solve moved it.
-    """
+    """The tangential program, to a hundredth of what the last solve moved r_t."""
 
     accuracy = SHARPER
 

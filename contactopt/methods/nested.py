@@ -102,9 +102,7 @@ class Nested(Method):
 
 
 def _first_guess(levels: list[Level], given: Point | None) -> Point:
-    """A point on the coarsest level: the one given, or the forces spread evenly that balance the
-    loads.
-    """
+    """The given point on the coarsest level, or forces spread evenly that balance the loads."""
     coarsest = levels[-1]
     if given is not None:
         for level in levels[:-1]:
@@ -122,9 +120,7 @@ def _first_guess(levels: list[Level], given: Point | None) -> Point:
 
 
 def _robust_start(coarsest: Level, point: Point) -> Point:
-    """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default
-    method on an array Q.
-    """
+    """A solution on the coarsest grid: by Newton's steps, or else by `auto` on an array Q."""
     reached, at = _solve_level(coarsest, point, constants.COARSEST_ENOUGH)
     if (
         at.residual <= constants.COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))

@@ -83,9 +83,8 @@ class Newton(Method):
     def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
-        """Iterates, each with the residual of the equations that its step began with.
-
-        Raises InputError if the linear algebra that was asked for does not fit Q.
+        """Iterates, each with the residual that its step began with; InputError if `linear` does
+        not fit Q.
         """
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:

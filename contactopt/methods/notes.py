@@ -17,8 +17,8 @@ _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs"
 
 
 def note(logger: logging.Logger, sentence: str) -> None:
-    """Log what was done otherwise than asked or expected, and keep the sentence for the Solution of
-    the solve that runs. A sentence is kept once.
+    """Log what was done otherwise than asked or expected, and keep the sentence once for the
+    Solution.
     """
     logger.info(sentence)
     notes = _notes.get()

@@ -94,9 +94,7 @@ class NSGS(Method):
 
 
 def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.ndarray, np.ndarray]:
-    """The components that move contact i, their part (dim, m) of Q, and the contact's own block
-    (dim, dim).
-    """
+    """The components that move contact i, their part (dim, m) of Q, its own block (dim, dim)."""
     own = slice(dim * i, dim * (i + 1))
     if not sp.issparse(Q):
         return slice(None), Q[own], Q[own, own]
@@ -106,10 +104,7 @@ def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.nd
 
 
 class Local:
-    """Coulomb's law at one contact, u = W r + v: W (dim, dim), mu >= 0.
-
-    Scalar arithmetic, for speed.
-    """
+    """Coulomb's law at one contact, u = W r + v, by scalar arithmetic: W (dim, dim), mu >= 0."""
 
     def __init__(self, W: np.ndarray, mu: float, bilateral: bool):
         self.W, self.mu, self.bilateral = W, mu, bilateral

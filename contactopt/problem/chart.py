@@ -1,6 +1,4 @@
-"""The contact surface's own coordinates: what every reader of places on it uses, whatever way the
-bodies are turned.
-"""
+"""The contact surface's own coordinates, whatever way the bodies are turned."""
 
 from __future__ import annotations
 
@@ -144,20 +142,12 @@ class Pair:
 
 
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
-    """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
+    """Compute positive weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2,
+    scaled so that the mean of w^2 is one.
 
     A force that is spread over the area of a node makes a displacement proportional to 1 / length
     of the contact line there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area /
     spacing on a line, sqrt(area) on a surface.
-
-    Parameters
-    ----------
-    chart : The places of the k contacts on their surface [length].
-    areas : (k,) nodal areas [length^2].
-
-    Returns
-    -------
-    (k,) positive weights [-]. The mean of w^2 is one.
     """
     if len(chart.places) == 2:
         square = np.sqrt(areas)

@@ -1,6 +1,4 @@
-"""The form of an interface problem in which every method works: without units, and with friction
-that is the same in all directions.
-"""
+"""The form in which methods work: without units, with friction the same in all directions."""
 
 from __future__ import annotations
 
@@ -157,16 +155,7 @@ def without_rounding(V: np.ndarray) -> np.ndarray:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """Find the components that neither forces nor multipliers nor q move.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-
-    Returns
-    -------
-    (k dim,) mask, True where a component cannot move.
-    """
+    """The components (k dim,) that neither forces nor multipliers nor q move, as a mask."""
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
@@ -177,9 +166,7 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _closing(problem: InterfaceProblem) -> float:
-    """Root mean square of the overlaps of the contacts that overlap at r = 0; without any, of the
-    least |q_i| > 0.
-    """
+    """Root mean square of the overlaps at r = 0; without any, of the least |q_i| > 0."""
     normal = problem.q[:, 0]
     overlap = np.where(problem.law.lowest < 0, np.abs(normal), -normal)
     overlap = overlap[overlap > 0]

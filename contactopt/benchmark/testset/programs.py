@@ -58,21 +58,9 @@ class ConvexProgram:
 
 
 def convex_program(problem: InterfaceProblem, kind: str, r: np.ndarray) -> ConvexProgram:
-    """Make a subproblem.
+    """Make the subproblem of a `kind` in PROGRAMS at forces r (k, dim), under Coulomb's law.
 
-    Parameters
-    ----------
-    problem : under Coulomb's law
-    kind : a key of PROGRAMS
-    r : (k, dim) forces at which it is made
-
-    Returns
-    -------
-    The program.
-
-    Raises
-    ------
-    InputError : for another law, and for a Q that is unsymmetric or too large for an array.
+    InputError for another law, and for a Q that is unsymmetric or too large for an array.
     """
     law = problem.law
     plain = law.unilateral and law.proportional and not law.dilatant

@@ -49,26 +49,21 @@ while True:
 
 
 class Child:
-    """The process of one sequence of quadratic programs: started by the first that needs it, ended
-    with this object.
-    """
+    """The process of one sequence of quadratic programs, which ends with this object."""
 
     def __init__(self) -> None:
         self.process: subprocess.Popen[bytes] | None = None
 
     @staticmethod
     def needed(backend: Backend, n: int) -> bool:
-        """Whether a program of n unknowns might outlast the time limit of the solve that runs, if
-        there is one.
-        """
+        """Whether a program of n unknowns might outlast the time limit of the solve that runs."""
         return n > SMALL and not backend.clock and not backend.steps and isfinite(time_left())
 
     def solve(
         self, arguments: dict[str, Any], name: str, start: Any, settings: dict[str, Any]
     ) -> tuple[Any, Any]:
-        """x and the multipliers y of qpsolvers.Problem(**arguments), None where there are none.
-
-        Raises TimeUp at the deadline, BackendError if the backend fails or its process dies.
+        """x and the multipliers y of qpsolvers.Problem(**arguments), None where there are none;
+        TimeUp at the deadline, BackendError if the backend fails or its process dies.
         """
         check_time()
         if self.process is None:

@@ -84,9 +84,7 @@ def project_balanced(
 
 
 def _least(slope: Callable[[float], float], first: float) -> float:
-    """The t > 0 at which a slope that grows from `first` < 0 vanishes; 0 if it does not, or not
-    above rounding.
-    """
+    """The t > 0 where a slope that grows from `first` < 0 vanishes; 0 if not above rounding."""
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
     for trial in range(SEARCH):
         value = slope(t)
@@ -171,9 +169,7 @@ def settled(
 
 
 def _softened(bound: np.ndarray, share: float) -> Projection:
-    """y -> the projection of share y on discs, and its derivative: friction that grows gradually
-    with the slip.
-    """
+    """The projection of share y on discs, for friction that grows with the slip."""
 
     def project(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         P, D = disc_derivative(share * y, bound)

@@ -77,9 +77,7 @@ class Coupled:
 
     @cached_property
     def weights(self) -> Stacked:
-        """Weights of the residuals of X, r and the balance: in units of the root of an energy,
-        whatever the mesh.
-        """
+        """Weights of the residuals of X, r and the balance, in units of the root of an energy."""
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
         return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
@@ -89,9 +87,7 @@ class Coupled:
         return np.asarray(u.reshape(at.r.shape) + self.equations.q)
 
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
-        """The right side of Newton's step there, in parts for X, r and the balance, and its contact
-        equations.
-        """
+        """The right side of Newton's step in parts for X, r, the balance; its contact equations."""
         equations = self.equations
         P, D = equations.project(at.r - equations.rho[:, None] * self.moved(at))
         balance = equations.V.T @ at.r.ravel() + equations.s
@@ -198,9 +194,7 @@ def coupled_steps(
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled, rtol: float) -> State | None:
-    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to a relative
-    accuracy, or no force at all.
-    """
+    """The bonded solution of `cold_start` to a relative accuracy, or no force at all."""
     none = np.zeros(problem.q.shape)
     zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
     glued = glued_contacts(problem)
@@ -215,24 +209,14 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled, rtol: float) -> State |
 
 
 def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditioner:
-    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a
-    random balanced force does most of its work.
+    """Scale a preconditioner P and its model so that the eigenvalues of P Q lie about 1 /
+    SCHUR_MARGIN where a random balanced force does most of its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur
     complement that is rather too large than too small. Forces that are not in balance tell nothing:
     a body that no support holds is held at a few nodes meanwhile, where they are taken up, and the
-    V-cycle knows the large motion that follows to a few digits only. So x has V'x = 0, and of Q x
-    counts what no motion V lambda can undo.
-
-    Parameters
-    ----------
-    P : The preconditioner, with its model of Q if it has one.
-    form : Q before condensation.
-    V : (n, p) the motions of the contacts that the multipliers stand for.
-
-    Returns
-    -------
-    P and its model, scaled.
+    V-cycle knows the large motion that follows to a few digits only. So x has V'x = 0 for the
+    motions V (n, p) of the multipliers, and of Q x counts what no motion V lambda can undo.
     """
     # The mean eigenvalue of P Q, weighted with the work of the force: (Qx)' P (Qx) over x' Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])
@@ -246,9 +230,8 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
 
 
 def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
-    """Compute displacements X of the bodies close to A^-1 T' r for contact forces r (k, dim), by
-    conjugate gradients with one V-cycle B as preconditioner, to a relative accuracy in the energy
-    norm; `size` is the energy residual' B residual.
+    """Displacements X close to A^-1 T' r for forces r (k, dim), by conjugate gradients with one
+    V-cycle as preconditioner, to a relative accuracy in the energy norm.
     """
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0

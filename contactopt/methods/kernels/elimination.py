@@ -29,16 +29,8 @@ from contactopt.problem import InterfaceProblem
 
 
 def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evaluation]:
-    """Solve the contacts that make most of the residual by themselves, where they are few.
-
-    Parameters
-    ----------
-    level, point, at : The problem on one grid, a point, and its errors.
-
-    Returns
-    -------
-    The point with other forces on these contacts, and its errors; the same point where the errors
-    are spread over many contacts, or do not fall.
+    """Solve the contacts that make most of the residual by themselves, and return the point with
+    these forces and its errors; the same point where the errors are spread widely or do not fall.
     """
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
@@ -55,9 +47,7 @@ def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evalu
 
 
 def _worst(level: Level, at: Evaluation) -> np.ndarray:
-    """Numbers of the contacts with most of the error and of those around them; none where these are
-    many.
-    """
+    """The contacts with most of the error and those around; none if these are many."""
     size = np.sum(at.error**2, axis=0)
     most = min(MOST_LOCAL, int(FEW_OF_ALL * len(at.closed)))
     if not most:

@@ -27,9 +27,7 @@ Act = Callable[[np.ndarray], np.ndarray]
 
 
 def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
-    """Solve for a Newton step dr (c, k), dlambda (p,) to a relative accuracy, and count the
-    iterations that it takes.
-    """
+    """A Newton step dr (c, k), dlambda (p,) to a relative accuracy, and its iterations."""
     known = at.error.copy()
     known[:, at.closed] = 0.0
     balance = -at.balance - np.einsum("ckp,ck->p", level.V, known)
@@ -41,9 +39,7 @@ def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
 
 
 def _act(level: Level, at: Evaluation) -> Callable[..., np.ndarray]:
-    """Products with Q on the closed contacts, (c, m) -> (c, m), in single precision, where all
-    others have no force or a given one.
-    """
+    """Products (c, m) with Q on the closed contacts, in single precision."""
 
     def act(x: np.ndarray, others: np.ndarray | None = None) -> np.ndarray:
         full = np.zeros(at.error.shape, np.float32) if others is None else others.astype(np.float32)
@@ -58,9 +54,7 @@ def _act(level: Level, at: Evaluation) -> Callable[..., np.ndarray]:
 def _symmetric(
     level: Level, at: Evaluation, known: np.ndarray, balance: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by
-    projected PCG.
-    """
+    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on closed contacts, by PCG."""
     (c, m), act = (len(known), len(at.closed)), _act(level, at)
     # W holds the columns of the balance; N is the rough inverse, normal and tangential components
     # by themselves.

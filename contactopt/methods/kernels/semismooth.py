@@ -72,8 +72,8 @@ class Equations:
     def evaluate(
         self, r: np.ndarray, lam: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r -
-        rho u.
+        """Norm of the residual, P(y) - r (k, d), V'r + s (p,), the derivative of P at y = r - rho
+        u.
         """
         P, D = self.project(r - self.rho[:, None] * self.displacements(r, lam))
         error, balance = P - r, self.V.T @ r.ravel() + self.s

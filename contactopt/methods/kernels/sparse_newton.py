@@ -53,9 +53,7 @@ def block_step(
 def solve_subproblem(
     equations: Equations, matrix: Blocks, point: Iterate, most: int | None = None
 ) -> tuple[Iterate, bool, int]:
-    """The last iterate of Newton's method with a line search on the equations of a proximal
-    subproblem, whether it solves the subproblem, and the steps, of which at most so many are taken.
-    """
+    """The last iterate of Newton's method with a line search, whether it solves, and the steps."""
     residual, error, balance, D = equations.evaluate(*point)
     recent, most = [residual], most or constants.SUBPROBLEM_STEPS
     for steps in range(1, most + 1):

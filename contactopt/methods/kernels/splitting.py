@@ -39,9 +39,7 @@ class Components:
         self.V = self.V_all[:, own]
 
     def given(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The linear term and the resultants of the own motions, given the forces of the other
-        components and the other multipliers.
-        """
+        """The linear term and the resultants, given the other components."""
         c = self.q + self.coupling @ fixed.ravel() + self.V_all[:, ~self.own] @ lam[~self.own]
         return c, (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
 

@@ -28,9 +28,7 @@ USABLE = 1e-5  # and above which there is no answer
 
 
 class KrylovSubproblem:
-    """One kind of components of a dimensionless problem; columns: mask (p,) of the multipliers that
-    belong to it.
-    """
+    """One kind of components of a dimensionless problem, with the mask (p,) of its multipliers."""
 
     def __init__(
         self, problem: InterfaceProblem, P: Preconditioner, columns: np.ndarray, normal: bool
@@ -107,7 +105,7 @@ class KrylovSubproblem:
         return (r, lam) if step is None else (r + step[0], lam + step[1])
 
     def _projection(self, given: np.ndarray) -> Projection:
-        """y (k, dim) -> the projection of the own components beside the given others, and its
+        """y (k, dim) -> the projection of the own components beside the `given`, and its
         derivative.
         """
         own, low, radius = self.own, self.problem.law.lowest, self.problem.law.bound(given[:, 0])

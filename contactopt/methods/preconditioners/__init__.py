@@ -107,9 +107,7 @@ PRECONDITIONERS = {
 
 
 def find_preconditioner(name: str | None) -> None:
-    """InputError unless there is a preconditioner of that name, or it is None or 'none', which are
-    choices of the methods.
-    """
+    """InputError unless it is the name of a preconditioner, None or 'none'."""
     if name not in (None, "none", *PRECONDITIONERS):
         raise InputError(
             f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}."
@@ -251,11 +249,9 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend
-    on others, and QZ.
-
-    Forces that move nothing, as those that are constant on a periodic half-space, have no energy
-    and are left out.
+    """Z (n, j) with Z'QZ = I on the same columns, and QZ, without those that depend on others.
+    Forces that move nothing, as constant ones on a periodic half-space, have no energy and are left
+    out.
     """
     energy = np.einsum("ij,ij->j", Z, QZ)
     each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)
@@ -268,9 +264,7 @@ def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np.ndarray:
-    """The factor (n,) of a P of one block, by a random force x without a part in what is exact:
-    x'Qx over (Qx)'P(Qx).
-    """
+    """The factor (n,) of a P of one block: x'Qx over (Qx)'P(Qx) of a random force x."""
     x = np.random.default_rng(0).normal(size=len(Z))
     x -= Z @ (QZ.T @ x)
     Qx = np.asarray(Q @ x)

@@ -30,18 +30,14 @@ def seminorm(m: float) -> np.ndarray:
 
 
 def norm(m: float, h: float) -> np.ndarray:
-    """The first column (2 m,) of the circulant matrix of the H^1 norm, eq (28), for a closed curve
-    of 2 m nodes at the distance h.
-    """
+    """First column (2 m,) of the circulant matrix of the H^1 norm, eq (28), at node distance h."""
     column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
     return column
 
 
 def extended(grid: Grid) -> tuple[GridMap, None]:
-    """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq
-    (29). The inverse is not cheap.
-    """
+    """P21 = E' Q_c E of eq (25) on a line, or the sum P31 of eq (29); the inverse is dear."""
     if grid.closed:
         symbol, smallest = _closed_symbol(*grid.shape)
         return _circular(np.maximum(symbol, smallest / 2)), None
@@ -108,9 +104,7 @@ def closed_curve(k: int) -> int:
 
 
 def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
-    """The product E' C E along one axis of k nodes of arrays on the grid, for the extension E by
-    zero and the circulant matrix C of size 2 m that has the real eigenvalues `symbol` (m + 1,).
-    """
+    """E' C E along one axis of k nodes, for a circulant C of size 2 m with eigenvalues `symbol`."""
     n = 2 * (len(symbol) - 1)
 
     def product(X: np.ndarray) -> np.ndarray:

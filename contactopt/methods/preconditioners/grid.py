@@ -88,9 +88,8 @@ def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndar
 
 @dataclass(frozen=True)
 class OnGrid:
-    """A preconditioner of contacts on a grid, made from a function of the grid that gives products
-    with P on arrays (*shape, dim) and, where it is cheap, with P^-1. It has that function's
-    docstring.
+    """A preconditioner made from a function of the grid, whose docstring it has, that gives
+    products with P and, where it is cheap, P^-1 on arrays (*shape, dim).
     """
 
     make: Callable[[Grid], GridMaps]
@@ -99,20 +98,9 @@ class OnGrid:
         object.__setattr__(self, "__doc__", self.make.__doc__)
 
     def __call__(self, problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-        """The same products on arrays (k, dim).
+        """The same products on arrays (k, dim), with P and with P^-1, or None in its place.
 
-        Parameters
-        ----------
-        problem : Of k contacts on a line, a closed curve or a rectangular grid of its chart.
-        held : (k, dim) mask of the components that cannot move.
-
-        Returns
-        -------
-        Products with P and with P^-1, or None in its place.
-
-        Raises
-        ------
-        InputError : If the contacts lie on no grid, or on one of fewer than 3 contacts a side.
+        Raises InputError if the contacts lie on no grid, or on one of fewer than 3 contacts a side.
         """
         grid, order = _grid_of(problem, held)
 
@@ -166,8 +154,6 @@ def _turn(places: np.ndarray) -> np.ndarray:
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
-    """How much of a line belongs to each of its ascending ticks: half-way to either neighbour, and
-    beyond an end as far as before it.
-    """
+    """Lengths of the ascending ticks' cells, half-way to either neighbour, symmetric at an end."""
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

@@ -1,6 +1,4 @@
-"""Contact without separation: the gap stays zero, the normal force may pull, and friction counts
-its size.
-"""
+"""Contact without separation: the normal force may pull, and friction counts its size."""
 
 from __future__ import annotations
 
