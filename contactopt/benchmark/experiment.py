@@ -142,9 +142,7 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
 
 
 def _check(table: Table) -> None:
-    """Refuse unknown keys, values of the wrong type or size, and more runs than MOST_RUNS, before
-    anything is expanded, built or run.
-    """
+    """Refuse unknown keys, wrong values, and more runs than MOST_RUNS, before anything is built."""
     data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped", "absent"}
     for key in data:
         if key not in known:

@@ -56,9 +56,7 @@ STYLES = [
 
 
 def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
-    """The label that was given for a name; else the name, where it is long with the values of its
-    settings only: normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
-    """
+    """The label given for a name, else the name with the values of its settings only."""
     if name in labels:
         return str(labels[name])
     head, bracket, settings = name.partition("(")
@@ -103,9 +101,7 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
 
 
 def label_right(ax: Any, ends: Sequence[tuple[float, str, str]]) -> None:
-    """Write the names of lines in their colours beside the axes, at the heights where they end or,
-    where names would meet, in the order of these: (height, name, colour) of each.
-    """
+    """Write coloured names beside the axes at (height, name, colour), in order if crowded."""
     low, high = ax.get_ylim()
     rows = ax.figure.get_figheight() * 72 * 0.8 / ROOM
     # equal heights: the first, which is the better, stands above
@@ -149,9 +145,7 @@ def make_figure(
 
 
 def set_ticks(axis: Any) -> None:
-    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels
-    run into each other.
-    """
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()

@@ -145,7 +145,5 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """The natural-map residual [-] of the same problem under the associated law, as
-    natural_map_residual computes it under its own.
-    """
+    """The natural-map residual [-] of the same problem under the associated law."""
     return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

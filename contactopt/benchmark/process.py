@@ -162,9 +162,7 @@ class Process:
 
 
 def prepare(noise: str, parent: int) -> None:
-    """Make the new process ready: it ends with the process of the number `parent`, leaves Ctrl-C to
-    it, and prints into the file `noise`.
-    """
+    """Let the new process end with its `parent`, ignore Ctrl-C and print into `noise`."""
     if sys.platform == "linux":
         import ctypes
 
@@ -186,9 +184,7 @@ def _mark() -> str:
 
 
 def end_orphans() -> None:
-    """Kill what solvers of this campaign, or of one that is dead, left behind in sessions of their
-    own.
-    """
+    """Kill what solvers of this campaign, or of a dead one, left in other sessions."""
     import psutil
 
     for process in psutil.process_iter():
@@ -218,8 +214,6 @@ def _kill(processes: Iterable[psutil.Process]) -> None:
 
 
 def one_line(error: object) -> str:
-    """A text, or an exception with its name unless it is an InputError, in one line of at most 200
-    characters.
-    """
+    """A text, or an exception with its name unless an InputError, in 200 characters."""
     text = str(error) if isinstance(error, str | InputError) else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]

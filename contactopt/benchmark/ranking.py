@@ -37,18 +37,14 @@ JOINED = {
 
 
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row for each problem, start, method and tolerance: times [s] with their quartiles, the
-    worst certificate, whether success was claimed, and the memory taken [MB].
-    """
+    """A row per problem, start, method and tolerance: times [s], worst certificate, memory."""
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     return table.assign(_memory=memory).groupby(POINT, sort=False).agg(**joined).reset_index()
 
 
 def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
-    """The seconds to a certificate of `accuracy`: a row for each instance, a column for each
-    method, inf where it is not reached.
-    """
+    """Seconds to a certificate of `accuracy` (instance, method), inf if not reached."""
     fronts = points.groupby(["problem", "start", "method"], sort=False)[[time, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
@@ -57,9 +53,7 @@ def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.Dat
 def _seconds_to(
     accuracy: float, seconds: np.ndarray, residuals: np.ndarray, limit: np.ndarray
 ) -> float:
-    """Read the time to an accuracy off the front of points, of which none is both slower and less
-    accurate than another.
-    """
+    """The time to an accuracy on the front of points that no other point dominates."""
     kept = (seconds <= limit) & np.isfinite(residuals)
     t, e = np.maximum(seconds[kept], NOISE), np.maximum(residuals[kept], LEAST)
     order = np.lexsort((t, e))
@@ -157,9 +151,7 @@ def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
-    """Kendall's tau of the ranks of the same methods in the points of two reruns; nan with fewer
-    than two methods.
-    """
+    """Kendall's tau of the ranks in two reruns; nan with fewer than two methods."""
     from scipy.stats import kendalltau
 
     ranks = [ranking(points, accuracy).set_index("method")["mean"] for points in (one, other)]

@@ -186,9 +186,7 @@ def _tags(row: pd.Series, of_set: Mapping[str, dict[str, Any]]) -> dict[str, Any
 def _groups(
     found: pd.DataFrame, tags: dict[str, dict[str, Any]], number: dict[str, int]
 ) -> list[tuple[str, pd.DataFrame, list[int]]]:
-    """The groups of problems with a leader table: all, and those that share a tag that is no
-    number, each with the numbers of its problems.
-    """
+    """The groups with a leader table, all and those of a tag, with their problems' numbers."""
     groups = {"all": list(number)}
     for name, known in tags.items():
         for key, value in known.items():

@@ -102,9 +102,7 @@ class AssembledElastic(AssembledBody):
         )
 
     def guides(self) -> Guides:
-        """The planes lie across a coordinate axis and have the whole body on one side; supports
-        hold it along this axis alone, at zero.
-        """
+        """Coordinate planes, the body on one side, that supports hold along the axis alone."""
         body, mesh = self.body, self.body.basis.mesh
         x = body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)

@@ -97,9 +97,7 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
 
 
 def forget(mapping: skfem.mapping.Mapping) -> None:
-    """Free the Jacobians that scikit-fem keeps of all elements it was asked for: a quarter of the
-    memory of the stiffness, which nothing asks for again.
-    """
+    """Free the Jacobians that scikit-fem keeps: a quarter of the stiffness's memory."""
     getattr(mapping, "_cache", {}).clear()
 
 
@@ -117,9 +115,7 @@ class LeanBasis(skfem.CellBasis):
         self.basis = _Shapes(element, self.mapping, self.X, self.Nbfun)
 
     def _volumes(self) -> np.ndarray:
-        """Volume per reference volume, elements by quadrature points; InputError for an element
-        that is flat or folds over.
-        """
+        """Volume per reference volume (element, point); InputError for a flat or folded element."""
         bad = np.zeros(self.nelems, dtype=bool)
         with np.errstate(all="ignore"):
             try:
@@ -156,9 +152,7 @@ class _Shapes(Sequence[Any]):
 
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
-    """The unknowns of every node (dim, N / dim) of a displacement basis; the vertices of the mesh
-    come first.
-    """
+    """The unknowns (dim, N / dim) of every node of a basis, vertices first."""
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
@@ -216,9 +210,7 @@ def contact_trace(
 def face_nodes(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (f, j) of the faces of a boundary (f,), corners first in cyclic order, and their mean
-    outward normals (dim, f).
-    """
+    """Nodes (f, j) of a boundary's faces, corners first and cyclic; outward normals (dim, f)."""
     name = basis.mesh.refdom.__name__
     shape, places = SHAPES[name][1][degree](), FACES[name][2]
     if degree == 1:
@@ -230,9 +222,7 @@ def face_nodes(
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, Rule]:
-    """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one
-    rule per cell.
-    """
+    """Hat functions (v, point) on a cell, and the reference face's rule of one rule per cell."""
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])
@@ -262,9 +252,7 @@ def _face_basis(
 def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and
-    these nodes.
-    """
+    """Values (face, j, point) of the face's shape functions at `at`, and their nodes."""
     nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     # Of the element's shape functions, the one of a node is that which is 1 there.
     local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)

@@ -89,9 +89,7 @@ class Validity(NamedTuple):
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """The von Mises stress (m,) of stresses (m, 4 or 6), whose first three columns are the normal
-    ones.
-    """
+    """The von Mises stress (m,) of stresses (m, 4 or 6), normal components first."""
     normal, shear = stress[:, :3], stress[:, 3:]
     deviator = normal - normal.mean(axis=1, keepdims=True)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))

@@ -1,6 +1,4 @@
-"""Ranks started by the command line itself, on the cores of this machine, and watched until they
-end.
-"""
+"""Ranks started by the command line itself, and watched until they end."""
 
 from __future__ import annotations
 

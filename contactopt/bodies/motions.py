@@ -57,9 +57,7 @@ class Motions:
 
 
 def rigid_fields(x: np.ndarray) -> np.ndarray:
-    """All rigid motions of points x (dim, k) as displacements (dim, k, m): translations of length
-    one, then rotations about the middle of the points, which move the furthest of them by one.
-    """
+    """Rigid motions (dim, k, m) of points: unit translations, then rotations about the middle."""
     dim = len(x)
     made = np.zeros((*x.shape, dim * (dim + 1) // 2))
     made[range(dim), :, range(dim)] = 1.0
@@ -141,9 +139,7 @@ def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.nd
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
-    """Check that the stiffness A (n, n) of a body does not resist its free motions, because of the
-    rounding of extreme coordinates.
-    """
+    """Refuse a stiffness (n, n) that resists its free motions, by rounding of coordinates."""
     if not len(motions.names):
         return
     error = np.abs(A @ motions.fields).max(axis=0) / (

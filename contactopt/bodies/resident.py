@@ -46,9 +46,7 @@ class AssembledResident(AssembledElastic):
         return np.sort(self.body.contact_dofs, axis=None)
 
     def shipped_surface(self, name: str | None) -> bytes:
-        """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the
-        contact surfaces alone.
-        """
+        """The surface and its mesh by the contact unknowns and nodes alone."""
         body, skin, whole = self.body, self.skin, self.surface(name)
         place = np.full(len(body.load), -1)
         place[skin] = np.arange(len(skin))

@@ -29,9 +29,7 @@ FLAT = 1e-3  # normals of a surface that differ by less than this are one direct
 
 @dataclass(frozen=True, eq=False)
 class RigidBody(AssembledBody, Body):
-    """A rigid body of a scene with the components of its displacement; it needs no preparation, so
-    it is both stages.
-    """
+    """A rigid body; it needs no preparation, so it is both stages."""
 
     part: Rigid
     components: tuple[str, ...]
@@ -115,9 +113,7 @@ class RigidBody(AssembledBody, Body):
             )
 
     def _gap(self, other: Surface) -> np.ndarray:
-        """The initial gap at the contacts from that at the nodes, by the weights of the
-        displacements.
-        """
+        """The initial gap at the contacts from that at the nodes, by their weights."""
         if other.mesh is None:  # its points lie in a plane, its places on the surface
             height = np.sum(other.normals * (other.places - other.points), axis=0)
             if self.part.gap is None:

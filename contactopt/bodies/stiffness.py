@@ -113,9 +113,7 @@ def _node_graph(nodes: np.ndarray, count: int) -> sp.csr_matrix:
 
 
 def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
-    """Integrals of f_ia f_jb: f (element, i, a, point), measure (element, point) -> (element, i, a,
-    j, b).
-    """
+    """Integrals of f_ia f_jb (element, i, a, j, b), from f (element, i, a, point)."""
     flat = f.reshape(len(f), -1, f.shape[3])
     return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(
         *f.shape[:3], *f.shape[1:3]

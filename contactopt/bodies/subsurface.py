@@ -64,9 +64,7 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 
 
 def _coefficients(body: HalfSpaceBody, padded: tuple[int, ...], depth: float) -> np.ndarray:
-    """(stress component, loaded component, *padded) stress per unit of force, at the distances of a
-    circulant.
-    """
+    """Stress per force at a circulant's distances: (stress component, loaded one, *padded)."""
     offsets = [np.fft.fftfreq(m, 1 / m) for m in padded]
     out, longer = _mean(body, offsets, depth, COARSE), max(body.spacing)
     if depth >= NEAR * longer:

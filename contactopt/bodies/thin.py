@@ -32,9 +32,7 @@ THIN = 20.0  # bodies softer than this many times such a ground are thin
 
 
 def volumes(body: Assembly) -> np.ndarray:
-    """The volume (n,) of the elements shared out to their unknowns, with the measure of the
-    integrals [length^3].
-    """
+    """The volume (n,) of the elements shared out to their unknowns [length^3]."""
     basis = body.basis
     measure = weight_at(body.weight, np.asarray(basis.global_coordinates()))
     volume = np.sum(basis.dx * measure, axis=1)
@@ -57,9 +55,7 @@ def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> boo
 
 
 def _per_volume(body: Assembly, M: np.ndarray, modulus: float) -> float:
-    """p: a small share of the stiffness of a block of a modulus on the contact surface, as high as
-    the body is wide.
-    """
+    """p: a small share of the stiffness of a block on the surface, as high as wide."""
     surface = max(float(trace.areas.sum()) for trace in body.traces.values())
     size = float(np.ptp(body.locations, axis=1).max())
     return SHARE * modulus * surface * len(body.unknowns) / (size * float(M.sum()))

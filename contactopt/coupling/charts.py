@@ -84,9 +84,7 @@ def _line(
 def _chains(
     contacts: ContactPoints, tangents: np.ndarray
 ) -> tuple[list[tuple[np.ndarray, np.ndarray]], float | None]:
-    """The pieces of the contact line in their order, each as contacts and the steps between them;
-    the period of a loop.
-    """
+    """The pieces of the contact line, each as contacts and steps; the period of a loop."""
     k = contacts.points.shape[1]
     following, length = np.full(k, -1), np.zeros(k)
     step = _steps(contacts.points, tangents, *contacts.cells)
@@ -116,9 +114,7 @@ def _walk(following: np.ndarray, start: int) -> np.ndarray:
 
 
 def _steps(points: np.ndarray, tangents: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """From the contacts i to the contacts j along the mean of their tangents; on a circle this is
-    the chord.
-    """
+    """From contacts i to contacts j along their mean tangents; the chord on a circle."""
     mean, chord = tangents[:, i] + tangents[:, j], points[:, j] - points[:, i]
     size, along = np.linalg.norm(mean, axis=0), np.sum(mean * chord, axis=0)
     return np.where(size > NEAR, along / np.maximum(size, NEAR), np.linalg.norm(chord, axis=0))
@@ -183,9 +179,7 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
 
 
 def _rim_direction(contacts: ContactPoints) -> np.ndarray:
-    """Along the longest edge of the rim, which belongs to one cell only; the first of those that
-    are equally long.
-    """
+    """Along the longest edge of the rim, whose edges belong to one cell only."""
     corners = contacts.cells
     edges = np.concatenate([corners[[i, i - 1]] for i in range(len(corners))], axis=1)
     known, count = np.unique(np.sort(edges, axis=0), axis=1, return_counts=True)
@@ -201,9 +195,7 @@ def _plane(
     planes: list[SymmetryPlane],
     mirrors: bool,
 ) -> tuple[np.ndarray, tuple[bool, ...]]:
-    """Coordinates (2, k) along the axes, from planes of symmetry or from the middle, and which of
-    them are mirrored.
-    """
+    """Coordinates (2, k) along the axes, and which of them are mirrored."""
     places, mirrored = np.stack(axes) @ contacts.points, []
     for axis, row in zip(axes, places):
         across = [p for p in planes if abs(axis @ p.inward) > 1 - NEAR]
@@ -216,9 +208,7 @@ def _plane(
 
 
 def _rank(row: np.ndarray, size: float) -> np.ndarray:
-    """(k,) numbers of the rows that values belong to; neighbours closer than rounding belong to
-    one.
-    """
+    """(k,) the row that each value belongs to; neighbours closer than rounding share one."""
     order = np.argsort(row)
     rank = np.empty(len(row), dtype=int)
     rank[order] = np.concatenate([[0], np.cumsum(np.diff(row[order]) > RANK * size)])
@@ -226,9 +216,7 @@ def _rank(row: np.ndarray, size: float) -> np.ndarray:
 
 
 def _frames(normals: np.ndarray, axes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Rows n, t1, t2 at each contact: t1 is the first direction made orthogonal to n, or the second
-    where n is close to it.
-    """
+    """Rows n, t1, t2: t1 is the first direction made orthogonal to n, or the second near n."""
     n = normals.T
     steep = np.abs(n @ axes[0]) > STEEP
     towards = np.where(steep[:, None], axes[1], axes[0])

@@ -129,9 +129,7 @@ def of_contacts(
     maps: tuple[sp.csr_matrix, sp.csr_matrix],
     share: np.ndarray | None = None,
 ) -> Coupling:
-    """The coupling at some contacts, from their chart, frames and order, and the maps in this
-    order.
-    """
+    """The coupling at contacts, from their chart, frames and order, and maps in this order."""
     chart, frames, order = laid_out
     gap, areas, places = points.gap[order], points.areas[order], points.points[:, order]
     cells = points.cells if chart.cells is None else chart.cells

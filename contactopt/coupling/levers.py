@@ -54,9 +54,7 @@ def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[li
 def _rotations(
     around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray, about: np.ndarray
 ) -> list[list[sp.csr_matrix]]:
-    """As above, from the weights (k, n) of the nodes around every contact, and its axes (3, k); in
-    the plane, embedded in space.
-    """
+    """The same from the weights (k, n) of the nodes around every contact, and axes (3, k)."""
     dim, k = lever.shape
     w = sp.coo_matrix(around)
     active = w.data > 0

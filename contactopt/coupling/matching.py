@@ -73,9 +73,7 @@ def couple_nodes(
 def _laid_out(
     scene: Scene, lead: Surface, points: ContactPoints
 ) -> tuple[Chart, np.ndarray, np.ndarray]:
-    """Chart, frames and order of the contacts: those of a surface that knows its coordinates, or
-    else laid out.
-    """
+    """Chart, frames and order of the contacts, known to the surface or laid out."""
     n = points.normals
     along = np.all(np.abs(n) == np.abs(lead.normals)) and np.all(n == n[:, :1])
     if lead.chart is None or not along:

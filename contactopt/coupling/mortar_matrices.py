@@ -130,9 +130,7 @@ class _Dual:
         self.fit = _slopes(mass, self.area, self.whole)
 
     def functional(self, values: np.ndarray, block: slice, pairs: np.ndarray) -> np.ndarray:
-        """(pair, v, j) int psi_v f_j from values (j, g) at the points of a block, summed over those
-        of each pair of a cell and a face, which begin at `pairs`.
-        """
+        """(pair, v, j) int psi_v f_j from values (j, g) of a block, summed pair by pair."""
         c = self.cell[block]
         slopes = np.einsum("gvw,wg->vg", self.fit[c], self.centred[:, block])
         weighted = self.area[c].T * (1 / self.whole[c] + slopes) * self.measure[block]
@@ -170,9 +168,7 @@ def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray
 
 
 def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """(cell, v, w) from the moments of a field with the centred hat functions to its fit at the
-    vertices, less its mean.
-    """
+    """(cell, v, w) from moments with the centred hat functions to the fit less its mean."""
     values, vectors = np.linalg.eigh(mass)
     large = values > SLIVER * whole[:, None]
     inverse = np.where(large, 1 / np.where(large, values, 1.0), 0.0)
@@ -185,17 +181,13 @@ def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray
 def collect(
     values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]
 ) -> sp.csr_matrix:
-    """The sparse matrix of values (pair, v, j) at rows (pair, v) and columns (pair, j); values at
-    the same place are added.
-    """
+    """The sparse matrix of values (pair, v, j) at rows (pair, v), columns (pair, j), summed."""
     rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
 def tidy(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Weights (k, n) without what is only rounding, whose rows add up to one exactly, whatever the
-    condition of a sliver.
-    """
+    """Weights (k, n) without rounding, whose rows add up to one exactly."""
     W = sp.csr_matrix(W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
     W.eliminate_zeros()

@@ -1,6 +1,4 @@
-"""Planes of symmetry, recognised by what supports hold or named by the scene: those that cut a
-contact surface, and those across which copies make the bodies whole.
-"""
+"""Planes of symmetry, recognised by what supports hold or named by the scene."""
 
 from __future__ import annotations
 
@@ -44,9 +42,7 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class SymmetryPlane:
-    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the
-    contacts.
-    """
+    """A plane that holds bodies along its normal only; `inward` (dim,) points to the contacts."""
 
     inward: np.ndarray
     offset: float
@@ -57,9 +53,7 @@ class SymmetryPlane:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes across one component, at most one for each, on which exactly the tangential
-    displacement along it is held.
-    """
+    """The planes, at most one per component, on which exactly this component is held."""
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
         if not mask.any():
@@ -76,9 +70,7 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
 
 
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
-    """Unit normals (dim, k) that lie in the planes of symmetry at their contacts: the mean over the
-    facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
-    """
+    """Unit normals (dim, k) that lie in the planes at their contacts, as with mirror images."""
     normals = contacts.normals
     for plane in symmetry_planes(contacts):
         out = plane.inward @ normals

@@ -156,18 +156,14 @@ class Reduction:
         return self._known[solution]
 
     def seen(self, displaced: Sequence[Any]) -> np.ndarray:
-        """The displacements u (k, dim) of the contacts [length], with the initial gap, from those
-        (n_b,) of each body.
-        """
+        """Displacements u (k, dim) of the contacts with the gap, from those of the bodies."""
         q = self.problem.q
         parts = (B @ U for B, U in zip(self.maps, displaced))
         u = np.asarray(sum(parts, 0 * q.ravel())).reshape(q.shape)
         return u + self.gap[:, None] * np.eye(self.problem.dim)[0]
 
     def grounded(self) -> Reduction | None:
-        """With thin bodies on a soft ground (contactopt.bodies.thin), whose answer is right where
-        it no longer pulls them; None without thin bodies.
-        """
+        """With thin bodies on a soft ground (contactopt.bodies.thin); None without any."""
         if self.on_ground:
             return self
         bodies = _on_ground(self.scene, self.bodies)
@@ -178,9 +174,7 @@ class Reduction:
         return replace(self._with(bodies, Q), on_ground=True)
 
     def pulled(self, solution: Solution) -> Reduction:
-        """With other displacements at rest: the ground of each body pulls it towards its
-        displacement, from which those of the contacts are taken anew.
-        """
+        """With the ground pulling each body towards its displacement in a solution."""
         displaced = self.displaced(solution)
         bodies = tuple(body.pulled(U) for body, U in zip(self.bodies, displaced))
         made = self._with(bodies, self.problem.Q)
@@ -332,9 +326,7 @@ def _way(
     asked: tuple[str, str],
     once: bool,
 ) -> tuple[str, str]:
-    """The form of Q and the solver of the bodies that were asked for; for `auto`, those of
-    the cheapest way.
-    """
+    """The form of Q and the solver that were asked for; for `auto` the cheapest."""
     Q, solver = asked
     if any(body.iterates(solver) for body in assembled if not body.work.stiffness):
         return ("implicit" if Q == "auto" else Q), solver

@@ -212,9 +212,7 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
 
 
 class _Seen:
-    """Places s from 0 to 1 on m of the lines that the own side is cut into, with normals that are
-    linear from those at the ends (2, m, 2).
-    """
+    """Places s, 0 to 1, on m own lines, whose normals are linear from ends (2, m, 2)."""
 
     def __init__(self, own: Faces, mine: _Polygons, lines: np.ndarray, ends: np.ndarray) -> None:
         self.own, self.mine, self.lines, self.ends = own, mine, lines, ends
@@ -254,8 +252,8 @@ class _Seen:
 
 
 def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners
-    (dim - 1, q, v) of pieces on cells (q,); all of a cell where it is covered as a whole.
+    """Begin and width (2, dim - 1, cells) of the least similar cell around the corners (dim - 1, q,
+    v) of pieces on cells (q,).
     """
     low, high = np.ones((own.dim - 1, len(covered))), np.zeros((own.dim - 1, len(covered)))
     for d, x in enumerate(corners):
@@ -339,9 +337,7 @@ def _in_space(mine: _Polygons, axes: np.ndarray, number: np.ndarray, y: np.ndarr
 
 
 def _order(own: Faces, other: Faces) -> int:
-    """Degree of the quadrature on triangles: exact for products of hat functions and shape
-    functions on affine faces.
-    """
+    """Degree of the quadrature on triangles, exact on affine faces."""
     hats, theirs = (2 if side.corners == 4 else 1 for side in (own, other))
     order = hats + max(hats, own.degree * hats, other.degree * theirs)
     if not (own.distorted or other.distorted):

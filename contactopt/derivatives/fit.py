@@ -270,9 +270,7 @@ def _minimised(
 def _slipping(
     misfit: Callable[[np.ndarray], np.ndarray], x: np.ndarray, sticks: np.ndarray, low: np.ndarray
 ) -> np.ndarray | None:
-    """The best point with less of the friction coefficients that do not matter at x, a mask (p,);
-    None if there is none.
-    """
+    """The best point with less of the frictions in the mask (p,) that do not matter, or None."""
     here, best, least = float(np.sum(misfit(x) ** 2)), None, np.inf
     for i in range(1, HALVINGS + 1):
         point = np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x)

@@ -140,9 +140,7 @@ def _cells(cells: np.ndarray) -> np.ndarray:
 
 
 class _Condition(NamedTuple):
-    """A support, load, force or normal: words, boundary, projection (dim, dim) on the components
-    that have values, these values (dim,), and the object of the scene.
-    """
+    """A support, load, force or normal by words, boundary, projection (dim, dim), values (dim,)."""
 
     kind: str
     where: str
@@ -173,9 +171,7 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
 
 @dataclass(frozen=True, eq=False)
 class _Comparison:
-    """A scene beside its image under one reflection; `nodes` as _images_of_meshes(). Each function
-    raises _Differs where something has no image.
-    """
+    """A scene beside its image; each function raises _Differs where something has none."""
 
     whole: Whole
     plane: Plane
@@ -212,9 +208,7 @@ class _Comparison:
         return twins
 
     def _plates(self, part: Any, image: Any) -> set[tuple[str, int]]:
-        """(body, number of a load) of plates that are their own images, if all conditions have
-        images.
-        """
+        """Plates that are their own images, if all conditions have images."""
         components, H, found = self.whole.scene.components, self.plane.reflection, set()
         others = list(_conditions(image, components))
         for one in _conditions(part, components):

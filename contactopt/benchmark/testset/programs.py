@@ -127,9 +127,7 @@ PROGRAMS: dict[str, Callable[[InterfaceProblem, np.ndarray], ConvexProgram]] = {
 
 
 def write_npz(program: ConvexProgram, path: Path) -> None:
-    """Write P, q, G, h, A, b, lb, ub of min x'Px/2 + q'x, G x <= h, A x = b, lb <= x <= ub.
-    InputError if a cone bounds more than one component, so that it is no quadratic program.
-    """
+    """Write P, q, G, h, A, b, lb, ub for qpsolvers; InputError for a cone that is no interval."""
     import qpsolvers
 
     if program.T.shape[1] > 1:

@@ -86,9 +86,7 @@ class Level:
     R: SparseProduct
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x =
-        r' - A z: x, r', z.
-        """
+        """x = p(A) r, close to A^-1 r for upper eigenvalues; r' = r - A x = r - A z; z."""
         z = SINGLE(4 / 3) / self.largest * r
         x = z.copy()
         for k in range(2, DEGREE + 1):
@@ -157,9 +155,7 @@ class VCycle:
         return self.scale * size * self._correct(full, 0)[self.place]
 
     def _correct(self, r: np.ndarray, depth: int) -> np.ndarray:
-        """Approximate solution on the levels from `depth` on: smooth, correct on the next level,
-        smooth.
-        """
+        """Smooth, correct on the next level, smooth, from the level `depth` on."""
         if depth == len(self.levels):
             return np.asarray(self.coarsest @ r)
         level = self.levels[depth]

@@ -99,10 +99,7 @@ class _Piece:
 
 
 def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
-    """P' A P (m, m) of a prolongation P (n, m) and A, both in blocks, from pieces of rows of A,
-    each in a thread of its own: A P is never there as a whole. It is the same whatever thread is
-    done first.
-    """
+    """P' A P (m, m) in blocks, from pieces of rows of A, each in a thread of its own."""
     height = P.blocksize[0]
     found: dict[int, sp.bsr_matrix] = {}
 

@@ -39,9 +39,7 @@ class FactorThread:
         return len(self._held) - 1
 
     def __getitem__(self, number: int) -> Any:
-        """SciPy's SuperLU object; whoever keeps it longer than this thread keeps its memory for
-        good.
-        """
+        """SciPy's SuperLU object; whoever keeps it longer than this thread keeps its memory."""
         return self._held[number]
 
 
@@ -66,9 +64,7 @@ def factorise(A: sp.csc_matrix) -> Any:
 
 
 class SuperLUSolver(BodySolver):
-    """Factors L U = L D L' of A, with `trailing` eliminated last: their last rows and columns give
-    its Schur complement.
-    """
+    """Factors L U = L D L' of A, `trailing` last, which give its Schur complement."""
 
     name = "superlu"
 
@@ -93,9 +89,7 @@ class SuperLUSolver(BodySolver):
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """None where SuperLU changed the order for its pivots, and where rounding left some that
-        are not positive.
-        """
+        """None where pivots changed the order or are not positive."""
         factors, n = self.factors, self.n
         head = n - len(self._asked())
         symmetric = np.array_equal(factors.perm_c, factors.perm_r)
@@ -134,9 +128,7 @@ class SuperLUSolver(BodySolver):
 
 
 def _ancestors(L: sp.csc_matrix, first: np.ndarray) -> np.ndarray:
-    """Unknowns (sorted) that substitution from `first` on reaches: those in the columns of L of
-    those reached before.
-    """
+    """Unknowns (sorted) that substitution from `first` on reaches, column by column."""
     reached = np.zeros(L.shape[0], dtype=bool)
     front = np.unique(first)
     while len(front):

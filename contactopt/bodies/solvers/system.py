@@ -139,9 +139,7 @@ class BodySolver(ABC):
         return self.trailing
 
     def trailing_inverse(self) -> np.ndarray:
-        """(m, m) block of the inverse of A on the unknowns `trailing`, symmetric to the last digit
-        [length / force]; InputError if it is not complete.
-        """
+        """The block (m, m) of A^-1 on `trailing`, exactly symmetric; InputError if incomplete."""
         at, triangle = self._asked(), self.trailing_triangle
         if triangle is not None:
             R, place = triangle
