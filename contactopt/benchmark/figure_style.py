@@ -75,10 +75,8 @@ def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write the names of lines in their colours beside their last points, one above the other where
-    they meet: (x, y, name, colour) of each.
-
-    A name stands to the left of a point in the right half of the figure, to the right of any other.
+    """Write coloured names of lines beside their last points (x, y, name, colour), one above the
+    other where they meet, to the left in the right half of the figure.
     """
     ax.autoscale_view()
     middle = float(ax.transAxes.transform((0.5, 0.5))[0])
@@ -119,11 +117,7 @@ def label_right(ax: Any, ends: Sequence[tuple[float, str, str]]) -> None:
 
 
 def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
-    """Write the numbers of a map in its cells, black on light colours and white on dark ones.
-
-    `norm` takes a number to its place between the darkest and the lightest colour; `size` is that
-    of the letters [pt].
-    """
+    """Write the numbers of a map in its cells, black on light colours and white on dark ones."""
     values = grid.to_numpy(float)
     if values.size > CELLS:
         return

@@ -1,9 +1,5 @@
-"""A process in which code of the user may run, seen from outside: start it, ask it, kill it, tell
-how it ended.
-
-The process is the one worker of an executor of loky, which starts it, carries calls and answers,
-and notices its death. What is added here: limits of time, the end of everything that the process
-started, and what it printed last.
+"""A process in which code of the user may run, seen from outside: the one worker of an executor of
+loky, with limits of time, the end of all that it started, and what it printed last.
 """
 
 from __future__ import annotations
@@ -84,11 +80,9 @@ class Process:
             ) from error
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function returns that the process calls.
-
-        After `limit` seconds the process is killed. Raises Ended if it did not survive the call,
-        which `phase` names. A process that is killed before the call, while it starts or while
-        nobody asks it anything, is started anew, STARTS times.
+        """What a function returns that the process calls; after `limit` seconds the process is
+        killed. Raises Ended, with `phase`, if it did not survive the call. A process that is killed
+        before the call is started anew, STARTS times.
         """
         from loky.process_executor import BrokenProcessPool
 

@@ -94,10 +94,8 @@ def report_campaign(
 
 
 def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
-    """The rows of a campaign and those of others, whose methods are told apart by their file.
-
-    Times of others come from another machine. Where both have made the same run of the same
-    method, the others' times are divided by the geometric mean of the ratios of these times.
+    """The rows of a campaign and those of others, whose methods are told apart by their file, and
+    whose times are divided by the geometric mean of the ratios for runs that both have made.
     """
     import pandas as pd
 

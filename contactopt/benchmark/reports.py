@@ -132,10 +132,7 @@ def has_table(folder: Path) -> bool:
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
     """Rebuild the report of every experiment that has a table in `reports`, and the page with all,
-    which is returned.
-
-    InputError if none has a table, or, after all the others are done, if a figure's arguments do
-    not fit its table.
+    which is returned; InputError if none has, or if a figure's arguments do not fit its table.
     """
     require("markdown_it", "pandas")
     page, errors = Path(reports) / PAGE, []
@@ -285,10 +282,8 @@ def _png(figure: Any) -> bytes:
 
 
 def rendered(text: str, folder: Path) -> str:
-    """HTML of Markdown, with the pictures of the report in its folder embedded.
-
-    Raw HTML is shown as text. Links to files beside the report become text, since the page may
-    stand elsewhere.
+    """HTML of Markdown, with the pictures in `folder` embedded; raw HTML is shown as text, and
+    links to files become text, since the page may stand elsewhere.
     """
     from markdown_it import MarkdownIt
 

@@ -60,10 +60,8 @@ def told(place: Path, advice: str = "choose another directory") -> Iterator[None
 
 
 class Store:
-    """The appending end, for one campaign at a time (file lock). Use as a context manager.
-
-    InputError if the folder holds results and `resume` is not set, if another campaign writes
-    there, or if nothing can be written.
+    """The appending end, for one campaign at a time (file lock), a context manager; InputError for
+    results without `resume`, another campaign, or a folder that cannot be written.
     """
 
     def __init__(self, folder: Path, resume: bool):

@@ -17,10 +17,8 @@ INSTANCE = ["problem", "setting", "start"]
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
-    """The rows of one law, or of all at '', whose columns have given values, at least one.
-
-    `where` holds for a column a value or a list of them; '' stands for no value. InputError on an
-    unknown column, or if no row is left.
+    """The rows of one law, or of all at '', whose columns have the values `where`, one, a list or
+    '' for none; InputError on an unknown column, or if no row is left.
     """
     rows = table[table["law"] == law] if law else table
     for column, value in where.items():

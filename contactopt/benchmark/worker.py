@@ -1,8 +1,5 @@
-"""What the processes do in which code of the user runs: build problems, run methods.
-
-They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them
-from outside. Each keeps its plug-ins, its problem and what is imported from call to call. What runs
-methods gets its problems from outside and judges nothing.
+"""What the processes do in which code of the user runs: build problems, run methods. They may end
+at any moment (contactopt.benchmark.process), keep what was loaded, and judge nothing.
 """
 
 from __future__ import annotations

@@ -128,12 +128,9 @@ class AssembledElastic(AssembledBody):
 def _trace(
     weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
 ) -> sp.csr_matrix:
-    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,).
-
-    In general the neighbours of a contact node take part, by its row of the weights. Where the
-    component is prescribed at the contact node itself, as on a plane of symmetry, its displacement
-    is that of the node alone: the weights of a neighbour and of its mirror image, which the model
-    leaves out, cancel each other there.
+    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,), by
+    their rows of the weights. Where it is prescribed at the contact node, it is that of the node
+    alone: the weights of a neighbour and of its mirror image cancel each other there.
     """
     k = len(nodes)
     alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)

@@ -27,11 +27,8 @@ from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
-    """Mesh and assemble one elastic part of a scene.
-
-    `elements` is the number of elements across the contact half-width, `zone` the half-width that
-    the mesh resolves [length]. InputError for a mesh that cannot be used, such as one in several
-    pieces, and for supports and loads that do not fit.
+    """Mesh and assemble an elastic part, with `elements` across the contact half-width and the
+    half-width `zone` resolved. InputError for a mesh, supports or loads that do not fit.
     """
     mesh = part.build_mesh(elements, zone)
     check_mesh(scene, part, mesh)

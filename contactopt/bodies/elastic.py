@@ -281,12 +281,11 @@ class ElasticBody(Body):
 def condense(
     body: Assembly, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
 ) -> ElasticBody:
-    """Make one body's linear system solvable and condense its plates.
+    """Make one body's linear system solvable, by a `solver`, and condense its plates.
 
-    solver is 'auto' or a name in contactopt.bodies.solvers.SOLVERS. With `entries` the contact
-    unknowns are eliminated last, so that the factors hold their Schur complement: this makes the
-    entries of the compliance cheap, and serves an explicit Q. ground (n, n) is a stiffness that is
-    added (contactopt.bodies.thin), if any.
+    With `entries` the contact unknowns are eliminated last, so that the factors hold their Schur
+    complement, which makes the entries of the compliance cheap. A stiffness `ground` (n, n) is
+    added.
     """
     whole = body.A if ground is None else sp.csr_matrix(body.A + ground)
     kept = body.free if ground is not None else np.setdiff1d(body.free, body.rigid_motions.fixing)
@@ -355,11 +354,8 @@ def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
 
 
 def _rigid_extension(body: Assembly) -> np.ndarray:
-    """The unit motions of the plates (n, p) with the unknowns of the same component moved along by
-    as much.
-
-    These are translations of the body where no support holds another part of it in that component.
-    The free unknowns of a body that is held elsewhere stay at rest.
+    """The unit motions of the plates (n, p) with the free unknowns of the same component moved
+    along, unless a support holds another part of the body in that component.
     """
     extended, fixed = body.motion.copy(), np.ones(len(body.load), dtype=bool)
     fixed[body.free] = False

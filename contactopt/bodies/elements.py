@@ -85,9 +85,7 @@ def weight_at(weight: Weight, x: np.ndarray) -> np.ndarray | float:
 
 
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
-    """The vector-valued displacement basis of a mesh, of degree 1 or 2.
-
-    Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor
+    """The displacement basis of a mesh, with quadrature that is exact on parallelepipeds but for
     1/r.
     """
     element = SHAPES[mesh.refdom.__name__][1][degree]()
@@ -102,10 +100,8 @@ def forget(mapping: skfem.mapping.Mapping) -> None:
 
 
 class LeanBasis(skfem.CellBasis):
-    """A CellBasis, with quadrature of an order, that evaluates each shape function when it is asked
-    for.
-
-    The values of all shape functions would take more memory than the stiffness matrix.
+    """A CellBasis that evaluates each shape function when it is asked for: the values of all would
+    take more memory than the stiffness matrix.
     """
 
     def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
@@ -160,10 +156,8 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
 def contact_trace(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: Weight, tied: bool = False
 ) -> Trace:
-    """The trace of the displacement on a boundary, given by the numbers (f,) of its facets.
-
-    degree is that of the basis, weight the measure of the integrals as for `weight_at`. If `tied`,
-    every node of the boundary is a contact, as where it is tied to another body.
+    """The trace of the displacement on a boundary of facets (f,), with the measure `weight`. If
+    `tied`, every node of the boundary is a contact, as where it is tied to another body.
     """
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
@@ -233,10 +227,8 @@ def _cell_rule(
 def _face_basis(
     mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: Rule
 ) -> skfem.FacetBasis:
-    """FacetBasis that finds the places on the elements to what rounding of the coordinates allows.
-
-    scikit-fem asks Newton's iteration for 1e-12 of an element, out of reach where elements are
-    small beside their distance from the origin.
+    """FacetBasis that finds the places on elements to the rounding of the coordinates; scikit-fem
+    asks for 1e-12 of an element, out of reach for small elements far from the origin.
     """
     mapping = mesh._mapping()
     if not isinstance(mapping, skfem.MappingAffine):

@@ -21,11 +21,8 @@ FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 def mirrored_nodes(
     scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray
 ) -> np.ndarray:
-    """Nodes in planes across an axis beyond which the body goes on as its mirror image.
-
-    Returns (dim, nodes) whether a node lies in a plane across that axis on which nothing else than
-    the displacement along this axis is held (n,), and no traction acts; none where the scene has no
-    copies.
+    """(dim, nodes) whether a node lies in a plane across that axis on which nothing else than the
+    displacement along it is held (n,), and no traction acts; none where the scene has no copies.
     """
     mesh, unknowns = basis.mesh, node_unknowns(basis)
     names = list(scene.surfaces_of(part))

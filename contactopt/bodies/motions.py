@@ -76,11 +76,9 @@ def _planes(dim: int) -> list[tuple[int, int]]:
 def free_motions(
     kind: str, components: tuple[str, ...], basis: skfem.CellBasis, held: np.ndarray, weight: Weight
 ) -> Motions:
-    """The rigid motions of a body that leave all held unknowns (n,) at rest.
-
-    kind and components are those of the scene; basis and weight are the displacement basis of n
-    unknowns and the measure of its integrals (contactopt.bodies.elements.weight_at). In an
-    axisymmetric scene there is one motion, along the axis.
+    """The rigid motions of a body, in a scene of that kind and these components, that leave all
+    held unknowns (n,) at rest, with inertia by the measure `weight`; the one along the axis where
+    axisymmetric.
     """
     unknowns = node_unknowns(basis)
     x = basis.doflocs[:, unknowns[0]]
@@ -104,9 +102,7 @@ def free_motions(
 
 def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
     """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, with their
-    names.
-
-    A translation or rotation that is free by itself is a column of its own.
+    names; translations and rotations that are free by themselves are columns of their own.
     """
     count = len(labels)
     values, vectors = np.linalg.eigh(held.T @ held)

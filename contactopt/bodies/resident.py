@@ -1,7 +1,5 @@
-"""An elastic body on its rank: what rank 0 orders of it (contactopt.bodies.remote).
-
-Its contact unknowns m are those of the nodes of its contact surfaces, in the order in which the
-body numbers them.
+"""An elastic body on its rank: what rank 0 orders of it (contactopt.bodies.remote). Its m contact
+unknowns are those of the nodes of its contact surfaces, in the order of the body.
 """
 
 from __future__ import annotations

@@ -41,11 +41,9 @@ def volumes(body: Assembly) -> np.ndarray:
 
 
 def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether a body resists some displacement little more than a ground of its own material would.
-
-    relieved takes nodal forces (n,) to the displacements (n,) that they make. The least eigenvalue
-    of A U = lambda M U, which one step of inverse iteration finds within a factor where it is far
-    below the others, is below 20 p: so it is for layers up to about a thirtieth of their width.
+    """Whether a body resists some displacement little more than a ground of its own material would:
+    the least eigenvalue of A U = lambda M U, by one step of inverse iteration with `relieved`,
+    forces -> displacements (n,), is below 20 p, as for layers up to a thirtieth of their width.
     """
     M = volumes(body)
     forces = M * np.random.default_rng(0).standard_normal(len(body.load))

@@ -1,8 +1,5 @@
-"""The contact surface's own coordinates and local frames, laid out from the surface itself.
-
-Neither depends on how the bodies lie in space: everything is derived from contact normals, from the
-cells that join the contacts, from planes of symmetry and from the distribution of the areas. A body
-that is turned takes its chart and its frames along.
+"""The contact surface's own coordinates and local frames, laid out from contact normals, cells,
+planes of symmetry and areas alone: a body that is turned takes them along.
 """
 
 from __future__ import annotations
@@ -56,11 +53,8 @@ def lay_out(
 def _line(
     contacts: ContactPoints, tangents: np.ndarray, planes: list[SymmetryPlane], mirrors: bool
 ) -> tuple[np.ndarray, tuple[bool, ...], float | None]:
-    """Arc length (1, k) along t1, whether it is mirrored at 0, and its period if the line is
-    closed.
-
-    It is measured from an end in a plane of symmetry, otherwise from the middle; on a closed line
-    from the contact with the least gap.
+    """Arc length (1, k) along t1, whether it is mirrored at 0, and the period of a closed line:
+    from an end in a plane of symmetry, else from the middle or, if closed, the least gap.
     """
     chains, period = _chains(contacts, tangents)
     place = np.zeros(contacts.points.shape[1])
@@ -126,11 +120,9 @@ def _least(gap: np.ndarray, size: float) -> int:
 
 
 def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndarray, np.ndarray]:
-    """Two orthogonal directions (3,) of a surface, right-handed with its normal.
-
-    Planes of symmetry give them: both point into the bodies. One such plane gives the second.
-    Without any the first is the direction in which the areas spread most, or, where they spread
-    evenly, that of the longest edge of the rim.
+    """Two orthogonal directions (3,) of a surface, right-handed with its normal: into the bodies
+    from planes of symmetry; without any, the first is that in which the areas spread most, or else
+    that of the longest edge of the rim.
     """
     n = _mean_normal(contacts)
     inward = [plane.inward - (plane.inward @ n) * n for plane in planes]
@@ -156,10 +148,8 @@ def _mean_normal(contacts: ContactPoints) -> np.ndarray:
 
 
 def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
-    """The first direction of a surface without planes of symmetry.
-
-    Its sense is that in which the areas reach further, or, where they reach equally far, that of
-    the first contact.
+    """The first direction of a surface without planes of symmetry, in the sense in which the areas
+    or else the first contact reach further.
     """
     points, areas = contacts.points, contacts.areas
     centred = points - (points @ areas / areas.sum())[:, None]

@@ -141,11 +141,8 @@ def of_contacts(
 def local_map(
     traces: Sequence[sp.csr_matrix], contacts: np.ndarray, frames: np.ndarray
 ) -> sp.csr_matrix:
-    """T (k dim, n) from a body's unknowns to the displacement of contacts in their frames, with dim
-    rows for each contact.
-
-    `traces` has a matrix (m, n) for each component of the displacement of the surface's contacts,
-    `contacts` (k,) are the numbers of some of them, and `frames` (k, dim, dim) hold n, t1[, t2].
+    """T (k dim, n) from a body's unknowns to the displacement of the contacts (k,) of a surface in
+    their frames (k, dim, dim), from a trace (m, n) for each component in space.
     """
     k, dim = frames.shape[:2]
     shape = k * dim, traces[0].shape[1]

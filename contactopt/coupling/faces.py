@@ -148,9 +148,7 @@ class Faces:
         self, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray
     ) -> np.ndarray:
         """Reference coordinates (dim - 1, m) on faces (m,) where axes (m, dim - 1, dim) see the
-        points x (dim, m).
-
-        Newton's iteration from `start`; a single step is exact on affine faces.
+        points x (dim, m), by Newton's iteration from `start`; one step is exact on affine faces.
         """
         at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
         for _ in range(STEPS):
@@ -217,9 +215,7 @@ def cross(tangents: np.ndarray) -> np.ndarray:
 
 def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
     """The polygons that stand for a face when surfaces are cut: their vertices (p, v) among its
-    nodes, and the linear cell (p,) in which each lies.
-
-    Those of the side with the multipliers (`own`) never reach over two of its cells.
+    nodes, and their linear cell (p,), over which they never reach where the side is `own`.
     """
     if surface.curved and surface.kind == "RefTet":
         return _QUARTERS, np.zeros(4, dtype=int)

@@ -55,10 +55,8 @@ class Facets:
 
 
 def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray, np.ndarray]:
-    """All pairs of facets of which the first may see the second along its normals, on either side.
-
-    The normals of facets which face each other have a cosine below `facing`, at most zero. Returns
-    the numbers (j,) of the own and of the other facet of each pair, sorted by the own one.
+    """All pairs of facets of which the first may see the second along its normals, on either side:
+    numbers (j,) sorted by the own one. Facets face each other with a cosine below `facing` <= 0.
     """
     trees = [_tree(facets) for facets in (own, other)]
     first, second = np.zeros(1, dtype=int), np.zeros(1, dtype=int)
@@ -90,9 +88,8 @@ def _seen(own: Facets, other: Facets, facing: float) -> np.ndarray:
 
 def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
     """Clusters of every level, from one to as many as there are facets, and the facets of the last.
-
-    Cluster c of a level is halved, across its longest side, into 2 c and 2 c + 1 of the next one.
-    Some of the last level are empty: their radius is not a number, so that they are never seen.
+    Cluster c is halved, across its longest side, into 2 c and 2 c + 1 of the next level; those that
+    stay empty have the radius nan, so that they are never seen.
     """
     n = len(facets.radius)
     order, levels = np.arange(n), []

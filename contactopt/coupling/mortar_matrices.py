@@ -140,10 +140,8 @@ class _Dual:
 def _contacts_of(
     dual: _Dual, full: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices of cells become contacts; those that are hardly covered pass their share on.
-
-    Returns the nodes (k,) of the contacts, the contact (cell, v) of every vertex, and of every
-    contact its area and whether a cell around it is covered in part only.
+    """The nodes (k,) of the contacts at the vertices of cells, of which those hardly covered pass
+    their share on; the contact (cell, v) of every vertex; area and `partial` of every contact.
     """
     nodes, rows = np.unique(dual.corners, return_inverse=True)
     rows = _pass_on(rows.reshape(dual.area.shape), dual.area, full[nodes])

@@ -84,13 +84,10 @@ def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
 def mirror_planes(
     scene: Scene, guides: Sequence[Guides], cutting: Sequence[SymmetryPlane]
 ) -> tuple[SymmetryPlane, ...]:
-    """Find the planes of symmetry, one for each direction, of a scene with two copies or more,
-    whose bodies are parts of the whole ones.
-
-    These are the planes `cutting` a contact surface, those of the axes that the scene names, and
-    those on which supports guide a body and which have all bodies on one side, unless there are
-    more of these than the copies ask for. InputError if the scene names an axis across which no
-    such plane lies.
+    """The planes of symmetry, one for each direction, of a scene with two copies or more: those
+    `cutting` a contact surface, those of the axes that the scene names, and those on which supports
+    guide a body and which have all bodies on one side, unless there are more of these than the
+    copies ask for. InputError if no such plane lies across an axis that the scene names.
     """
     found: list[SymmetryPlane] = []
     for plane in cutting:

@@ -192,11 +192,8 @@ class Reduction:
         return replace(self, bodies=bodies, problem=problem)
 
     def loaded(self, scene: Scene) -> Reduction:
-        """Put the loads of another scene of the same structure on the same bodies, coupling and Q.
-
-        Values of tractions, body forces, plate forces and support displacements may differ, and mu.
-        InputError if meshes, materials or other parts differ, or if supports or plates hold other
-        unknowns.
+        """Put the loads of another scene on the same bodies, coupling and Q: tractions, body and
+        plate forces, support displacements and mu. InputError if anything else differs.
         """
         check_same(self.scene, scene)
         start = time.perf_counter()

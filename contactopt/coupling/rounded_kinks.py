@@ -78,9 +78,7 @@ def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
 
 def _gradients(surface: Faces) -> list[sp.csr_matrix]:
     """Matrices (n, n), one for each component of space, from the nodes' values to the tangential
-    gradient at the nodes.
-
-    Rows of nodes that too few others surround are empty.
+    gradient; empty rows where too few others surround a node.
     """
     n, (f, j) = surface.points.shape[1], surface.faces.shape
     at = surface.faces.ravel(), np.repeat(np.arange(f), j)

@@ -67,10 +67,8 @@ class Overlap:
 
 
 def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
-    """Find where two surfaces overlap, with points of integration in the order of the own cells.
-
-    The own side carries the contacts; `normals` (dim, n) are its normals at its points. InputError
-    if the other surface is folded, so that some cell faces two of its layers.
+    """Find where two surfaces overlap, with points of integration in the order of the own cells,
+    whose normals `normals` (dim, n) are given at its points. InputError if the other is folded.
     """
     return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 
@@ -135,15 +133,13 @@ def _nearest(
     direction: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mask (q,) of the pieces on that layer of the other surface which the own one faces, and how
-    much of each own cell they cover. `pairs` are the own and the other polygon of each piece,
-    `content` (q,) is its part of the own cell, `middle` (dim, q) a place within it, and `direction`
-    (dim, q) the normal there.
+    much of each own cell they cover, from the polygons of each piece, its part of the own cell, a
+    place within it and the normal there (dim, q).
 
-    A line along the normal may meet the other surface more than once, and goes on behind the own
-    one as well. Behind it counts what overlaps no deeper than about twice the distance of the
-    nearest place of the other surface. Where a cell is covered more than once, layers count that
-    are no further away than twice the nearest one. If these still cover the cell more than once,
-    the surface is folded: an InputError.
+    A line along the normal may meet the other surface more than once. Behind the own one counts
+    what overlaps no deeper than about twice the distance of the nearest place. Where a cell is
+    covered more than once, layers count that are no further than twice the nearest one; if these
+    still do, the surface is folded: an InputError.
     """
     first, second = pairs
     m, cell = theirs.normal[:, second], mine.cell[first]

@@ -230,10 +230,8 @@ def fit(
 def _minimised(
     model: _Model, first: np.ndarray, limits: tuple[np.ndarray, np.ndarray], estimated: bool
 ) -> tuple[np.ndarray, Any]:
-    """The values (p,) of the smallest misfit, and what the optimiser says, which works in units of
-    the first values.
-
-    Where the data hardly know friction because contacts stick, it goes on from less friction.
+    """The values (p,) of the smallest misfit, and what the optimiser says; where the data hardly
+    know friction because contacts stick, it goes on from less friction.
     """
     size = np.where(first != 0, np.abs(first), 1.0)
     low, high = limits[0] / size, limits[1] / size

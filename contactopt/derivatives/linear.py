@@ -248,10 +248,8 @@ def _refined(
     right: Stacked,
     weights: Stacked | float,
 ) -> Stacked:
-    """Solve A x = b to ACCURACY by solving again for what is left, from x -> A x, b -> an
-    approximate x, and weights W of the rows, like b: the residual is |W (b - A x)| / |W b|.
-
-    InputError if that is out of reach, because the solution is not unique.
+    """Solve A x = b by `solve` again and again for what is left, until |W (b - A x)| / |W b| is
+    ACCURACY; InputError if that is out of reach, because the solution is not unique.
     """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)

@@ -277,11 +277,8 @@ def solved_chain(
     Q: str = "auto",
     gap: np.ndarray | float = 0.0,
 ) -> Chain:
-    """Solve the states of a load path, without their energies, to the certificate `tol`.
-
-    `base` is a reduction of the same bodies, which is then only loaded anew; `starts` has a
-    solution for every state to start from; `gap` (k,) is added to the initial gap. InputError where
-    a state has no solution or is not solved.
+    """Solve the states of a load path, without their energies, to the certificate `tol`, with `gap`
+    (k,) added and a start for each, on `base` loaded anew if given. InputError if one is unsolved.
     """
     steps: list[Step] = []
     slipped: Any = 0.0

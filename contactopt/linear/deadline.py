@@ -1,9 +1,5 @@
-"""The moment at which the step of a method that runs must give up, for inner iterations of
-thousands of steps.
-
-The driver looks at its clock after each outer iteration. An inner loop that can last longer than a
-user's patience calls `check_time`, which ends the step; the solve then ends with status
-`time_limit` and the last outer iterate.
+"""The moment at which the step of a method that runs must give up. The driver looks at its clock
+after each outer iteration; an inner loop that can last longer calls `check_time`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,6 @@
-"""Vectors in parts: one array for each body, some of which may lie in other processes.
-
-A part is an array, or an object with the same operators that is `elsewhere`
-(contactopt.bodies.remote.Field). What is done with a part elsewhere is only ordered here; so the
-orders go out first, and all processes work at the same time. Sums are made part by part, wherever
-the parts are, so that the result does not depend on it.
+"""Vectors in parts: one array for each body, some in other processes, where what is done with them
+is only ordered (contactopt.bodies.remote.Field): so the orders go out first, and all work at the
+same time. Sums are made part by part, so that the result does not depend on it.
 """
 
 from __future__ import annotations

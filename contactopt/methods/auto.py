@@ -117,10 +117,8 @@ class Auto(Method):
 
 
 class _Robust:
-    """The stages after Newton's method, on a problem whose Q is an array or sparse.
-
-    A stage yields its iterates, and returns the best of its points or a better one that it was
-    given.
+    """The stages after Newton's method, on a problem whose Q is an array or sparse. A stage yields
+    its iterates, and returns the best of its points or a better one that it was given.
     """
 
     def __init__(self, problem: InterfaceProblem, loose: bool):
@@ -248,10 +246,8 @@ def _newton(
 ) -> Generator[Iterate | Known, None, Iterate]:
     """Newton's iterates; returns the best.
 
-    What comes next needs the entries of Q. Where there are many, or bodies are solved by iteration,
-    these are dear, and Newton's method goes on until its own products have cost as much. A start
-    that leads nowhere is given up for the solution of the bonded problem, from which Newton's
-    method begins where it has none.
+    What comes next needs the entries of Q. Where these are dear, Newton's method goes on until its
+    own products have cost as much. A start that leads nowhere is given up for the bonded solution.
     """
     Q = problem.Q
     dear = isinstance(Q, InterfaceOperator) and (

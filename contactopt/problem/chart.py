@@ -51,14 +51,12 @@ class Chart:
 
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
-        """Lay a chart through bare points, of which nothing else is known, along the directions in
-        which they extend most.
+        """Lay a chart through bare points (d, k) [length], of which nothing else is known, open and
+        without symmetry.
 
         Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
         Otherwise the origin is the middle of the points, the axes are their principal directions,
-        and the sign of each axis is chosen so that its largest component in space is positive. The
-        chart is open and without symmetry. `coordinates` are the points (d, k) [length], and `dim`
-        is the number of components of a contact.
+        and the sign of each makes its largest component in space positive.
         """
         count = dim - 1
         if len(coordinates) <= count:

@@ -97,10 +97,8 @@ def cylinder_derivative(
 def disc_of_height(
     height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of tangential components t (k, dim - 1) alone, on discs whose radius is
-    mu |height|, and its derivative; the heights (k,) stay.
-
-    slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
+    """Projection of t (k, dim - 1) alone on discs of radius mu |height|, and its derivative; the
+    heights (k,) stay. `slope` (k,) is the derivative of |height|.
     """
     k, dim = len(t), t.shape[1] + 1
     bound, length = mu * np.abs(height), lengths(t)

@@ -145,10 +145,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 
 def without_rounding(V: np.ndarray) -> np.ndarray:
-    """Motions V (n, p) without the entries that are rounding beside the largest of their column.
-
-    Normals of a flat surface that are off by rounding would let forces without friction hold a body
-    along it: by motions without bound, which the certificate does not see.
+    """Motions V (n, p) without entries that are rounding beside the largest of their column: forces
+    without friction would hold a body along a flat surface by them, unseen by the certificate.
     """
     size = np.abs(V)
     return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)

@@ -87,10 +87,9 @@ def _restricted(mesh: Any, elements: np.ndarray) -> Any:
 
 
 def roller(whole: Whole) -> str:
-    """A support that holds one component of contacts in a plane across it; empty if there is none.
-
-    In a scene of mirror images such a support is a plane of symmetry
-    (contactopt.coupling.planes_of_symmetry), in a whole scene it is not.
+    """A support that holds one component of contacts in a plane across it, or none: a plane of
+    symmetry in a scene of mirror images (contactopt.coupling.planes_of_symmetry), not in a whole
+    scene.
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]

@@ -181,10 +181,8 @@ class Answer(NamedTuple):
 def conjugate_gradients(
     A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float
 ) -> Answer:
-    """Solve A x = load, load (n,) [force], by conjugate gradients with a V-cycle B.
-
-    It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`; BackendError if it does
-    not get there within MOST_ITERATIONS iterations, or if r' B r is negative or not a number.
+    """Solve A x = load by conjugate gradients with a V-cycle B until (r' B r)^1/2 has fallen by
+    `rtol`; BackendError after MOST_ITERATIONS iterations, or if r' B r is negative or nan.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -216,9 +214,8 @@ def _dot(x: np.ndarray, y: np.ndarray) -> float:
 def _coarsen(
     A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """Prolongation from the aggregates of nodes, and the modes and points of the aggregates.
-
-    A (n, n) in blocks of nodes;  modes (n, j) it should represent exactly;  points (dim, nodes)
+    """Prolongation from the aggregates of nodes, and the modes (n, j), represented exactly, and
+    points (dim, nodes) of these; A is in blocks of nodes.
     """
     try:
         with IMPORTING:
@@ -260,11 +257,8 @@ def _smoothed(
 
 
 def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
-    """Pattern (k, k) of ones of the neighbours in the graph of A at no more than NEAR times the
-    distance of the nearest one, with each node as its own neighbour.
-
-    The nearest neighbour of either node counts, so that the pattern is symmetric. A is in blocks of
-    the k nodes, which are at points (dim, k).
+    """Pattern (k, k) of ones of the neighbours in the graph of A, in blocks of k nodes at points
+    (dim, k), at no more than NEAR times the distance of the nearest one of either, and of itself.
     """
     return _pattern(A, _near(A, points))
 
@@ -301,11 +295,8 @@ def _starts(A: sp.bsr_matrix, chosen: np.ndarray) -> np.ndarray:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """The translations and rotations of points (dim, k) as columns, which are the near-kernel of
-    the stiffness: (k dim, 3) in 2D, (k dim, 6) in 3D, the unknowns of a point in consecutive rows.
-
-    An axisymmetric body keeps the motions of its section: its hoop strain is small across a few
-    elements.
+    """The translations and rotations of points (dim, k) as columns, (k dim, 3) in 2D and (k dim, 6)
+    in 3D, the near-kernel of the stiffness, hoop strain apart.
     """
     fields = rigid_fields(points)
     return fields.swapaxes(0, 1).reshape(-1, fields.shape[2])
@@ -324,12 +315,9 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A matrix in single precision and blocks of the k nodes present, (k dim, k dim), whose held
-    unknowns are rows of their own; the place (n,) of each unknown of A in it; and the nodes present
-    (k,).
-
-    A, node and component are as in contactopt.bodies.solvers.system.System, dim is the number of
-    components. The rows are made some at a time, for the copies take more than the result.
+    """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
+    their own; the place (n,) of each unknown of A in it; and the nodes (k,). The rows are made some
+    at a time, for the copies take more than the result.
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim

@@ -1,10 +1,7 @@
-"""Bridges to QP and conic solvers.
+"""Bridges to QP and conic solvers: a backend is one line of a table, imported when it is used.
 
-The tables say what exists; nothing is imported before it is used.
-
-A backend is one line here. `settings` are the tight settings it is run at, for a dimensionless
-problem; what each of them gets wrong is caught afterwards by the crossover and the certificate,
-never believed.
+`settings` are the tight settings it is run at, for a dimensionless problem; what each of them gets
+wrong is caught afterwards by the crossover and the certificate, never believed.
 """
 
 from __future__ import annotations

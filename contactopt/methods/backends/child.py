@@ -1,9 +1,6 @@
-"""Quadratic programs solved in a process of their own, for backends that can neither be told a time
-limit nor interrupted.
-
-The process waits for one program after another and is killed at the deadline of the solve that
-runs. It is started for programs of more than SMALL unknowns in solves with a time limit only:
-smaller ones take a few milliseconds, and the start takes up to a second.
+"""Quadratic programs in a process of their own, for backends that no time limit ends. It is killed
+at the deadline of the solve that runs, and started for programs of more than SMALL unknowns in
+solves with a time limit only, since the start takes up to a second.
 """
 
 from __future__ import annotations

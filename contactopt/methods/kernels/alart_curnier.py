@@ -73,11 +73,9 @@ def coulomb_equations(
 
 def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Forces within the bounds of the law to the last digit, at the solution equal to r (k, dim):
-    P(y) = r + error.
-
-    Thin bodies between several pairs of surfaces are much softer under smooth forces than 1 / rho.
-    There P(y), which contains rho u, would make a displacement of the rounding of u, and r itself
-    is projected on the bounds instead.
+    P(y) = r + error. Thin bodies between several pairs of surfaces are much softer under smooth
+    forces than 1 / rho, so that P(y) would make a displacement of the rounding of u; there r is
+    projected.
     """
     if len(problem.pairs) == 1:
         return r + error
@@ -150,10 +148,8 @@ def cold_start(
     """Find the bonded solution of a dimensionless problem, from which Newton's method starts, to a
     relative accuracy; by default with factors.
 
-    All contacts are glued if a plate presses the bodies together, else those that would penetrate.
     Without a plate the start has no force at all, if its residual is smaller: forces that bond
-    rigid bodies are of any size. On elastic bodies Newton's method cycles from there, because it
-    takes contacts for sliding before friction acts.
+    rigid bodies are of any size, but on elastic bodies Newton's method cycles from no force.
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     glued = glued_contacts(problem)
@@ -185,11 +181,9 @@ def _bonded(problem: InterfaceProblem, glued: np.ndarray) -> Iterate | None:
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
     """Choose the contacts (k,) that the bonded solution of a dimensionless problem glues.
 
-    Where loads press free bodies together these are all contacts that the loads may close, and
-    otherwise those that would penetrate. One contact i that bears the load F of a pair alone closes
-    once the bodies have approached by q_i + Q_ii F. Further contacts only stiffen the pair. So no
-    contact closes whose gap exceeds the least of these approaches, unless a body turns. All are
-    glued where the near ones alone would leave a motion free.
+    They are those that would penetrate and, where loads press free bodies together, those whose gap
+    is at most the least approach q_i + Q_ii F of a contact i that bears the load F of its pair
+    alone. All are glued where the near ones alone would leave a motion free.
     """
     gap = problem.q[:, 0]
     closed = np.asarray((problem.law.lowest < 0) | (gap < 0))

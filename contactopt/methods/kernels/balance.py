@@ -107,10 +107,8 @@ def _least(slope: Callable[[float], float], first: float) -> float:
 
 
 def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Find the motions that no closed contact holds along its normal and no sticking one at all.
-
-    V (k d, p) are the rigid motions, D (k, d, d) the derivative of the law's map. The columns (p,
-    j) that come back are orthonormal combinations of the multipliers.
+    """Orthonormal combinations (p, j) of the motions V that no closed contact holds along its
+    normal and no sticking one at all, by the derivative D (k, d, d) of the law's map.
     """
     d = D.shape[1]
     firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
@@ -127,16 +125,13 @@ def settled(
     D: np.ndarray,
     displacements: Callable[[], np.ndarray],
 ) -> np.ndarray | None:
-    """Find the change (p,) of the multipliers with which friction balances motions that no contact
+    """The change (p,) of the multipliers with which friction balances motions that no contact
     holds; None where there are no such motions, or no friction balances the loads.
 
-    Newton's method linearises the contacts. Where all of them slip, their forces do not change with
-    such a motion, and its system says nothing about it: it is singular, or its steps jump to and
-    fro over the contact that should stick. Here the normal forces are bounds of the friction, and
-    the motion follows from a convex problem.
-
-    r are the forces (k, d), D is the derivative of the law's map there, and `displacements` gives u
-    (k, d).
+    Where all contacts slip, their linearised forces do not change with such a motion, and Newton's
+    system is singular or its steps jump over the contact that should stick. With the normal forces
+    as bounds of the friction, the motion follows from a convex problem. D is the derivative of the
+    law's map at the forces r (k, d), and `displacements` gives u (k, d).
     """
     if not len(equations.s):
         return None

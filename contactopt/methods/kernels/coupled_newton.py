@@ -127,12 +127,10 @@ class Coupled:
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces r + error, at the solution equal to r and within the bounds to the last digit,
-        with what Q makes of them.
+        """The forces r + error, at the solution equal to r, with what Q makes of them.
 
-        One V-cycle improves the displacements. The accuracy stated is that before it, by the
-        criterion with which conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f
-        over that of the displacements.
+        One V-cycle improves the displacements. The accuracy stated is that before it: the energy
+        (f'Bf)^1/2 of the missing forces f over that of the displacements.
         """
         form, r = self.form, at.r + error
         missing = form.unbalanced(at.X, r.ravel())
@@ -150,14 +148,12 @@ def coupled_steps(
     preconditioner: str | None,
     start: Iterate | None,
 ) -> Iterator[tuple[Known, float]]:
-    """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
+    """Iterates of Newton's method on contacts and bodies, each with the residual before its step.
 
     `form` is the dimensionless problem's Q before condensation; `start` None stands for the bonded
-    solution. Yields an iterate, and the residual of the equations that its step began with.
-
-    Where the residual does not fall for more than IDLE steps, a rough start has led the sorting of
-    the contacts into a circle, and the iteration begins anew, once, from an accurate bonded
-    solution. It ends where a step fails.
+    solution. Where the residual does not fall for more than IDLE steps, a rough start has led the
+    sorting of the contacts into a circle, and the iteration begins anew, once, from an accurate
+    bonded solution. It ends where a step fails.
     """
     with one_blas_thread():
         several = len(problem.pairs) > 1

@@ -174,10 +174,8 @@ def homotopy_iterates(
     problem: InterfaceProblem, matrix: Blocks, steps: int, random: np.random.Generator | None = None
 ) -> Iterator[tuple[Iterate, float]]:
     """Points (r (k, dim), lambda (p,)) of a dimensionless problem and how far each is from a
-    solution: one at each new half of t.
-
-    It ends near a solution, where the path cannot be followed further, or after that many
-    factorisations. `random` draws another first point, of another path.
+    solution: one at each new half of t, until the path ends or so many `steps` are factorised.
+    `random` draws another first point, of another path.
     """
     spread = np.zeros(problem.contacts) if random is None else random.normal(size=problem.contacts)
     path = Homotopy(problem, matrix, START * np.exp(spread))

@@ -84,11 +84,8 @@ def krylov_step(
     D: np.ndarray,
     rtol: float,
 ) -> Iterate | None:
-    """Solve for a Newton step dr (k, d) and dlambda (p,) from products with Q alone, to a relative
-    accuracy; None if the iteration does not get anywhere.
-
-    The right sides are error (k, d) of the contact equations and -balance (p,); D (k, d, d) are the
-    derivatives of the law's map.
+    """A Newton step dr (k, d), dlambda (p,) as of `Equations.step`, from products with Q alone, to
+    a relative accuracy; None if the iteration does not get anywhere.
     """
     if np.array_equal(D, D.transpose(0, 2, 1)):
         dr, multipliers = _symmetric_step(equations, P, error, balance, D, rtol)

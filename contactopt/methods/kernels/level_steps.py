@@ -181,11 +181,8 @@ def _rough_inverse(level: Level, at: Evaluation) -> Act:
 
 
 def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of
-    them.
-
-    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift
-    sum to less than one.
+    """Shifts from 0 to beyond `largest`, and the share (k, j) of each sigma (k, j) in each of them:
+    hat functions of log(FIRST_SHIFT + sigma), which sum to less than one beyond the last shift.
     """
     count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
     place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)

@@ -27,11 +27,8 @@ Act = Callable[[np.ndarray], np.ndarray]
 
 
 class Border:
-    """The balance V' x of a bordered system [[A, B], [V', 0]], given an approximate inverse N of A
-    on arrays (n,).
-
-    Y = N B, and K is the inverse of the Schur complement V' Y; motions that no contact feels stay
-    out of it.
+    """The balance V' x of a bordered system [[A, B], [V', 0]], given an approximate inverse N of A:
+    Y = N B, and K is the inverse of V' Y without motions that no contact feels.
     """
 
     def __init__(self, near: Act, B: np.ndarray, V: np.ndarray, unfelt: float = 1e-15):

@@ -126,11 +126,8 @@ def crossover(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> Iterate:
-    """Improve an approximate answer r (k, d) of a dimensionless subproblem by at most so many
-    Newton steps, and return the best point on the way.
-
-    c are the displacements without forces; the rest is as in Equations, with rho = 1. The residual
-    of what comes back is never larger than that of the projection of what came in.
+    """Improve an approximate answer r (k, d) of a dimensionless subproblem by Newton steps, and
+    return the best point on the way. c are the displacements without forces; rho is 1 in Equations.
     """
     equations = Equations(Q, c.reshape(r.shape), V, s, project)
     residual, r, multipliers = _improve(equations, r, multipliers, steps)
@@ -142,12 +139,10 @@ def crossover(
 def certified(
     solvers: Iterable[tuple[str, Callable[[], Iterate]]], equations: Equations
 ) -> Iterate:
-    """Ask backends one after the other until Newton steps make an answer exact.
+    """Ask backends (name, solve), one after the other, until Newton steps make an answer exact.
 
-    A backend may call anything optimal, so that every answer is checked by its residual. The next
-    of the pairs (name of a backend, its solve), usually the same backend at tighter settings, is
-    asked only if the answer is not exact. The first exact answer is returned, or else the best one;
-    BackendError if even its relative residual is above WRONG.
+    A backend may call anything optimal, so that every answer is checked by its residual. Without an
+    exact answer the best is returned; BackendError if even its relative residual is above WRONG.
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
     for attempt, (asked, solver) in enumerate(solvers):

@@ -115,12 +115,9 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q, (k dim, k dim), in a block for each pair of
-    surfaces.
-
-    Of Q it uses the mean of the diagonal, and which components cannot move. Raises InputError for
-    an unknown name, and for contacts that the preconditioner does not fit; the caller says what it
-    does instead.
+    """The named approximate inverse (k dim, k dim) of problem.Q, in a block for each pair of
+    surfaces, from its mean diagonal. InputError for an unknown name, and for contacts that do not
+    fit.
     """
     find_preconditioner(name)
     if len(problem.pairs) > 1:
@@ -159,12 +156,8 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     """Forces (k dim, j) that are smooth on every pair of surfaces: polynomials of the place, in
-    every component.
-
-    On a pair that is far from all others they are constant and linear. Forces whose waves are
-    longer than the distance to the next pair reach it through the body in between, which no model
-    of one pair knows. A thin slice of a body bends under them as a plate does. Therefore the degree
-    grows with the length of a pair over that distance.
+    every component, of a degree that grows with the length of a pair over the distance to the next
+    pair. Longer waves reach it through the body in between, which no model of one pair knows.
     """
     parts = [
         _smooth_motions(part_of(problem, pair), degree)
@@ -174,10 +167,8 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
 
 def degrees(problem: InterfaceProblem) -> list[int]:
-    """The degree of the smooth motions of each pair of surfaces.
-
-    The distance between two pairs is the median over the contacts of one of them, so that pairs
-    that meet at a corner are not taken for neighbours along all of their length.
+    """The degree of the smooth motions of each pair: the distance between two pairs is the median
+    over the contacts of one, so that pairs that meet at a corner are not taken for neighbours.
     """
     points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
     trees = [KDTree(own) for own in points]
@@ -191,10 +182,8 @@ def degrees(problem: InterfaceProblem) -> list[int]:
 
 
 def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
-    """(k dim, j): polynomials of the place up to a degree, those of Chebyshev, in every component.
-
-    On a closed line, which has no polynomials, cosines and sines take their place. Components that
-    cannot move stay at rest; what is then no motion of its own is left out.
+    """(k dim, j): Chebyshev polynomials of the place, or cosines and sines on a closed line, in
+    every component; zero where it cannot move, and without what is then no motion of its own.
     """
     chart = problem.chart
     if chart.period is not None:
@@ -272,10 +261,8 @@ def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np
 
 
 def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
-    """The factor (n,) of every block of P, the same for all of its unknowns.
-
-    A random force x = P y of one block does the work y'P y by the model. Its work by Q is x'Q x,
-    less what the exact part does of it, |QZ'x|^2.
+    """The factor (n,) of every block of P: a random force x = P y of a block does the work y'P y by
+    the model, and by Q the work x'Q x less what the exact part does of it, |QZ'x|^2.
     """
     random = np.where(held(Q), 0.0, np.random.default_rng(0).normal(size=len(QZ)))
     made = P @ random
@@ -293,11 +280,8 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
 
 
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
-    """An approximate inverse (m, m) of U'QU + diag(added).
-
-    U (n, m) selects the unknowns of an active set, or directions in which contacts may still move;
-    its columns are orthonormal. With a model G of Q it is (U'GU + diag(added))^-1 by an inner PCG;
-    without one it is U'PU (paper, section 5.2).
+    """An approximate inverse (m, m) of U'QU + diag(added), for orthonormal columns U (n, m) of the
+    directions that are free: by an inner PCG with a model G of Q, else U'PU (paper, section 5.2).
     """
     m = U.shape[1]
     rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)

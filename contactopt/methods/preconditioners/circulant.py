@@ -14,11 +14,8 @@ INNER = 1e-13
 
 
 def seminorm(m: float) -> np.ndarray:
-    """The first column (2 m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27), for a
-    closed curve of 2 m nodes.
-
-    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the
-    kernel of a seminorm.
+    """The first column (2 m,) of the circulant matrix of the H^1/2 seminorm, eq (27), on a closed
+    curve of 2 m nodes: about log2 m entries, of sum zero where m is a power of two.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
@@ -81,12 +78,8 @@ p22 = OnGrid(inverse_of_extended)
 
 
 def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
-    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that
-    is not zero.
-
-    A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is
-    no power of two, the column of eq (27) does not sum to zero, and its sum is subtracted from
-    every eigenvalue.
+    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the least positive one.
+    The sum of the column of eq (27), not zero where k is no power of two, is subtracted from all.
     """
     symbol = fft(seminorm(k / 2)).real
     symbol = symbol - symbol[0]

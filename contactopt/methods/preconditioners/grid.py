@@ -48,10 +48,8 @@ class Grid:
 
 
 def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
-    """The line, closed curve or rectangular grid on which the contacts lie, and the contacts (k,)
-    in its order.
-
-    The search takes place in the chart, where a rectangular grid may be turned by any angle.
+    """The line, closed curve or rectangular grid, turned by any angle in the chart, on which the
+    contacts lie, and the contacts (k,) in its order.
     """
     if problem.dim == 2:
         return _line(problem, held)
@@ -134,12 +132,9 @@ def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray
 
 
 def _turn(places: np.ndarray) -> np.ndarray:
-    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k) along the
-    axes.
-
-    On a rectangular grid these are the directions of its sides. Their angle is known up to quarter
-    turns only, and the smallest of the possible angles is taken. A grid that lies along the axes
-    already gives the identity to the last digit.
+    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k), on a
+    grid those of its sides, along the axes: by the smallest angle, and exactly 1 where they lie
+    there.
     """
     points = places.T
     if len(points) < 4:

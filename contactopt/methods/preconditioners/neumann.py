@@ -83,10 +83,8 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
 
 
 def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
-    """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
-
-    The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue
-    of the root stands in its place.
+    """Square root of the weighted Laplacian of the contacts, and its inverse; half the least other
+    eigenvalue of the root stands in the place of zero, for constants.
     """
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
