@@ -37,11 +37,7 @@ TYPES: dict[str, tuple[type, str]] = {
 # s; GB: less than the least holds no NumPy and SciPy
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}
 # key -> least and most; NumPy's generator takes no larger seed
-WHOLE = {
-    "repeats": (1, MOST_RUNS),
-    "max_iterations": (1, 10**9),
-    "seed": (0, 2**32 - 1),
-}
+WHOLE = {"repeats": (1, MOST_RUNS), "max_iterations": (1, 10**9), "seed": (0, 2**32 - 1)}
 FILTERED = ("problem", "method", "setting", "start", "repeat")
 
 

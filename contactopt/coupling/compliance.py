@@ -13,12 +13,7 @@ from contactopt.coupling.coupling import Coupling
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import each
 from contactopt.linear.convolution import Convolution
-from contactopt.linear.operators import (
-    Interface,
-    InterfaceOperator,
-    Product,
-    dense,
-)
+from contactopt.linear.operators import Interface, InterfaceOperator, Product, dense
 from contactopt.linear.saddle_point import BodyTerm, CoupledForm
 from contactopt.problem.chart import nodal_weights
 

@@ -22,11 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody
-from contactopt.coupling.planes_of_symmetry import (
-    ContactPoints,
-    SymmetryPlane,
-    symmetry_planes,
-)
+from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law, Place, make_law

@@ -143,10 +143,7 @@ class Coupled:
 
 
 def coupled_steps(
-    problem: InterfaceProblem,
-    form: CoupledForm,
-    preconditioner: str | None,
-    start: Iterate | None,
+    problem: InterfaceProblem, form: CoupledForm, preconditioner: str | None, start: Iterate | None
 ) -> Iterator[tuple[Known, float]]:
     """Iterates of Newton's method on contacts and bodies, each with the residual before its step.
 
