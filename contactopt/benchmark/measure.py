@@ -43,9 +43,7 @@ class Task:
 def blank(task: Task) -> dict[str, Any]:
     """A row with every column, of a run of which nothing is known yet but what it is."""
     run = task.run
-    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
-    return unknown | {
-        "schema": SCHEMA,
+    return _empty() | {
         "key": run.key,
         "experiment": task.experiment,
         "problem": run.problem.label,
@@ -66,17 +64,12 @@ def blank(task: Task) -> dict[str, Any]:
         "residual": np.inf,
         "law_residual": np.inf,
         "history": "[]",
-        "versions": _versions(),
-        "machine": _machine(),
-        "time": _now(),
     }
 
 
 def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
     """A row that says why a method is not there."""
-    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
-    return unknown | {
-        "schema": SCHEMA,
+    return _empty() | {
         "key": f"absent {method}",
         "experiment": experiment,
         "method": method,
@@ -84,10 +77,14 @@ def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
         "law": "coulomb",
         "status": ABSENT,
         "message": one_line(why),
-        "versions": _versions(),
-        "machine": _machine(),
-        "time": _now(),
     }
+
+
+def _empty() -> dict[str, Any]:
+    """A row made here and now, with every column."""
+    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
+    made = {"schema": SCHEMA, "versions": _versions(), "machine": _machine(), "time": _now()}
+    return unknown | made
 
 
 def _now() -> str:

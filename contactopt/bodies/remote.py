@@ -224,9 +224,6 @@ class RemoteBody(Remote, Body):
     fields = _forwarded("fields")
     limits = _forwarded("limits")
 
-    def convolution(self, T: sp.csr_matrix) -> None:
-        return None  # an elastic body has none
-
     def product(self, T: sp.csr_matrix) -> Product:
         made = Remote(self.team, self._keep("product", T))
         return lambda X, accuracy: made._ask("__call__", X, accuracy)

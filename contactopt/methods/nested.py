@@ -64,11 +64,9 @@ class Nested(Method):
         while levels[-1].halves:
             levels.append(levels[-1].coarse())
         given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
-        point = (
-            _robust_start(levels[-1], _first_guess(levels, given))
-            if len(levels) > 1
-            else _first_guess(levels, given)
-        )
+        point = _first_guess(levels, given)
+        if len(levels) > 1:
+            point = _robust_start(levels[-1], point)
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
             point, at = _solve_level(coarse, point)
             logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
@@ -76,9 +74,8 @@ class Nested(Method):
         finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
         if given is not None:
             other = finest.evaluate(*given)
-            point, at = (
-                (given, other) if other.residual < constants.CLOSER * at.residual else (point, at)
-            )
+            if other.residual < constants.CLOSER * at.residual:
+                point, at = given, other
         while True:
             near = NEAR * max(1.0, float(np.linalg.norm(point[0])))
             if at.residual <= near or at.residual > 0.5 * last:
@@ -92,13 +89,8 @@ class Nested(Method):
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
             at = finest.evaluate(*point)
-            logger.info(
-                "grid %s: %d closed, %d iterations, residual %.1e",
-                finest.kernel.grid,
-                len(at.closed),
-                count,
-                at.residual,
-            )
+            told = finest.kernel.grid, len(at.closed), count, at.residual
+            logger.info("grid %s: %d closed, %d iterations, residual %.1e", *told)
 
 
 def _first_guess(levels: list[Level], given: Point | None) -> Point:
@@ -166,13 +158,8 @@ def _solve_level(
 
 def _worth(residual: float, last: float) -> float:
     """Accuracy of a step: low while the residual does not fall, because contacts still change."""
-    return forcing(
-        residual,
-        last,
-        constants.NESTED_LOOSEST,
-        constants.NESTED_LOOSEST,
-        constants.NESTED_TIGHTEST,
-    )
+    loosest, tightest = constants.NESTED_LOOSEST, constants.NESTED_TIGHTEST
+    return forcing(residual, last, loosest, loosest, tightest)
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:

@@ -58,9 +58,8 @@ class NSGS(Method):
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         (k, dim), V, s = problem.q.shape, problem.V, problem.s
-        r, lam = (
-            (np.zeros((k, dim)), np.zeros(len(s))) if start is None else (start[0].copy(), start[1])
-        )
+        r, lam = start or (np.zeros((k, dim)), np.zeros(len(s)))
+        r = r.copy()
         flat = r.reshape(-1)  # a view: changes with r
         tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
         motions = V.reshape(k, dim, -1)
@@ -82,11 +81,9 @@ class NSGS(Method):
                 if len(s):
                     moved += T @ (tau * pushed)
                 new = local.solve((moved - local.W @ old).tolist())
-                r[i] = (
-                    new
-                    if self.relaxation == 1.0
-                    else local.admissible(old + self.relaxation * (new - old))
-                )
+                if self.relaxation != 1.0:
+                    new = local.admissible(old + self.relaxation * (new - old))
+                r[i] = new
                 if len(s):
                     pushed += T.T @ (r[i] - old)
             lam = lam + tau * (V.T @ flat + s)

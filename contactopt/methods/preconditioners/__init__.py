@@ -295,8 +295,3 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
         (m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float
     )
 
-
-def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
-    """The matrix (n, m) whose columns are the unit vectors of some of n unknowns."""
-    m = len(unknowns)
-    return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

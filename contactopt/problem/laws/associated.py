@@ -26,10 +26,6 @@ class Associated(Law):
     proportional = True
     dilatant = True
 
-    @property
-    def coefficient(self) -> np.ndarray:
-        return self.mu
-
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.asarray(self.mu * np.maximum(r_n, 0.0))
 

@@ -21,10 +21,6 @@ class Bilateral(Law):
     proportional = True
 
     @property
-    def coefficient(self) -> np.ndarray:
-        return self.mu
-
-    @property
     def lowest(self) -> np.ndarray:
         return np.full(self.contacts, -np.inf)
 

@@ -29,10 +29,6 @@ class Coulomb(Law):
     mu: np.ndarray
     proportional = True
 
-    @property
-    def coefficient(self) -> np.ndarray:
-        return self.mu
-
     def idle(self, y: np.ndarray) -> np.ndarray:
         return np.asarray(y[:, 0] <= 0)
 
