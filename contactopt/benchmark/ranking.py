@@ -1,10 +1,9 @@
 """Who is first: methods compared at the accuracy that they reach, not at the one asked for.
 
-The runs of a method on an instance (a problem and a start) are points: the median time of its
-repeats, and the worst certificate among them, one for each tolerance asked. The time to an accuracy
-is read off the front of these points, straight between two of them in logarithms of time and
-certificate. What reaches the accuracy with none of them has failed, and counts as its time limit.
-Times below NOISE count as NOISE: nobody is first by what a clock cannot tell.
+The runs of a method on an instance (a problem and a start) are points: median time and worst
+certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
+front, straight in logarithms; what does not reach it counts as its time limit, and times below
+NOISE count as NOISE.
 """
 
 from __future__ import annotations

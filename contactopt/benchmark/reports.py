@@ -1,10 +1,8 @@
-"""Reports: Markdown and one HTML page, from experiment files and the small tables beside the
-reports. Solves nothing.
+"""Reports from experiment files and the small tables beside the reports. Solves nothing.
 
 An experiment file lists its figures and tables in order (`contactopt.benchmark.keys.FIGURE` has the
-keys). A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its
-table REPORTS/NAME/rows.csv, or rows.parquet if it is long. All reports together are
-REPORTS/benchmarks.html.
+keys), or gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its table rows.csv or
+rows.parquet beside it; all reports together are REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations

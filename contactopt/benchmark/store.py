@@ -1,9 +1,6 @@
-"""Results on disk: one JSON line per finished run, appended in one write; consolidated to Parquet,
-CSV for small tables.
-
-A campaign's folder holds `rows.jsonl` (appended while it runs), `rows.parquet` (the same,
-consolidated at its end) and `experiment.toml`. Killed at any moment, at most the last line is torn;
-it is cut off when the file is opened again.
+"""Results on disk: `rows.jsonl`, one line per finished run, appended in one write while a campaign
+runs, `rows.parquet`, the same at its end, and `experiment.toml`. Killed at any moment, at most the
+last line is torn; it is cut off when the file is opened again.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""Where the mirror image of a body goes on beyond its surface: on planes that are held along their
-normal alone.
-
-In a scene of several copies these are the planes of symmetry. No shear acts on such a plane, and no
-displacement crosses it. So displacement and stress go on beyond it as their own mirror images, and
-a recovered stress may look there from both sides: its shear across the plane is zero, and not what
-the elements on the one side show.
+"""Where the mirror image of a body goes on beyond its surface: on planes of symmetry, which are
+held along their normal alone. No shear acts there, and a recovered stress may look from both sides:
+its shear across the plane is zero, and not what the elements on the one side show.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """Processes that MPI started: rank 0 runs the program, the others keep objects for it and act on
 them.
 
-Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. Or
-the result stays on its rank, and rank 0 holds a Kept that stands for it in later orders; then no
-message comes back. Every rank follows its orders one after the other. All messages are counted with
-their bytes.
-
-Whoever waits for a message sleeps between two looks, so that ranks that share a core do not take it
-from each other.
+Rank 0 sends an order, a function with its arguments, and receives what it returned or raised; or
+the result stays, and rank 0 holds a Kept for later orders, without a message back. Every rank
+follows its orders one after the other; all messages are counted. Whoever waits sleeps between two
+looks, so that ranks that share a core do not take it from each other.
 """
 
 from __future__ import annotations

@@ -1,9 +1,5 @@
-"""A body on another rank: what rank 0 knows of it are the displacement unknowns of its contact
-surfaces.
-
-The body itself, its mesh, its stiffness and its solver stay on their rank. Here its unknowns are
-only those m of the nodes of its contact surfaces, in the order in which the body itself numbers
-them. Contact forces go there, and displacements of these unknowns come back. A displacement of the
+"""A body on another rank, where it stays with its mesh, stiffness and solver. Here its unknowns are
+only those m of the nodes of its contact surfaces, in the order of the body. A displacement of the
 whole body is kept on its rank and stands here as a Field.
 """
 

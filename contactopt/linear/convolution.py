@@ -1,15 +1,15 @@
-"""Interface operators that are convolutions over a regular grid of contacts, with products by fast
-Fourier transforms.
+"""Interface operators that are convolutions over a regular grid of contacts, by fast Fourier
+transforms.
 
-The displacement of a contact then depends on the forces through the distances between contacts
-alone, as on a half-space:
+The displacement of a contact then depends on the forces through distances alone, as on a
+half-space:
 
     u_a(x) = sum_b sum_y K_ab(x - y) r_b(y),        a, b the components n, t1[, t2],
 
-where t1 lies along the first axis of the grid and t2 along the second. K_ab is even in the distance
-along an axis, or odd if exactly one of a and b lies along it. On a grid that does not repeat itself
-the forces are padded by zeros to at least twice its size. Only the Fourier transforms of K are
-kept: real numbers times 1 or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
+where t1 and t2 lie along the axes of the grid. K_ab is even in the distance along an axis, or odd
+if exactly one of a and b lies along it. On a grid that does not repeat itself the forces are padded
+by zeros to at least twice its size. Only the Fourier transforms of K are kept: real numbers times 1
+or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
-"""GMRES with a preconditioner that may change from iteration to iteration, in the norm of given
-weights.
+"""GMRES with a preconditioner that may change, in the norm of given weights.
 
-The basis is kept in single precision, which halves its memory and limits the reduction by one run
-to about 1e-5; Newton's steps ask for less. Scalar products do not use BLAS, whose threads would
-spin until the next call.
-
-Source: Saad (1993), A flexible inner-outer preconditioned GMRES algorithm.
+The basis is kept in single precision, which limits the reduction by one run to about 1e-5. Scalar
+products do not use BLAS, whose threads would spin until the next call. Source: Saad (1993), A
+flexible inner-outer preconditioned GMRES algorithm.
 """
 
 from __future__ import annotations

@@ -1,9 +1,6 @@
-"""The interface operator Q known by its products: what every method needs that never looks at an
-entry of Q.
-
-A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that
-need them ask for `dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse
-matrix in compressed rows (csr_array), and an InterfaceOperator.
+"""The interface operator Q as an array, a scipy sparse matrix in compressed rows (csr_array), or an
+InterfaceOperator known by its products, of which each costs one solve per body. Methods that need
+the entries, one product for each interface unknown, ask for `dense(Q)`.
 """
 
 from __future__ import annotations

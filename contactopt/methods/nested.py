@@ -1,11 +1,10 @@
 """Newton's method on nested grids, for problems whose Q is a convolution: half-spaces, rough
 surfaces.
 
-The problem is solved on coarse grids first, where it costs little to find out which contacts close
-and slip; each solution starts the next finer grid. The steps are those of the primal-dual active
-set method (`newton`), whose linear systems are solved by PCG or GMRES in single precision to the
-accuracy that the step is worth, while residuals are computed in double precision. Without friction
-only the normal components are computed.
+Coarse grids tell cheaply which contacts close and slip; each solution starts the next finer grid.
+The steps are those of `newton`, by PCG or GMRES in single precision to the accuracy that they are
+worth, while residuals are computed in double precision. Without friction only the normal components
+are computed.
 
 Sources: Polonsky, Keer (1999), A numerical method for solving rough contact problems based on the
 multi-level multi-summation and conjugate gradient techniques; Hueber, Stadler, Wohlmuth (2008) for

@@ -70,11 +70,9 @@ STIFFEST = 1e4  # largest rho_i, over the mean one
 class Moved:
     """Q r, known from displacements that are carried along with the forces r.
 
-    value     (k dim,) [length]
-    accuracy  error of these displacements in the energy norm, relative to them: how far the bodies
-              are from equilibrium
-    displacements  (N,) these displacements, the unknowns X of contactopt.linear.saddle_point
-                   [length]
+    value          (k dim,) [length]
+    accuracy       relative error of these displacements in the energy norm
+    displacements  (N,) the unknowns X of contactopt.linear.saddle_point [length]
     """
 
     value: np.ndarray

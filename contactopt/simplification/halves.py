@@ -1,9 +1,8 @@
 """One half of a scene that is its own mirror image across a plane normal to an axis.
 
-`Scene.copies` doubles, so that forces, reactions and areas stay those of the whole. What the plane
-cuts keeps the half on the positive side and is held there along the normal. Of two bodies, contacts
-or plates that are each other's images the one on the positive side stays, and stands for both: its
-forces are those of both together. No element is cut.
+`Scene.copies` doubles, so that forces and areas stay those of the whole. What the plane cuts is
+held there along the normal; of two images the one on the positive side stays, with the forces of
+both. No element is cut.
 """
 
 from __future__ import annotations

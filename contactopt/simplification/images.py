@@ -1,10 +1,6 @@
-"""Whether a scene is its own mirror image: meshes, materials, supports, loads, laws, friction and
-gaps.
-
-A mesh is its own image, or that of another body, if every node and every element has one. The
-solution of the whole scene is then its own image, too, on this mesh and to the last digits.
-Boundaries are compared by their facets, and functions of the place at the nodes and between them.
-Nothing is read from names.
+"""Whether a scene is its own mirror image, and so its solution to the last digits: every node and
+every element must have an image, in its own mesh or in that of another body. Boundaries are
+compared by their facets, functions at the nodes and between them; nothing is read from names.
 """
 
 from __future__ import annotations

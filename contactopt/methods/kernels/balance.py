@@ -1,12 +1,10 @@
-"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with lambda such that V'
-r + s = 0.
+"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with V' r + s = 0.
 
-With P the projection on a convex set this is the projection on the set's part where V' r + s = 0,
-and lambda minimises a convex, piecewise smooth function of p unknowns: a few Newton steps with an
-exact line search, each O(k). It makes every first-order method on forces work with plates, without
-a penalty: lambda is the multiplier that the step itself determines. Where the forces are friction
-alone the function is nearly a sum of lengths, whose minimum is a weighted median: its slope jumps
-from contact to contact, and only the exact search finds the one that sticks.
+With P the projection on a convex set, lambda minimises a convex, piecewise smooth function of p
+unknowns: a few Newton steps with an exact line search, each O(k). So every first-order method on
+forces works with plates, without a penalty. Where the forces are friction alone the slope jumps
+from contact to contact, as at a weighted median, and only the exact search finds the one that
+sticks.
 """
 
 from __future__ import annotations

@@ -30,14 +30,7 @@ from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
 from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, norm
-from contactopt.methods.constants import (
-    COUPLED_FIRST,
-    COUPLED_LOOSEST,
-    COUPLED_TIGHTEST,
-    GIVEN_BALANCE,
-    SCHUR_MARGIN,
-    SCHUR_STEP,
-)
+from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
     admissible,
     coulomb_equations,
@@ -112,7 +105,7 @@ class Coupled:
 
         def precondition(x: Stacked) -> Stacked:
             forces, error, balance = _parted(x)
-            r, multipliers = linearised.solve(model, inverse, error, -balance, SCHUR_STEP)
+            r, multipliers = linearised.solve(model, inverse, error, -balance, constants.SCHUR_STEP)
             return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
         product = partial(self.product, linearised)
@@ -158,11 +151,11 @@ def coupled_steps(
         equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
         coupled = Coupled(equations, form, P if several else fitted(P, form, problem.V))
         at = (
-            _bonded(problem, coupled, COUPLED_FIRST)
+            _bonded(problem, coupled, constants.COUPLED_FIRST)
             if start is None
-            else State(in_equilibrium(form, start[0], GIVEN_BALANCE), *start)
+            else State(in_equilibrium(form, start[0], constants.GIVEN_BALANCE), *start)
         )
-    first, last, best, idle = COUPLED_FIRST, np.inf, np.inf, 0
+    first, last, best, idle = constants.COUPLED_FIRST, np.inf, np.inf, 0
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
@@ -176,12 +169,12 @@ def coupled_steps(
             known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
         yield known, residual
         best, idle = min(best, residual), 0 if residual < best else idle + 1
-        if idle > IDLE and first > COUPLED_TIGHTEST:
-            first, last, idle = COUPLED_TIGHTEST, np.inf, 0
+        if idle > IDLE and first > constants.COUPLED_TIGHTEST:
+            first, last, idle = constants.COUPLED_TIGHTEST, np.inf, 0
             with one_blas_thread():
                 at = _bonded(problem, coupled, first)
             continue
-        rtol = forcing(residual, last, first, COUPLED_LOOSEST, COUPLED_TIGHTEST)
+        rtol = forcing(residual, last, first, constants.COUPLED_LOOSEST, constants.COUPLED_TIGHTEST)
         with one_blas_thread():
             at, last = coupled.step(at, right, linearised, rtol), residual
 
@@ -217,7 +210,7 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
     Qx = form.moved(form.approximate(form.pulled(x)), x)
     PV = np.stack([P @ v for v in V.T], axis=1) if V.shape[1] else V
     Qx = Qx - V @ (np.linalg.pinv(V.T @ PV) @ (PV.T @ Qx))
-    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / constants.SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 

@@ -1,10 +1,9 @@
 """Newton's steps on one grid of contacts, whose Q is a convolution
 (contactopt.methods.kernels.levels).
 
-A step solves  (I - D) dr + D rho (Q dr + V dlambda) = error,  V' dr = -balance  on the contacts
-               with D != 0; all others have dr = error.
-Products with Q are taken in single precision, which is enough for a correction. Where every closed
-contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES. Both are
+A step solves (I - D) dr + D rho (Q dr + V dlambda) = error, V' dr = -balance on the contacts with D
+!= 0; all others have dr = error. Products with Q are taken in single precision. Where every closed
+contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES, both
 preconditioned by the inverse of the symbol of Q on the grid without padding, restricted to the
 contacts that are closed and to the directions that are held.
 """

@@ -1,9 +1,6 @@
-"""Contact problems whose Q is a convolution, on a grid and on coarser ones.
-
-A Level holds a problem component by component, r (c, k), for the components that its law makes
-matter: the normal one alone where there is no friction. A coarse level lumps pairs or squares of
-contacts; its kernel follows from the finer one. Newton's steps are in
-contactopt.methods.kernels.level_steps.
+"""Contact problems whose Q is a convolution, on a grid and on coarser ones, which lump pairs or
+squares of contacts. A Level holds the components, r (c, k), that its law makes matter: the normal
+one alone where there is no friction.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
-"""Semismooth Newton steps on r = P(r - rho u), u = Q r + V lambda + q, V' r + s = 0, for any
-projection P.
+"""Semismooth Newton steps on r = P(r - rho u), u = Q r + V lambda + q, V' r + s = 0.
 
 With P the projection onto half-lines, intervals or discs this is the primal-dual active set method
-of one convex subproblem, and a few steps of it make a backend's approximate answer exact
-(`crossover`): an interior-point answer is the square root of its accuracy away from the solution
-wherever force and gap vanish together. With P the Coulomb map of contactopt.problem.laws it is
-Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
+of one convex subproblem, and makes a backend's answer exact (`crossover`): an interior-point answer
+is the square root of its accuracy off wherever force and gap vanish together. With P the Coulomb
+map it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
 from __future__ import annotations

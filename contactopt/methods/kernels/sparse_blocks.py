@@ -1,11 +1,8 @@
-"""Linear systems of block form: diag(left) Q + diag(added), both block diagonal, with Q an array or
-sparse.
+"""Linear systems diag(left) Q + diag(added), both block diagonal, with Q an array or sparse.
 
-Newton's method and interior-point methods for contact solve many of them that differ in the d x d
-blocks of the contacts only. For a sparse Q the pattern of its blocks, the order of elimination and
-the places of its entries in compressed columns are found once; a system then costs a few array
-operations and one sparse LU factorisation (SuperLU). Memory is linear in the non-zeros of the
-factors.
+Newton's and interior-point methods solve many of them. For a sparse Q the pattern of its blocks,
+the order of elimination and the places of its entries are found once; a system then costs a few
+array operations and one sparse LU factorisation (SuperLU).
 """
 
 from __future__ import annotations

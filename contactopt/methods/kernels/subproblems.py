@@ -1,10 +1,6 @@
-"""The normal and the tangential problem from products with Q alone: active sets outside,
-preconditioned CG inside.
-
-Both are semismooth Newton methods on r = P(r - rho u), where P projects one kind of component and
-leaves the other as it is given: half-lines for the normal problem (primal-dual active set method),
-intervals or discs of the given friction bounds for the tangential one. Each step is one PCG of
-contactopt.methods.kernels.krylov. Penalty: give them Q with 1 / factor on its diagonal.
+"""The normal and the tangential problem from products with Q alone: semismooth Newton methods on r
+= P(r - rho u), where P projects one kind of component on half-lines, intervals or discs and leaves
+the other as it is given. Each step is one PCG of contactopt.methods.kernels.krylov.
 """
 
 from __future__ import annotations

@@ -294,4 +294,3 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
     return LinearOperator(
         (m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float
     )
-

@@ -88,7 +88,7 @@ class Law:
 
     @property
     def coefficient(self) -> np.ndarray:
-        """(k,) friction coefficients, the largest of all directions; `mu` if there is one, else 0."""
+        """(k,) friction coefficients, of the largest direction: `mu`, or 0 without any."""
         return getattr(self, "mu", np.zeros(self.contacts))
 
     @property
