@@ -108,10 +108,7 @@ def _machine() -> str:
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
-    """The columns of the row that follow from the answer, judged by its certificate.
-
-    The method's own word counts only where it admits failure.
-    """
+    """The columns that follow from the answer, whose own word counts only as failure."""
     out: dict[str, Any] = {"message": answer.message, "time": _now(), **answer.measured}
     if answer.reactions is None:
         seconds = answer.measured.get("call_seconds", np.nan)

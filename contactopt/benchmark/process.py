@@ -80,9 +80,8 @@ class Process:
             ) from error
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function returns that the process calls; after `limit` seconds the process is
-        killed. Raises Ended, with `phase`, if it did not survive the call. A process that is killed
-        before the call is started anew, STARTS times.
+        """What a function returns that the process calls; Ended, with `phase`, if it died or took
+        more than `limit` seconds. One that died before the call is started anew, STARTS times.
         """
         from loky.process_executor import BrokenProcessPool
 

@@ -161,10 +161,7 @@ def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
 
 
 def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The table in two halves: the even and the odd repeats, which were made one after the other.
-
-    A run of a single repeat stands in both.
-    """
+    """The even and the odd repeats, two reruns of a table; a single repeat stands in both."""
     single = table.groupby(POINT)["repeat"].transform("size") == 1
     even = table["repeat"] % 2 == 0
     return table[even | single], table[~even | single]

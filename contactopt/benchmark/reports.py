@@ -78,10 +78,7 @@ class Layout:
 
 
 def read_layout(path: str | Path) -> Layout:
-    """How the report of an experiment is laid out.
-
-    InputError if the file cannot be read or asks for a figure that does not exist.
-    """
+    """The layout of an experiment's report; InputError if unreadable or with unknown figures."""
     path = Path(path)
     root = read_table(path, "experiment")
     name = root.take("name", str, path.stem)

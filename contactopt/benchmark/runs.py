@@ -51,10 +51,7 @@ class MethodSpec:
 
 
 def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> MethodSpec:
-    """The method with these settings, checked.
-
-    InputError if its name or a setting is unknown, or a backend is not installed.
-    """
+    """The method with these settings; InputError if unknown, or a backend is not installed."""
     law, peer = OTHER_LAWS.get(name, "coulomb"), ""
     if name in METHODS:
         find_method(name, **settings)

@@ -105,10 +105,7 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl; InputError if one has a newer schema.
-
-    Lines that are no rows are left out, with a warning: their runs count as not made.
-    """
+    """The rows of a rows.jsonl, without torn ones, with a warning; InputError on a newer schema."""
     wanted, bad = COLUMNS.keys() - {"error"}, 0  # which load() works out
     with open(path, "rb") as file:
         for line in file:

@@ -72,10 +72,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
-    """The body with the loads of another scene, whose `part` stands for it.
-
-    InputError if other unknowns are held or driven there.
-    """
+    """The body with the loads of another scene; InputError if other unknowns are held or driven."""
     fixed = _constrained(scene, part, body.basis)
     held = np.array_equal(np.flatnonzero(~fixed.held), body.free)
     if not held or not np.array_equal(fixed.motion, body.motion):

@@ -172,9 +172,7 @@ class ElasticBody(Body):
         return np.asarray(self._under(force) + self.motions @ multipliers)
 
     def _under(self, force: np.ndarray) -> np.ndarray:
-        """Displacement (n,) under loads, supports, plates and nodal forces (n,), with multipliers
-        of zero.
-        """
+        """Displacement (n,) under loads and nodal forces (n,), with multipliers of zero."""
         body = self.body
         missing = body.load + force + self.pull - self._stiffness @ body.prescribed
         resisted = body.plate_forces + self.extended.T @ missing
@@ -185,9 +183,7 @@ class ElasticBody(Body):
         )
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
-        """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at
-        rest.
-        """
+        """Displacements (n,) or (n, j) under forces on free unknowns, plates at rest."""
         U, Z = np.zeros(force.shape), self.body.rigid_motions.fields
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
@@ -225,9 +221,7 @@ class ElasticBody(Body):
         return float(U @ (self.body.A @ U)) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """Loads on free unknowns, reactions of supports, and on the unknowns of each plate its
-        total force, shared out.
-        """
+        """Loads, reactions of supports, and each plate's total force, shared out."""
         body, F = self.body, self.body.A @ U
         F[body.free] = body.load[body.free]
         total = body.plate_forces + body.motion.T @ body.load

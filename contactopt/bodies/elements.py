@@ -85,9 +85,7 @@ def weight_at(weight: Weight, x: np.ndarray) -> np.ndarray | float:
 
 
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
-    """The displacement basis of a mesh, with quadrature that is exact on parallelepipeds but for
-    1/r.
-    """
+    """The displacement basis of a mesh; quadrature is exact on parallelepipeds but for 1/r."""
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
     order = 2 if simplex and not axisymmetric else 2 * degree + axisymmetric

@@ -76,9 +76,8 @@ def _planes(dim: int) -> list[tuple[int, int]]:
 def free_motions(
     kind: str, components: tuple[str, ...], basis: skfem.CellBasis, held: np.ndarray, weight: Weight
 ) -> Motions:
-    """The rigid motions of a body, in a scene of that kind and these components, that leave all
-    held unknowns (n,) at rest, with inertia by the measure `weight`; the one along the axis where
-    axisymmetric.
+    """The rigid motions of a body that leave all held unknowns (n,) at rest, with inertia by the
+    measure `weight`; where axisymmetric, the one along the axis.
     """
     unknowns = node_unknowns(basis)
     x = basis.doflocs[:, unknowns[0]]

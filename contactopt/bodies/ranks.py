@@ -129,10 +129,7 @@ class Team:
         return end
 
     def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
-        """What stands for the result of a function, which stays on its rank.
-
-        Nobody waits for it: whoever uses it learns of an exception.
-        """
+        """What stands for a function's result, or its exception, on its rank."""
         kept = Kept(rank, self._next_number())
         self._order(rank, (None, function, arguments), kept.number)
         weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
@@ -158,9 +155,7 @@ class Team:
             return self._number
 
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
-        """Send without waiting; the bytes are kept until they have arrived. InputError once the
-        ranks were dismissed.
-        """
+        """Send without waiting, bytes kept until arrival; InputError after dismissal."""
         if self._dismissed:
             raise InputError(
                 "the ranks that hold the bodies of this result were dismissed; ask before, or run"
@@ -232,9 +227,7 @@ def serve(comm: Any) -> None:
 
 
 def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """What the function makes of its arguments, or the exception: its own, or that which an
-    argument should have been.
-    """
+    """What the function makes of its arguments, or its exception or that of an argument."""
     found = [kept[item.number] if isinstance(item, _Reference) else item for item in arguments]
     for item in found:
         if isinstance(item, Raised):
@@ -255,9 +248,7 @@ def _portable(error: Exception) -> Exception:
 
 
 def shipped(message: Any) -> bytes:
-    """Pack anything as bytes: functions without a name, such as those that make meshes, travel by
-    their code.
-    """
+    """Pack anything as bytes; functions without a name travel by their code."""
     import cloudpickle
 
     return bytes(cloudpickle.dumps(message))

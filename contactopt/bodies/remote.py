@@ -166,9 +166,7 @@ class RemoteEquilibrium:
 
 
 def _sendable(value: Any) -> Any:
-    """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it
-    is.
-    """
+    """An argument as its rank takes it: a vector there, forces on contacts, or the same."""
     if isinstance(value, Field):
         return value.kept
     return resident.Forces(value) if isinstance(value, np.ndarray) else value
@@ -276,9 +274,7 @@ class RemoteBody(Remote, Body):
 
 @dataclass(frozen=True, eq=False)
 class RemoteStressMap(Remote):
-    """A contactopt.bodies.stress_recovery.StressMap on the rank of its body, with its places and
-    sources here.
-    """
+    """A StressMap on the rank of its body, with its places and sources here."""
 
     body: Kept
     places: np.ndarray

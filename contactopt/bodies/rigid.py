@@ -97,9 +97,8 @@ class RigidBody(AssembledBody, Body):
         return surface, gap
 
     def _check_side(self, other: Surface, facing: np.ndarray, gap: np.ndarray) -> None:
-        """Refuse a normal that points away from the other body where the bodies are nearest.
-
-        `facing` (k,) is the cosine between the normal and the one that the other body suggests.
+        """Refuse a normal away from the other body where they are nearest; `facing` (k,) is its
+        cosine with the normal that the other body suggests.
         """
         nearest = gap <= gap.min(initial=np.inf) + NEAREST * float(np.max(np.abs(gap), initial=0.0))
         if (

@@ -70,9 +70,8 @@ def isotropic_stiffness(
 def _element_matrices(
     basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: Weight
 ) -> np.ndarray:
-    """Stiffness of some elements, (element, i, a, j, b), as one batched matrix product: the
-    integral of lambda g_ia g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab, with g_ia the derivative of
-    N_i by a.
+    """Element stiffness (element, i, a, j, b) as one product: the integral of lambda g_ia g_jb + G
+    g_ib g_ja + G (g_i . g_j) delta_ab, with g_ia the derivative of N_i by a.
     """
     lam, shear = constants
     mapping, places, shape = basis.mapping, basis.X, basis.elem.elem

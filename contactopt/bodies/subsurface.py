@@ -94,9 +94,8 @@ def _mean(body: HalfSpaceBody, offsets: list[np.ndarray], depth: float, points: 
 
 
 def flamant(x: np.ndarray, z: float) -> np.ndarray:
-    """Stresses xx, zz and xz (3, 2, ...) under unit line forces along x and into the body, at
-    places x of any shape along the surface and the depth z [1 / length]. Source: Johnson (1985),
-    sections 2.2, 2.3.
+    """Stresses xx, zz, xz (3, 2, ...) at x and depth z under unit line forces along x and into the
+    body [1 / length]. Source: Johnson (1985), sections 2.2, 2.3.
     """
     square = x**2 + z**2
     radial = [-2 / np.pi * x / square**2, -2 / np.pi * z / square**2]
@@ -106,9 +105,8 @@ def flamant(x: np.ndarray, z: float) -> np.ndarray:
 
 
 def boussinesq_cerruti(x: np.ndarray, y: np.ndarray, z: float, nu: float) -> np.ndarray:
-    """Stresses xx, yy, zz, xy, xz and yz (6, 3, ...) under unit point forces along x, y and into
-    the body, at places x, y along the surface and the depth z > 0 [1 / length^2]. Sources: Johnson
-    (1985), sections 3.2 and 3.6.
+    """Stresses xx, yy, zz, xy, xz, yz (6, 3, ...) at x, y and depth z > 0 under unit point forces
+    along x, y and into the body [1 / length^2]. Sources: Johnson (1985), sections 3.2 and 3.6.
     """
     x, y = np.broadcast_arrays(x, y)
     rho = np.sqrt(x**2 + y**2 + z**2)

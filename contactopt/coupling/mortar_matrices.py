@@ -154,9 +154,8 @@ def _contacts_of(
 
 
 def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest.
-
-    The force of the other surface's edge would be divided by an area as small as you like.
+    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest,
+    for an edge's force over an area as small as you like would be no pressure.
     """
     share = np.bincount(rows.ravel(), area.ravel(), len(full)) / full
     weak = (share < WEAK)[rows]

@@ -248,9 +248,7 @@ class _Seen:
 
 
 def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Begin and width (2, dim - 1, cells) of the least similar cell around the corners (dim - 1, q,
-    v) of pieces on cells (q,).
-    """
+    """Begin and width (2, dim - 1, cells) of the least similar cells around corners of pieces."""
     low, high = np.ones((own.dim - 1, len(covered))), np.zeros((own.dim - 1, len(covered)))
     for d, x in enumerate(corners):
         np.minimum.at(low[d], cell, x.min(axis=1))

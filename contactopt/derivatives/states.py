@@ -71,10 +71,7 @@ class Step(State):
         return sensitivity(self.problem, self.solution, self.distance)
 
     def _changed(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
-        """The scene with a load changed by a step, its part that stands for a body, and the step.
-
-        Bodies are affine in their loads, so that a step of any size gives the derivative.
-        """
+        """The scene with a load changed by a step, its part of a body, and the step."""
         scene = self.reduction.scene
         value = which.read(scene)
         step = abs(value) or 1.0

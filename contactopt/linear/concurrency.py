@@ -33,10 +33,7 @@ def one_blas_thread() -> Iterator[None]:
 
 
 def give_back() -> None:
-    """Return the memory that was freed to the system.
-
-    The C library of GNU keeps much of it for the thread that freed it; with others nothing happens.
-    """
+    """Return freed memory to the system: GNU's C library keeps it for the thread that freed it."""
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).malloc_trim(0)
 

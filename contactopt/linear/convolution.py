@@ -71,9 +71,8 @@ class Kernel:
 
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
-        """Make a kernel from its coefficients: for each pair of components (a, b) with a <= b the
-        K_ab at distances 0 to M / 2 along each axis, with M as `embedding` gives it [length /
-        force].
+        """Make a kernel from K_ab [length / force] at distances 0 to M / 2 along each axis, with M
+        as `embedding` gives it, for pairs of components a <= b.
         """
         from scipy.fft import dct, dst
 
@@ -163,9 +162,7 @@ class Kernel:
     def act(
         self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False
     ) -> np.ndarray:
-        """Displacements (rows, n0[, n1]) of the components `rows` [length] under forces x (columns,
-        n0[, n1]) on the grid [force]; `single` precision may be enough.
-        """
+        """Displacements (rows, n0[, n1]) [length] under forces x (columns, n0[, n1]) [force]."""
         symbols, kind = (self.single, np.float32) if single else (self.symbols, np.float64)
         spectra = {
             b: forward(part.astype(kind, copy=False), self.padded)
@@ -188,9 +185,7 @@ class Kernel:
         return out
 
     def entries(self, contacts: np.ndarray | None = None) -> np.ndarray:
-        """The operator between the contacts (k,), by default all, as an array (k dim, k dim)
-        [length / force]; InputError if it would be too large.
-        """
+        """Q between contacts (k,) as an array (k dim, k dim); InputError if too large."""
         numbers = np.arange(np.prod(self.grid)) if contacts is None else contacts
         k, dim = len(numbers), self.dim
         check_dense(k * dim)

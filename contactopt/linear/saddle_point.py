@@ -49,9 +49,7 @@ class BodyTerm(Protocol):
         """T' r (N,): the contact forces r (n,) on the unknowns of the body [force]."""
 
     def started_trace(self, X: Any) -> Callable[[], np.ndarray]:
-        """Begin with T X (n,) [length], and return the function that ends it; elsewhere it is
-        ordered.
-        """
+        """Begin with T X (n,) [length], elsewhere at once, and return the function that ends it."""
 
 
 @dataclass(frozen=True, eq=False)

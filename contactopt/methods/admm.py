@@ -84,10 +84,7 @@ def _balancing(
     x: np.ndarray,
     rho: float,
 ) -> float:
-    """The factor by which rho should change.
-
-    The larger error says which way: a larger rho lets r = z fall faster, a smaller one velocities.
-    """
+    """The factor for rho: a larger rho lets r = z fall faster, a smaller one velocities."""
     primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
     parts = problem.Q @ z.ravel(), problem.q, rho * x  # the velocity is their difference
     size = max(*(float(np.linalg.norm(part)) for part in parts), 1e-300)

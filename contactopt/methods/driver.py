@@ -203,9 +203,8 @@ def _follow(
 def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None
 ) -> tuple[Iterate | Known | None, Status | None, str]:
-    """The next iterate of a method with `left` seconds to go; else how the iteration ended and why.
-
-    `repeated` says how the last iterates repeat earlier ones; a method without another way ends so.
+    """The next iterate with `left` seconds to go, or how and why the iteration ended; `repeated`
+    says how the last iterates repeat earlier ones, which ends a method without another way.
     """
     try:
         # what overflows is seen below
@@ -356,9 +355,8 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 
 
 def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """InputError for a load that contacts, which only push, cannot balance: where the multipliers
-    have names, if the bodies escape along a motion, otherwise if a plate is pulled off along the
-    normals.
+    """InputError for a load that no contacts can balance: bodies escape along a named motion, or a
+    plate is pulled off along the normals.
     """
     if problem.motions:
         found = escape(problem)

@@ -140,9 +140,7 @@ class _Program:
         return np.argmax(answer.x[n:].reshape(4, k), axis=0), answer.x[:n]
 
     def point(self, states: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The solution r (k, 2), lambda (p,) of the linear system of these states nearest to
-        `near`.
-        """
+        """The solution r (k, 2), lambda (p,) of these states' linear system nearest to `near`."""
         problem, k = self.problem, self.problem.contacts
         A, b = np.hstack([problem.Q, problem.V]), -problem.q.ravel()
         shut, opened, slips = np.flatnonzero(states != OPEN), states == OPEN, states >= FORWARD

@@ -81,9 +81,7 @@ class Newton(Method):
     def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
-        """Iterates, each with the residual that its step began with; InputError if `linear` does
-        not fit Q.
-        """
+        """Iterates with the residual before each step; InputError if `linear` does not fit."""
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:
             raise InputError(

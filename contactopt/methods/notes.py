@@ -14,9 +14,7 @@ _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs"
 
 
 def note(logger: logging.Logger, sentence: str) -> None:
-    """Log what was done otherwise than asked or expected, and keep the sentence once for the
-    Solution.
-    """
+    """Log what was done otherwise than asked or expected, and keep it once for the Solution."""
     logger.info(sentence)
     notes = _notes.get()
     if notes is not None and sentence not in notes:

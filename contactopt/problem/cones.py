@@ -85,9 +85,7 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
 def cylinder_derivative(
     y: np.ndarray, radius: np.ndarray, low: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, dim) on the cylinders r_n >= low, |r_t| <= radius, and its generalised
-    derivative (k, dim, dim).
-    """
+    """Projection of y (k, dim) on cylinders r_n >= low, |r_t| <= radius, and its derivative."""
     P, D = np.empty_like(y), np.zeros((*y.shape, y.shape[1]))
     P[:, :1], D[:, :1, :1] = half_line_derivative(y[:, :1], low)
     P[:, 1:], D[:, 1:, 1:] = disc_derivative(y[:, 1:], radius)

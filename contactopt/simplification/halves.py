@@ -23,10 +23,7 @@ from contactopt.simplification.whole import Whole, of_mesh, with_pairs
 
 
 def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
-    """The half on the positive side of a plane across an axis, and how the whole lies on it.
-
-    Raises InputError if the plane runs through elements.
-    """
+    """The positive half, and how the whole lies on it; InputError if elements are cut."""
     scene, near = whole.scene, NEAR * whole.size
     component = scene.components[int(np.argmax(np.abs(plane.normal)))]
     heights = {name: float(np.mean(plane.height(mesh.p))) for name, mesh in whole.meshes.items()}
@@ -86,9 +83,8 @@ def _restricted(mesh: Any, elements: np.ndarray) -> Any:
 
 
 def roller(whole: Whole) -> str:
-    """A support that holds one component of contacts in a plane across it, or none: a plane of
-    symmetry in a scene of mirror images (contactopt.coupling.planes_of_symmetry), not in a whole
-    scene.
+    """A support that holds a component of contacts in a plane across it, or none: it would be a
+    plane of symmetry in a scene of mirror images (contactopt.coupling.planes_of_symmetry).
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]

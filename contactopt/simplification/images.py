@@ -71,10 +71,7 @@ class _Differs(Exception):
 
 
 def images_under(whole: Whole, plane: Plane) -> Images | str | None:
-    """How the scene lies on itself.
-
-    Half a sentence if the meshes lie on themselves and the rest does not; None if they do not.
-    """
+    """How the scene lies on itself; half a sentence if only its meshes do, None if they do not."""
     nodes = _images_of_meshes(whole, plane)
     if nodes is None:
         return None

@@ -46,9 +46,8 @@ class Whole:
 
     @cached_property
     def sizes(self) -> tuple[int, int]:
-        """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
-
-        Contacts are the nodes of the finer surface of each pair; supports are not taken off.
+        """Displacement unknowns, with those that are held, and contacts not tied: finer sides'
+        nodes.
         """
         numbers, contacts = {}, 0
         for name, mesh in self.meshes.items():

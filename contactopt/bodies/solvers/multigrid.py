@@ -143,10 +143,7 @@ class VCycle:
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
 
     def apply(self, r: np.ndarray) -> np.ndarray:
-        """B r: one V-cycle for the residual r (n,), in the units of A.
-
-        The residual is divided by its largest entry, for single precision has small exponents only.
-        """
+        """B r for a residual r (n,), scaled to one: single precision has small exponents."""
         size = float(np.abs(r).max(initial=0.0))
         if size == 0.0:
             return np.zeros(len(r))
@@ -316,8 +313,7 @@ def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
-    their own; the place (n,) of each unknown of A in it; and the nodes (k,). The rows are made some
-    at a time, for the copies take more than the result.
+    their own, made some at a time; each unknown's place (n,) in it; the nodes (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim

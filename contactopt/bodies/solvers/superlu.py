@@ -98,9 +98,8 @@ class SuperLUSolver(BodySolver):
         return L * np.sqrt(pivots), factors.perm_c[head:] - head
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Products by only the rows and columns of L and D that a load on `at` reaches: `at` and
-        its ancestors in the elimination tree. In space they hold most of L, and whole solves are
-        used.
+        """Products by only the rows and columns of L and D that `at` reaches in the elimination
+        tree; in space they hold most of L, and whole solves are used.
         """
         factors = self.factors
         if not self._plane or not np.array_equal(factors.perm_c, factors.perm_r):

@@ -125,9 +125,8 @@ class BodySolver(ABC):
 
     @property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular, zeros above, and the place (m,) of each of `trailing`: R R' is
-        the Schur complement of the others in these places. None where there is none without a
-        solve.
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
+        complement of the others there. None where a solve would be needed.
         """
         return None
 

@@ -92,9 +92,7 @@ def run(backend: Backend, problem: Any) -> None:
 
 
 def check_semidefinite(Q: np.ndarray) -> None:
-    """BackendError unless Q is positive semidefinite but for rounding, by a Cholesky factorisation:
-    cvxpy's own test of convexity fails at random and on small numbers.
-    """
+    """BackendError unless Q is semidefinite but for rounding: cvxpy's test fails at random."""
     try:
         la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)
     except la.LinAlgError as error:

@@ -216,9 +216,7 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
 
 
 def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
-    """Displacements X close to A^-1 T' r for forces r (k, dim), by conjugate gradients with one
-    V-cycle as preconditioner, to a relative accuracy in the energy norm.
-    """
+    """X close to A^-1 T' r for forces r (k, dim), by CG with one V-cycle, to rtol in energy."""
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X

@@ -94,9 +94,7 @@ class Lorentz:
     def answer(
         self, x: np.ndarray, z: np.ndarray, lam: np.ndarray, gap: np.ndarray
     ) -> tuple[Iterate, float]:
-        """Forces in the cone, multipliers, and how far they are from a solution
-        (`interior_iterates`).
-        """
+        """Forces in the cone, multipliers, and their error (`interior_iterates`)."""
         error = max(
             float(np.vdot(x, z)) / len(x),
             sqrt(np.vdot(gap, gap) / len(x)),

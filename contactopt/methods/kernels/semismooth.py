@@ -70,9 +70,7 @@ class Equations:
     def evaluate(
         self, r: np.ndarray, lam: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Norm of the residual, P(y) - r (k, d), V'r + s (p,), the derivative of P at y = r - rho
-        u.
-        """
+        """Residual, P(y) - r (k, d), V'r + s (p,), derivative of P at y = r - rho u."""
         P, D = self.project(r - self.rho[:, None] * self.displacements(r, lam))
         error, balance = P - r, self.V.T @ r.ravel() + self.s
         return sqrt(np.vdot(error, error) + balance @ balance), error, balance, D

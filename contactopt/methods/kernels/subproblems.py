@@ -99,9 +99,7 @@ class KrylovSubproblem:
         return (r, lam) if step is None else (r + step[0], lam + step[1])
 
     def _projection(self, given: np.ndarray) -> Projection:
-        """y (k, dim) -> the projection of the own components beside the `given`, and its
-        derivative.
-        """
+        """The projection of the own components of y (k, dim) beside the `given`."""
         own, low, radius = self.own, self.problem.law.lowest, self.problem.law.bound(given[:, 0])
 
         def project(y: np.ndarray) -> Iterate:

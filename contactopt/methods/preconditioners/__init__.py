@@ -115,9 +115,8 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse (k dim, k dim) of problem.Q, in a block for each pair of
-    surfaces, from its mean diagonal. InputError for an unknown name, and for contacts that do not
-    fit.
+    """The named approximate inverse of problem.Q in a block for each pair of surfaces, by its mean
+    diagonal; InputError for an unknown name, and for contacts that do not fit.
     """
     find_preconditioner(name)
     if len(problem.pairs) > 1:
@@ -238,9 +237,8 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, and QZ, without those that depend on others.
-    Forces that move nothing, as constant ones on a periodic half-space, have no energy and are left
-    out.
+    """Z (n, j) with Z'QZ = I on the same columns, and QZ, without columns that depend on others or
+    move nothing, as constant ones on a periodic half-space.
     """
     energy = np.einsum("ij,ij->j", Z, QZ)
     each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)

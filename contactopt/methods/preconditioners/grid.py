@@ -96,9 +96,8 @@ class OnGrid:
         object.__setattr__(self, "__doc__", self.make.__doc__)
 
     def __call__(self, problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-        """The same products on arrays (k, dim), with P and with P^-1, or None in its place.
-
-        Raises InputError if the contacts lie on no grid, or on one of fewer than 3 contacts a side.
+        """Products with P and P^-1, or None, on arrays (k, dim); InputError without a grid of 3 a
+        side.
         """
         grid, order = _grid_of(problem, held)
 
@@ -132,9 +131,8 @@ def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray
 
 
 def _turn(places: np.ndarray) -> np.ndarray:
-    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k), on a
-    grid those of its sides, along the axes: by the smallest angle, and exactly 1 where they lie
-    there.
+    """Rotation (2, 2) that lays the directions to nearest neighbours of places (2, k) along the
+    axes, by the smallest angle, and exactly 1 where they lie there.
     """
     points = places.T
     if len(points) < 4:

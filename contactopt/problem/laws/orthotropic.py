@@ -71,9 +71,7 @@ class Orthotropic(Law):
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Orthotropic:
-        """From one coefficient, or from two, (2,) or (2, k), along the scene's direction and
-        across.
-        """
+        """From one coefficient, or two, (2,) or (2, k), along the scene's direction and across."""
         k = len(place.areas)
         if values.shape not in ((), (2,), (2, k)):
             raise InputError(
