@@ -37,10 +37,6 @@ class AssembledElastic(AssembledBody):
     def unknowns(self) -> int:
         return len(self.body.free)
 
-    @cached_property
-    def interface_unknowns(self) -> int:
-        return self.body.contact_dofs.size
-
     def iterates(self, solver: str) -> bool:
         return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
 

@@ -67,10 +67,6 @@ class HalfSpaceBody(AssembledBody, Body):
     def unknowns(self) -> int:
         return int(np.prod(self.grid)) * len(self.components)
 
-    @cached_property
-    def interface_unknowns(self) -> int:
-        return self.unknowns
-
     @property
     def cell(self) -> float:
         """Area of a cell [length^2]."""

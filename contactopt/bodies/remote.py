@@ -218,6 +218,9 @@ class RemoteBody(Remote, Body):
     fields = _forwarded("fields")
     limits = _forwarded("limits")
 
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None  # an elastic body has none
+
     def product(self, T: sp.csr_matrix) -> Product:
         made = Remote(self.team, self._keep("product", T))
         return lambda X, accuracy: made._ask("__call__", X, accuracy)
@@ -313,10 +316,6 @@ class AssembledRemote(Remote, AssembledBody):
     @cached_property
     def unknowns(self) -> int:
         return int(self._ask("unknowns"))
-
-    @cached_property
-    def interface_unknowns(self) -> int:
-        return int(self._ask("interface_unknowns"))
 
     @cached_property
     def work(self) -> Work:

@@ -34,7 +34,7 @@ class RigidBody(AssembledBody, Body):
     part: Rigid
     components: tuple[str, ...]
 
-    unknowns = interface_unknowns = 0
+    unknowns = 0
     meshed = False
 
     @cached_property
