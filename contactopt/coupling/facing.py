@@ -110,7 +110,7 @@ def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
 
 
 def _clusters(facets: Facets, centre: np.ndarray, start: np.ndarray, cluster: np.ndarray) -> Facets:
-    """Balls and cones of clusters (facet by facet), each of which begins at `start`."""
+    """Balls and cones of clusters: each begins at `start`; `cluster` is that of each facet."""
     axis = np.add.reduceat(facets.axis, start, axis=1)
     length = np.linalg.norm(axis, axis=0)
     axis = np.where(length > 0, axis, facets.axis[:, start]) / np.where(length > 0, length, 1.0)

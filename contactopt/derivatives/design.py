@@ -274,7 +274,7 @@ def _peak(step: Step) -> float:
 
 
 def _usual(states: _States, now: Step, x: np.ndarray) -> np.ndarray:
-    """By what a unit of each variable would change the forces of contacts on their own."""
+    """How much each variable would change the forces of contacts that are on their own."""
     compliance, rest = float(np.mean(diagonal(now.problem.Q))), x[states.shapes.shape[1] :]
     largest = float(np.abs(now.solution.reactions).max())
     shapes = np.abs(states.shapes).max(axis=0, initial=0.0) / compliance

@@ -46,9 +46,7 @@ class Whole:
 
     @cached_property
     def sizes(self) -> tuple[int, int]:
-        """Displacement unknowns, with those that are held, and contacts not tied: finer sides'
-        nodes.
-        """
+        """Displacement unknowns, held ones too, and contacts that are not tied, by the meshes."""
         numbers, contacts = {}, 0
         for name, mesh in self.meshes.items():
             element = SHAPES[mesh.refdom.__name__][1][self.scene.degree]()

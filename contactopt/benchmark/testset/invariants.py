@@ -8,7 +8,7 @@ from contactopt.problem import InterfaceProblem
 
 
 def invariants(problem: InterfaceProblem) -> dict[str, float]:
-    """Norms of q, Q x, V' x (x_i = cos i), s and mu with ten digits, as rounding leaves them."""
+    """Norms of q, Q x, V' x (x_i = cos i), s and mu, to ten digits, which rounding keeps."""
     x = np.cos(np.arange(problem.q.size))
     parts = {"q": problem.q, "Qx": problem.Q @ x, "Vx": problem.V.T @ x, "s": problem.s}
     return {

@@ -86,7 +86,7 @@ class Level:
     R: SparseProduct
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x = p(A) r, close to A^-1 r for upper eigenvalues; r' = r - A x = r - A z; z."""
+        """x = p(A) r, close to A^-1 r for upper eigenvalues, and r', z: r - A x = r' - A z."""
         z = SINGLE(4 / 3) / self.largest * r
         x = z.copy()
         for k in range(2, DEGREE + 1):
