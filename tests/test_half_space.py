@@ -677,7 +677,7 @@ def test_a_few_contacts_are_solved_by_themselves(monkeypatch):
     level = Level.of_problem(problem)
     solution = contactopt.solve(problem, Nested(), tol=1e-10)
     r, lam = solution.reactions.T.copy(), solution.multipliers
-    monkeypatch.setattr(elimination, "FEW_OF_ALL", 0.5)
+    monkeypatch.setattr(elimination.constants, "FEW_OF_ALL", 0.5)
     at = level.evaluate(r, lam)
     k = int(np.argmax(r[0]))
     wrong = r.copy()

@@ -1,7 +1,4 @@
-"""One run made: the method called, its answer in one form for all, its time and memory.
-
-Runs in a worker process.
-"""
+"""One run made in a worker: the method called, its answer, its time and memory."""
 
 from __future__ import annotations
 
@@ -34,9 +31,7 @@ FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "
 def measure(
     task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry
 ) -> Answer:
-    """Run a method on a problem, from `start` if there is one, and measure time and memory: its
-    answer, or how it failed.
-    """
+    """Run a method, from `start` if there is one: its answer, or how it failed."""
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
     measured = {"base_mb": _reset_peak()}
@@ -137,9 +132,7 @@ def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Answer:
 
 
 def _thinned(history: Sequence[Mapping[str, float]] | None) -> Any:
-    """Residuals, seconds and iterations, at most POINTS of them, the last included; None without a
-    history.
-    """
+    """Residuals, seconds, iterations, at most POINTS with the last; None without any."""
     if not history:
         return None
     index = np.unique(np.geomspace(1, len(history), POINTS).astype(int)) - 1

@@ -1,6 +1,4 @@
-"""A campaign: the runs of an experiment that are not finished yet, executed, stored one by one,
-consolidated.
-"""
+"""A campaign: the unfinished runs of an experiment, executed and stored one by one."""
 
 from __future__ import annotations
 

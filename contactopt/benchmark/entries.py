@@ -30,9 +30,7 @@ class Entries:
         self.absent: list[tuple[str, str, dict[str, Any], str]] = []
 
     def expanded(self, key: str, kinds: Sequence[str], make: Callable[..., list[Any]]) -> list[Any]:
-        """What `make(kind, name, values)` makes of every combination of the lists and ranges of the
-        entries below a key; `kinds` are the keys of which each entry needs one.
-        """
+        """What `make` makes of every combination of the entries below a key, of these kinds."""
         made: list[Any] = []
         for index, entry in enumerate(self.table.data[key]):
             own = [kind for kind in kinds if isinstance(entry, dict) and kind in entry]

@@ -37,11 +37,7 @@ TYPES: dict[str, tuple[type, str]] = {
 # s; GB: less than the least holds no NumPy and SciPy
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}
 # key -> least and most; NumPy's generator takes no larger seed
-WHOLE = {
-    "repeats": (1, MOST_RUNS),
-    "max_iterations": (1, 10**9),
-    "seed": (0, 2**32 - 1),
-}
+WHOLE = {"repeats": (1, MOST_RUNS), "max_iterations": (1, 10**9), "seed": (0, 2**32 - 1)}
 FILTERED = ("problem", "method", "setting", "start", "repeat")
 
 
@@ -142,9 +138,7 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
 
 
 def _check(table: Table) -> None:
-    """Refuse unknown keys, values of the wrong type or size, and more runs than MOST_RUNS, before
-    anything is expanded, built or run.
-    """
+    """Refuse unknown keys, wrong values, and more runs than MOST_RUNS, before anything is built."""
     data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped", "absent"}
     for key in data:
         if key not in known:

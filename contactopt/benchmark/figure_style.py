@@ -56,9 +56,7 @@ STYLES = [
 
 
 def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
-    """The label that was given for a name; else the name, where it is long with the values of its
-    settings only: normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
-    """
+    """The label given for a name, else the name with the values of its settings only."""
     if name in labels:
         return str(labels[name])
     head, bracket, settings = name.partition("(")
@@ -77,10 +75,8 @@ def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write the names of lines in their colours beside their last points, one above the other where
-    they meet: (x, y, name, colour) of each.
-
-    A name stands to the left of a point in the right half of the figure, to the right of any other.
+    """Write coloured names of lines beside their last points (x, y, name, colour), one above the
+    other where they meet, to the left in the right half of the figure.
     """
     ax.autoscale_view()
     middle = float(ax.transAxes.transform((0.5, 0.5))[0])
@@ -103,9 +99,7 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
 
 
 def label_right(ax: Any, ends: Sequence[tuple[float, str, str]]) -> None:
-    """Write the names of lines in their colours beside the axes, at the heights where they end or,
-    where names would meet, in the order of these: (height, name, colour) of each.
-    """
+    """Write coloured names beside the axes at (height, name, colour), in order if crowded."""
     low, high = ax.get_ylim()
     rows = ax.figure.get_figheight() * 72 * 0.8 / ROOM
     # equal heights: the first, which is the better, stands above
@@ -123,11 +117,7 @@ def label_right(ax: Any, ends: Sequence[tuple[float, str, str]]) -> None:
 
 
 def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
-    """Write the numbers of a map in its cells, black on light colours and white on dark ones.
-
-    `norm` takes a number to its place between the darkest and the lightest colour; `size` is that
-    of the letters [pt].
-    """
+    """Write the numbers of a map in its cells, black on light colours and white on dark ones."""
     values = grid.to_numpy(float)
     if values.size > CELLS:
         return
@@ -149,9 +139,7 @@ def make_figure(
 
 
 def set_ticks(axis: Any) -> None:
-    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels
-    run into each other.
-    """
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()

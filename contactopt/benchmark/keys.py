@@ -1,6 +1,4 @@
-"""Every key of an experiment file with an example, as the help of `contactopt bench` and the
-documentation show them, and every column of a table of results. The texts are in keys.toml.
-"""
+"""The keys of an experiment file and the columns of results; the texts are in keys.toml."""
 
 from __future__ import annotations
 

@@ -43,9 +43,7 @@ class Task:
 def blank(task: Task) -> dict[str, Any]:
     """A row with every column, of a run of which nothing is known yet but what it is."""
     run = task.run
-    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
-    return unknown | {
-        "schema": SCHEMA,
+    return _empty() | {
         "key": run.key,
         "experiment": task.experiment,
         "problem": run.problem.label,
@@ -66,17 +64,12 @@ def blank(task: Task) -> dict[str, Any]:
         "residual": np.inf,
         "law_residual": np.inf,
         "history": "[]",
-        "versions": _versions(),
-        "machine": _machine(),
-        "time": _now(),
     }
 
 
 def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
     """A row that says why a method is not there."""
-    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
-    return unknown | {
-        "schema": SCHEMA,
+    return _empty() | {
         "key": f"absent {method}",
         "experiment": experiment,
         "method": method,
@@ -84,10 +77,14 @@ def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
         "law": "coulomb",
         "status": ABSENT,
         "message": one_line(why),
-        "versions": _versions(),
-        "machine": _machine(),
-        "time": _now(),
     }
+
+
+def _empty() -> dict[str, Any]:
+    """A row made here and now, with every column."""
+    unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
+    made = {"schema": SCHEMA, "versions": _versions(), "machine": _machine(), "time": _now()}
+    return unknown | made
 
 
 def _now() -> str:
@@ -111,10 +108,7 @@ def _machine() -> str:
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
-    """The columns of the row that follow from the answer, judged by its certificate.
-
-    The method's own word counts only where it admits failure.
-    """
+    """The columns that follow from the answer, whose own word counts only as failure."""
     out: dict[str, Any] = {"message": answer.message, "time": _now(), **answer.measured}
     if answer.reactions is None:
         seconds = answer.measured.get("call_seconds", np.nan)
@@ -145,7 +139,5 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """The natural-map residual [-] of the same problem under the associated law, as
-    natural_map_residual computes it under its own.
-    """
+    """The natural-map residual [-] of the same problem under the associated law."""
     return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

@@ -196,10 +196,8 @@ def _said(python: str, program: str) -> str:
 
 
 def _in_space(problem: InterfaceProblem) -> InterfaceProblem:
-    """The same problem with a second tangent: what moves along it stays where it is.
-
-    Q gets on the new components the mean of its diagonal and q gets 0, so that no force acts along
-    them. A problem in space is returned as it is.
+    """The same problem with a second tangent along which nothing moves: Q gets there the mean of
+    its diagonal, and q gets 0. A problem in space is returned as it is.
     """
     k, dim = problem.q.shape
     if dim == 3:

@@ -1,8 +1,6 @@
-"""Methods and problems of the user: decorated in a file that the experiment names, or entry points
-of a package.
-
-The campaign's process runs the file, to know what it declares. The functions themselves are called
-in worker processes only.
+"""Methods and problems of the user: decorated in a file, or entry points of a package. The
+campaign's process runs the file, to know what it declares; the functions are called in workers
+only.
 """
 
 from __future__ import annotations

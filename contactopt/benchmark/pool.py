@@ -1,6 +1,4 @@
-"""Runs made by worker processes, each within its limit of time: problems built, methods run,
-answers certified. contactopt.benchmark.process kills a worker at the limit.
-"""
+"""Runs made by worker processes, each within its limit of time, and certified."""
 
 from __future__ import annotations
 
@@ -155,9 +153,7 @@ class Worker:
         return answer
 
     def _prepare(self, task: Task) -> None:
-        """Give the process the problem, a warm start if one is asked for, and the imports of the
-        method.
-        """
+        """Give the process the problem, a warm start if asked for, and the method's imports."""
         method, dim = task.run.method, self.problem.dim
         if not self.solver.running:
             self._forget()
@@ -184,9 +180,7 @@ class Worker:
 
 
 class Shares:
-    """Tasks handed out so that a worker stays with a problem, and two build the same one only if no
-    other is left.
-    """
+    """Tasks dealt so that workers stay with a problem, and share one only at the end."""
 
     def __init__(self, tasks: Sequence[Task]):
         self.lock = threading.Lock()

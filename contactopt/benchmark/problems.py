@@ -1,6 +1,4 @@
-"""Problems of an experiment: scenes, FCLib files and generated families, each a name with
-parameters.
-"""
+"""Problems of an experiment file: scenes, FCLib files and generated families."""
 
 from __future__ import annotations
 

@@ -1,9 +1,5 @@
-"""A process in which code of the user may run, seen from outside: start it, ask it, kill it, tell
-how it ended.
-
-The process is the one worker of an executor of loky, which starts it, carries calls and answers,
-and notices its death. What is added here: limits of time, the end of everything that the process
-started, and what it printed last.
+"""A process in which code of the user may run, seen from outside: the one worker of an executor of
+loky, with limits of time, the end of all that it started, and what it printed last.
 """
 
 from __future__ import annotations
@@ -84,11 +80,8 @@ class Process:
             ) from error
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function returns that the process calls.
-
-        After `limit` seconds the process is killed. Raises Ended if it did not survive the call,
-        which `phase` names. A process that is killed before the call, while it starts or while
-        nobody asks it anything, is started anew, STARTS times.
+        """What a function returns that the process calls; Ended, with `phase`, if it died or took
+        more than `limit` seconds. One that died before the call is started anew, STARTS times.
         """
         from loky.process_executor import BrokenProcessPool
 
@@ -192,9 +185,7 @@ def _mark() -> str:
 
 
 def end_orphans() -> None:
-    """Kill what solvers of this campaign, or of one that is dead, left behind in sessions of their
-    own.
-    """
+    """Kill what solvers of this campaign, or of a dead one, left in other sessions."""
     import psutil
 
     for process in psutil.process_iter():
@@ -224,8 +215,6 @@ def _kill(processes: Iterable[psutil.Process]) -> None:
 
 
 def one_line(error: object) -> str:
-    """A text, or an exception with its name unless it is an InputError, in one line of at most 200
-    characters.
-    """
+    """A text, or an exception with its name unless an InputError, in 200 characters."""
     text = str(error) if isinstance(error, str | InputError) else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]

@@ -1,10 +1,9 @@
 """Who is first: methods compared at the accuracy that they reach, not at the one asked for.
 
-The runs of a method on an instance (a problem and a start) are points: the median time of its
-repeats, and the worst certificate among them, one for each tolerance asked. The time to an accuracy
-is read off the front of these points, straight between two of them in logarithms of time and
-certificate. What reaches the accuracy with none of them has failed, and counts as its time limit.
-Times below NOISE count as NOISE: nobody is first by what a clock cannot tell.
+The runs of a method on an instance (a problem and a start) are points: median time and worst
+certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
+front, straight in logarithms; what does not reach it counts as its time limit, and times below
+NOISE count as NOISE.
 """
 
 from __future__ import annotations
@@ -37,18 +36,14 @@ JOINED = {
 
 
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row for each problem, start, method and tolerance: times [s] with their quartiles, the
-    worst certificate, whether success was claimed, and the memory taken [MB].
-    """
+    """A row per problem, start, method and tolerance: times [s], worst certificate, memory."""
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     return table.assign(_memory=memory).groupby(POINT, sort=False).agg(**joined).reset_index()
 
 
 def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
-    """The seconds to a certificate of `accuracy`: a row for each instance, a column for each
-    method, inf where it is not reached.
-    """
+    """Seconds to a certificate of `accuracy` (instance, method), inf if not reached."""
     fronts = points.groupby(["problem", "start", "method"], sort=False)[[time, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
@@ -57,9 +52,7 @@ def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.Dat
 def _seconds_to(
     accuracy: float, seconds: np.ndarray, residuals: np.ndarray, limit: np.ndarray
 ) -> float:
-    """Read the time to an accuracy off the front of points, of which none is both slower and less
-    accurate than another.
-    """
+    """The time to an accuracy on the front of points that no other point dominates."""
     kept = (seconds <= limit) & np.isfinite(residuals)
     t, e = np.maximum(seconds[kept], NOISE), np.maximum(residuals[kept], LEAST)
     order = np.lexsort((t, e))
@@ -157,9 +150,7 @@ def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
-    """Kendall's tau of the ranks of the same methods in the points of two reruns; nan with fewer
-    than two methods.
-    """
+    """Kendall's tau of the ranks in two reruns; nan with fewer than two methods."""
     from scipy.stats import kendalltau
 
     ranks = [ranking(points, accuracy).set_index("method")["mean"] for points in (one, other)]
@@ -170,10 +161,7 @@ def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
 
 
 def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The table in two halves: the even and the odd repeats, which were made one after the other.
-
-    A run of a single repeat stands in both.
-    """
+    """The even and the odd repeats, two reruns of a table; a single repeat stands in both."""
     single = table.groupby(POINT)["repeat"].transform("size") == 1
     even = table["repeat"] % 2 == 0
     return table[even | single], table[~even | single]

@@ -153,9 +153,7 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
-    """Draw the median time of successful runs against size, with the exponent p of time ~ size^p
-    from the larger sizes.
-    """
+    """Draw median times of successes against size, with the exponent p of the larger sizes."""
     figure, ax = make_figure()
     ends = []
     look = {name: style for (name, _), style in zip(groups(table, by), cycle(STYLES))}
@@ -174,9 +172,7 @@ def time_against_size(
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
-    """The exponent p of y ~ x^p by least squares over the larger half of the sizes (n,), three at
-    least; nan with fewer than three.
-    """
+    """The exponent p of y ~ x^p over the larger half of the sizes; nan below three."""
     if len(x) < 3:
         return np.nan
     order = np.argsort(x)[-max(3, (len(x) + 1) // 2) :]
@@ -258,9 +254,7 @@ def _draw_map(ax: Any, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
 
 
 def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame) -> None:
-    """Lines at the thresholds of friction, in the places of the cells (logarithmic between their
-    values).
-    """
+    """Lines at the thresholds of friction, logarithmic between the cells' values."""
     if "problem.mu" not in (x, y):
         return
     upright = x == "problem.mu"
@@ -289,9 +283,7 @@ def convergence(
     by: str = "method",
     labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
-    """Draw the natural-map residual after each outer iteration, or against time ("seconds"), of the
-    first repeat of each method.
-    """
+    """Draw the residual over outer iterations, or over time ("seconds"), of first repeats."""
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
     figure, ax = make_figure()

@@ -94,10 +94,8 @@ def report_campaign(
 
 
 def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
-    """The rows of a campaign and those of others, whose methods are told apart by their file.
-
-    Times of others come from another machine. Where both have made the same run of the same
-    method, the others' times are divided by the geometric mean of the ratios of these times.
+    """The rows of a campaign and those of others, whose methods are told apart by their file, and
+    whose times are divided by the geometric mean of the ratios for runs that both have made.
     """
     import pandas as pd
 
@@ -186,9 +184,7 @@ def _tags(row: pd.Series, of_set: Mapping[str, dict[str, Any]]) -> dict[str, Any
 def _groups(
     found: pd.DataFrame, tags: dict[str, dict[str, Any]], number: dict[str, int]
 ) -> list[tuple[str, pd.DataFrame, list[int]]]:
-    """The groups of problems with a leader table: all, and those that share a tag that is no
-    number, each with the numbers of its problems.
-    """
+    """The groups with a leader table, all and those of a tag, with their problems' numbers."""
     groups = {"all": list(number)}
     for name, known in tags.items():
         for key, value in known.items():
@@ -261,16 +257,7 @@ def _plain(value: Any) -> Any:
 
 
 def refusals(table: pd.DataFrame) -> list[str]:
-    """Say in a sentence each why runs were refused or could not be built, with their number.
-
-    Parameters
-    ----------
-    table : The table of a campaign.
-
-    Returns
-    -------
-    The sentences, the most frequent reason first.
-    """
+    """Say in a sentence each why runs were refused or could not be built, most frequent first."""
     left = table[table["status"].isin(["refused", "not_built"])]
     reasons = Counter(str(message) for message in left["message"])
     return [

@@ -1,10 +1,8 @@
-"""Reports: Markdown and one HTML page, from experiment files and the small tables beside the
-reports. Solves nothing.
+"""Reports from experiment files and the small tables beside the reports. Solves nothing.
 
 An experiment file lists its figures and tables in order (`contactopt.benchmark.keys.FIGURE` has the
-keys). A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its
-table REPORTS/NAME/rows.csv, or rows.parquet if it is long. All reports together are
-REPORTS/benchmarks.html.
+keys), or gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its table rows.csv or
+rows.parquet beside it; all reports together are REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations
@@ -80,10 +78,7 @@ class Layout:
 
 
 def read_layout(path: str | Path) -> Layout:
-    """How the report of an experiment is laid out.
-
-    InputError if the file cannot be read or asks for a figure that does not exist.
-    """
+    """The layout of an experiment's report; InputError if unreadable or with unknown figures."""
     path = Path(path)
     root = read_table(path, "experiment")
     name = root.take("name", str, path.stem)
@@ -132,10 +127,7 @@ def has_table(folder: Path) -> bool:
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
     """Rebuild the report of every experiment that has a table in `reports`, and the page with all,
-    which is returned.
-
-    InputError if none has a table, or, after all the others are done, if a figure's arguments do
-    not fit its table.
+    which is returned; InputError if none has, or if a figure's arguments do not fit its table.
     """
     require("markdown_it", "pandas")
     page, errors = Path(reports) / PAGE, []
@@ -285,10 +277,8 @@ def _png(figure: Any) -> bytes:
 
 
 def rendered(text: str, folder: Path) -> str:
-    """HTML of Markdown, with the pictures of the report in its folder embedded.
-
-    Raw HTML is shown as text. Links to files beside the report become text, since the page may
-    stand elsewhere.
+    """HTML of Markdown, with the pictures in `folder` embedded; raw HTML is shown as text, and
+    links to files become text, since the page may stand elsewhere.
     """
     from markdown_it import MarkdownIt
 

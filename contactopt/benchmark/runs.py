@@ -25,9 +25,7 @@ OTHER_LAWS = {"relaxation": "associated"}
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method of contactopt, or a plug-in, with the settings given, the law that it solves, and
-    name and version of the solver of others that it calls.
-    """
+    """A method or plug-in with settings and law, and the solver of others that it calls."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -48,17 +46,12 @@ class MethodSpec:
         return self.name not in METHODS
 
     def backends(self, *dims: int) -> str:
-        """Names and versions of the backends in any of these dimensions, "native" without;
-        InputError if none works.
-        """
+        """Names and versions of the backends, "native" without; InputError if none works."""
         return self.peer or _backends(self.name, json.dumps(dict(self.settings)), dims)
 
 
 def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> MethodSpec:
-    """The method with these settings, checked.
-
-    InputError if its name or a setting is unknown, or a backend is not installed.
-    """
+    """The method with these settings; InputError if unknown, or a backend is not installed."""
     law, peer = OTHER_LAWS.get(name, "coulomb"), ""
     if name in METHODS:
         find_method(name, **settings)
@@ -95,9 +88,7 @@ def _backends(name: str, settings: str, dims: tuple[int, ...]) -> str:
 
 @dataclass(frozen=True)
 class Run:
-    """One run; `key` tells it apart from all others, in any campaign, until a backend's version
-    changes.
-    """
+    """One run; `key` tells it apart from all others of the same backends' versions."""
 
     problem: ProblemSpec
     method: MethodSpec

@@ -1,9 +1,6 @@
-"""Results on disk: one JSON line per finished run, appended in one write; consolidated to Parquet,
-CSV for small tables.
-
-A campaign's folder holds `rows.jsonl` (appended while it runs), `rows.parquet` (the same,
-consolidated at its end) and `experiment.toml`. Killed at any moment, at most the last line is torn;
-it is cut off when the file is opened again.
+"""Results on disk: `rows.jsonl`, one line per finished run, appended in one write while a campaign
+runs, `rows.parquet`, the same at its end, and `experiment.toml`. Killed at any moment, at most the
+last line is torn; it is cut off when the file is opened again.
 """
 
 from __future__ import annotations
@@ -60,10 +57,8 @@ def told(place: Path, advice: str = "choose another directory") -> Iterator[None
 
 
 class Store:
-    """The appending end, for one campaign at a time (file lock). Use as a context manager.
-
-    InputError if the folder holds results and `resume` is not set, if another campaign writes
-    there, or if nothing can be written.
+    """The appending end, for one campaign at a time (file lock), a context manager; InputError for
+    results without `resume`, another campaign, or a folder that cannot be written.
     """
 
     def __init__(self, folder: Path, resume: bool):
@@ -110,10 +105,7 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl; InputError if one has a newer schema.
-
-    Lines that are no rows are left out, with a warning: their runs count as not made.
-    """
+    """The rows of a rows.jsonl, without torn ones, with a warning; InputError on a newer schema."""
     wanted, bad = COLUMNS.keys() - {"error"}, 0  # which load() works out
     with open(path, "rb") as file:
         for line in file:

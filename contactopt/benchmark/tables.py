@@ -1,6 +1,4 @@
-"""Tables of a report: f(table, ...) -> DataFrame; and the choice of rows that figures and tables
-are made of.
-"""
+"""Tables of a report, and the choice of rows that figures and tables are made of."""
 
 from __future__ import annotations
 
@@ -19,10 +17,8 @@ INSTANCE = ["problem", "setting", "start"]
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
-    """The rows of one law, or of all at '', whose columns have given values, at least one.
-
-    `where` holds for a column a value or a list of them; '' stands for no value. InputError on an
-    unknown column, or if no row is left.
+    """The rows of one law, or of all at '', whose columns have the values `where`, one, a list or
+    '' for none; InputError on an unknown column, or if no row is left.
     """
     rows = table[table["law"] == law] if law else table
     for column, value in where.items():
@@ -36,9 +32,7 @@ def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFr
 
 
 def success_table(table: pd.DataFrame, by: str = "method", across: str = "setting") -> pd.DataFrame:
-    """Percent of the runs that kept the tolerance and of those with a right claim, and the ways of
-    failing, with a row for each value of the column `by` and a column for each of `across`.
-    """
+    """Percent of runs that kept the tolerance, of right claims, and the ways of failing."""
     import pandas as pd
 
     groups(table, across)  # complains if there is no such column
@@ -96,9 +90,7 @@ def time_table(
 
 
 def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
-    """The rows for each value of a column, sorted by name; settings from the loosest to the
-    tightest. InputError if there is no such column.
-    """
+    """The rows of each value of a column by name; settings go from loose to tight."""
     if by not in table:
         raise InputError(f"the table has no column {by!r}.")
     found = [(str(name), rows) for name, rows in table.groupby(by, sort=True)]

@@ -1,8 +1,5 @@
-"""What the processes do in which code of the user runs: build problems, run methods.
-
-They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them
-from outside. Each keeps its plug-ins, its problem and what is imported from call to call. What runs
-methods gets its problems from outside and judges nothing.
+"""What the processes do in which code of the user runs: build problems, run methods. They may end
+at any moment (contactopt.benchmark.process), keep what was loaded, and judge nothing.
 """
 
 from __future__ import annotations
@@ -35,9 +32,7 @@ UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAl
 
 @dataclass
 class Kept:
-    """What a process keeps: plug-ins, and the problem of that label with its warm start, or why it
-    has none.
-    """
+    """Plug-ins, and the problem of a label with its warm start, or why there is none."""
 
     plugins: Registry = field(default_factory=Registry)
     label: str = ""
@@ -98,9 +93,7 @@ def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
 
 
 def warm_up(task: Task, dim: int) -> None:
-    """Run the method untimed on a problem of two contacts, so that imports and compilation are not
-    timed later.
-    """
+    """Run the method untimed on two contacts, so that imports and compilation are not timed."""
     Q = np.eye(2 * dim) + 0.1
     q = np.zeros((2, dim))
     q[:, 0], q[:, 1] = -1.0, 0.5
@@ -150,9 +143,7 @@ def _only(own: int) -> None:
 
 
 def _limit_memory(gigabytes: float) -> None:
-    """Bound the data of this process; beyond what it holds now also all that is mapped, as shared
-    memory is.
-    """
+    """Bound the data of this process, and all that is mapped beyond what it holds now."""
     import resource
 
     import psutil

@@ -113,11 +113,9 @@ class Work(NamedTuple):
 class AssembledBody(ABC):
     """A body whose surface and size are known, before its linear system is made solvable.
 
-    name                its name in the scene
-    unknowns            number of its free displacement unknowns
-    interface_unknowns  number of those on its contact surface
-    meshed              whether it has contacts of its own; if not, it follows the contacts of the
-                        other body
+    name      its name in the scene
+    unknowns  number of its free displacement unknowns
+    meshed    whether it has contacts of its own; if not, it follows those of the other body
     """
 
     if TYPE_CHECKING:  # for classes whose fields they are, and for those that compute them
@@ -126,8 +124,6 @@ class AssembledBody(ABC):
         def name(self) -> str: ...
         @property
         def unknowns(self) -> int: ...
-        @property
-        def interface_unknowns(self) -> int: ...
         @property
         def meshed(self) -> bool: ...
 

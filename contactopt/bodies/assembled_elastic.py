@@ -37,10 +37,6 @@ class AssembledElastic(AssembledBody):
     def unknowns(self) -> int:
         return len(self.body.free)
 
-    @cached_property
-    def interface_unknowns(self) -> int:
-        return self.body.contact_dofs.size
-
     def iterates(self, solver: str) -> bool:
         return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
 
@@ -102,9 +98,7 @@ class AssembledElastic(AssembledBody):
         )
 
     def guides(self) -> Guides:
-        """The planes lie across a coordinate axis and have the whole body on one side; supports
-        hold it along this axis alone, at zero.
-        """
+        """Coordinate planes, the body on one side, that supports hold along the axis alone."""
         body, mesh = self.body, self.body.basis.mesh
         x = body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
@@ -130,12 +124,9 @@ class AssembledElastic(AssembledBody):
 def _trace(
     weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
 ) -> sp.csr_matrix:
-    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,).
-
-    In general the neighbours of a contact node take part, by its row of the weights. Where the
-    component is prescribed at the contact node itself, as on a plane of symmetry, its displacement
-    is that of the node alone: the weights of a neighbour and of its mirror image, which the model
-    leaves out, cancel each other there.
+    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,), by
+    their rows of the weights. Where it is prescribed at the contact node, it is that of the node
+    alone: the weights of a neighbour and of its mirror image cancel each other there.
     """
     k = len(nodes)
     alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)

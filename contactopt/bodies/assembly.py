@@ -77,9 +77,7 @@ class Assembly:
         return isotropic_stiffness(self.basis, lame_by_poisson(self.material), self.weight)
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
-        """The derivative (n,) of the elastic forces by the material's constant 'E' or 'nu' at fixed
-        U.
-        """
+        """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""
         return np.asarray(self.A @ U / self.material.E if constant == "E" else self.by_poisson @ U)
 
     @property

@@ -27,11 +27,8 @@ from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
-    """Mesh and assemble one elastic part of a scene.
-
-    `elements` is the number of elements across the contact half-width, `zone` the half-width that
-    the mesh resolves [length]. InputError for a mesh that cannot be used, such as one in several
-    pieces, and for supports and loads that do not fit.
+    """Mesh and assemble an elastic part, with `elements` across the contact half-width and the
+    half-width `zone` resolved. InputError for a mesh, supports or loads that do not fit.
     """
     mesh = part.build_mesh(elements, zone)
     check_mesh(scene, part, mesh)
@@ -75,10 +72,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
-    """The body with the loads of another scene, whose `part` stands for it.
-
-    InputError if other unknowns are held or driven there.
-    """
+    """The body with the loads of another scene; InputError if other unknowns are held or driven."""
     fixed = _constrained(scene, part, body.basis)
     held = np.array_equal(np.flatnonzero(~fixed.held), body.free)
     if not held or not np.array_equal(fixed.motion, body.motion):
@@ -98,15 +92,8 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
 def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     """Check that a part's mesh fits the kind of the scene and has all boundaries that are named.
 
-    Parameters
-    ----------
-    scene, part : The scene, and an elastic body of it.
-    mesh : Its mesh.
-
-    Raises
-    ------
-    InputError : If the mesh has another dimension, elements that are not known, numbers that are
-        not finite, points on the wrong side of an axis of revolution, or lacks a named boundary.
+    InputError if it has another dimension, elements that are not known, numbers that are not
+    finite, points on the wrong side of an axis of revolution, or lacks a named boundary.
     """
     if (
         not isinstance(mesh, skfem.Mesh)

@@ -172,9 +172,7 @@ class ElasticBody(Body):
         return np.asarray(self._under(force) + self.motions @ multipliers)
 
     def _under(self, force: np.ndarray) -> np.ndarray:
-        """Displacement (n,) under loads, supports, plates and nodal forces (n,), with multipliers
-        of zero.
-        """
+        """Displacement (n,) under loads and nodal forces (n,), with multipliers of zero."""
         body = self.body
         missing = body.load + force + self.pull - self._stiffness @ body.prescribed
         resisted = body.plate_forces + self.extended.T @ missing
@@ -185,9 +183,7 @@ class ElasticBody(Body):
         )
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
-        """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at
-        rest.
-        """
+        """Displacements (n,) or (n, j) under forces on free unknowns, plates at rest."""
         U, Z = np.zeros(force.shape), self.body.rigid_motions.fields
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
@@ -225,9 +221,7 @@ class ElasticBody(Body):
         return float(U @ (self.body.A @ U)) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """Loads on free unknowns, reactions of supports, and on the unknowns of each plate its
-        total force, shared out.
-        """
+        """Loads, reactions of supports, and each plate's total force, shared out."""
         body, F = self.body, self.body.A @ U
         F[body.free] = body.load[body.free]
         total = body.plate_forces + body.motion.T @ body.load
@@ -281,12 +275,11 @@ class ElasticBody(Body):
 def condense(
     body: Assembly, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
 ) -> ElasticBody:
-    """Make one body's linear system solvable and condense its plates.
+    """Make one body's linear system solvable, by a `solver`, and condense its plates.
 
-    solver is 'auto' or a name in contactopt.bodies.solvers.SOLVERS. With `entries` the contact
-    unknowns are eliminated last, so that the factors hold their Schur complement: this makes the
-    entries of the compliance cheap, and serves an explicit Q. ground (n, n) is a stiffness that is
-    added (contactopt.bodies.thin), if any.
+    With `entries` the contact unknowns are eliminated last, so that the factors hold their Schur
+    complement, which makes the entries of the compliance cheap. A stiffness `ground` (n, n) is
+    added.
     """
     whole = body.A if ground is None else sp.csr_matrix(body.A + ground)
     kept = body.free if ground is not None else np.setdiff1d(body.free, body.rigid_motions.fixing)
@@ -355,11 +348,8 @@ def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
 
 
 def _rigid_extension(body: Assembly) -> np.ndarray:
-    """The unit motions of the plates (n, p) with the unknowns of the same component moved along by
-    as much.
-
-    These are translations of the body where no support holds another part of it in that component.
-    The free unknowns of a body that is held elsewhere stay at rest.
+    """The unit motions of the plates (n, p) with the free unknowns of the same component moved
+    along, unless a support holds another part of the body in that component.
     """
     extended, fixed = body.motion.copy(), np.ones(len(body.load), dtype=bool)
     fixed[body.free] = False

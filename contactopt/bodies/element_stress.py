@@ -16,10 +16,8 @@ BLOCK = 2000
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
-    """How far a body is from equilibrium under the contact forces (n,), strained and turned.
-
-    The imbalance counts the free unknowns and, for each plate that moves, the sum over its
-    unknowns.
+    """How far a body is from equilibrium under the contact forces (n,), on free unknowns and on the
+    sum over each plate's, strained and turned.
     """
     internal = body.A @ U
     missing = internal - body.load - force

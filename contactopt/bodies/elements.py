@@ -79,28 +79,13 @@ class Trace(NamedTuple):
 
 
 def weight_at(weight: Weight, x: np.ndarray) -> np.ndarray | float:
-    """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an
-    axisymmetric scene.
-
-    Parameters
-    ----------
-    weight : The constant, and whether the scene is axisymmetric.
-    x : (dim, ...) places [length].
-
-    Returns
-    -------
-    The measure (...) in an axisymmetric scene, else one number.
-    """
+    """The measure of the integrals at places x (dim, ...): a constant, times r if axisymmetric."""
     factor, axisymmetric = weight
     return factor * x[0] if axisymmetric else factor
 
 
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
-    """The vector-valued displacement basis of a mesh, of degree 1 or 2.
-
-    Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor
-    1/r.
-    """
+    """The displacement basis of a mesh; quadrature is exact on parallelepipeds but for 1/r."""
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
     order = 2 if simplex and not axisymmetric else 2 * degree + axisymmetric
@@ -108,22 +93,13 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
 
 
 def forget(mapping: skfem.mapping.Mapping) -> None:
-    """Free the Jacobians that scikit-fem keeps of all elements it was asked for.
-
-    They take a quarter of the memory of the stiffness, and nothing asks for them again.
-
-    Parameters
-    ----------
-    mapping : Of a mesh.
-    """
+    """Free the Jacobians that scikit-fem keeps: a quarter of the stiffness's memory."""
     getattr(mapping, "_cache", {}).clear()
 
 
 class LeanBasis(skfem.CellBasis):
-    """A CellBasis, with quadrature of an order, that evaluates each shape function when it is asked
-    for.
-
-    The values of all shape functions would take more memory than the stiffness matrix.
+    """A CellBasis that evaluates each shape function when it is asked for: the values of all would
+    take more memory than the stiffness matrix.
     """
 
     def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
@@ -133,9 +109,7 @@ class LeanBasis(skfem.CellBasis):
         self.basis = _Shapes(element, self.mapping, self.X, self.Nbfun)
 
     def _volumes(self) -> np.ndarray:
-        """Volume per reference volume, elements by quadrature points; InputError for an element
-        that is flat or folds over.
-        """
+        """Volume per reference volume (element, point); InputError for a flat or folded element."""
         bad = np.zeros(self.nelems, dtype=bool)
         with np.errstate(all="ignore"):
             try:
@@ -172,9 +146,7 @@ class _Shapes(Sequence[Any]):
 
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
-    """The unknowns of every node (dim, N / dim) of a displacement basis; the vertices of the mesh
-    come first.
-    """
+    """The unknowns (dim, N / dim) of every node of a basis, vertices first."""
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
@@ -182,10 +154,8 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
 def contact_trace(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: Weight, tied: bool = False
 ) -> Trace:
-    """The trace of the displacement on a boundary, given by the numbers (f,) of its facets.
-
-    degree is that of the basis, weight the measure of the integrals as for `weight_at`. If `tied`,
-    every node of the boundary is a contact, as where it is tied to another body.
+    """The trace of the displacement on a boundary of facets (f,), with the measure `weight`. If
+    `tied`, every node of the boundary is a contact, as where it is tied to another body.
     """
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
@@ -232,18 +202,7 @@ def contact_trace(
 def face_nodes(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the nodes and the normals of the faces of a boundary.
-
-    Parameters
-    ----------
-    basis : The displacement basis of the body.
-    degree : Its degree, 1 or 2.
-    boundary : (f,) numbers of the facets of the mesh.
-
-    Returns
-    -------
-    Nodes (f, j) of each face, corners first in cyclic order, and mean outward normals (dim, f).
-    """
+    """Nodes (f, j) of a boundary's faces, corners first and cyclic; outward normals (dim, f)."""
     name = basis.mesh.refdom.__name__
     shape, places = SHAPES[name][1][degree](), FACES[name][2]
     if degree == 1:
@@ -255,9 +214,7 @@ def face_nodes(
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, Rule]:
-    """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one
-    rule per cell.
-    """
+    """Hat functions (v, point) on a cell, and the reference face's rule of one rule per cell."""
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])
@@ -268,10 +225,8 @@ def _cell_rule(
 def _face_basis(
     mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: Rule
 ) -> skfem.FacetBasis:
-    """FacetBasis that finds the places on the elements to what rounding of the coordinates allows.
-
-    scikit-fem asks Newton's iteration for 1e-12 of an element, out of reach where elements are
-    small beside their distance from the origin.
+    """FacetBasis that finds the places on elements to the rounding of the coordinates; scikit-fem
+    asks for 1e-12 of an element, out of reach for small elements far from the origin.
     """
     mapping = mesh._mapping()
     if not isinstance(mapping, skfem.MappingAffine):
@@ -287,9 +242,7 @@ def _face_basis(
 def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and
-    these nodes.
-    """
+    """Values (face, j, point) of the face's shape functions at `at`, and their nodes."""
     nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     # Of the element's shape functions, the one of a node is that which is 1 there.
     local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)

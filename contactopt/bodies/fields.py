@@ -89,32 +89,14 @@ class Validity(NamedTuple):
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Compute the von Mises stress.
-
-    Parameters
-    ----------
-    stress : (m, 4 or 6) stresses, whose first three columns are the normal ones.
-
-    Returns
-    -------
-    (m,) their von Mises stress.
-    """
+    """The von Mises stress (m,) of stresses (m, 4 or 6), normal components first."""
     normal, shear = stress[:, :3], stress[:, 3:]
     deviator = normal - normal.mean(axis=1, keepdims=True)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))
 
 
 def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
-    """Differentiate the von Mises stress.
-
-    Parameters
-    ----------
-    stress : (m, 4 or 6) as for `von_mises`.
-
-    Returns
-    -------
-    (m, 4 or 6) derivatives by the components; 0 where there is no stress.
-    """
+    """The derivatives of the von Mises stress by these components; 0 where there is no stress."""
     normal, size = stress[:, :3], von_mises(stress)[:, None]
     slopes = np.concatenate(
         [1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1

@@ -67,10 +67,6 @@ class HalfSpaceBody(AssembledBody, Body):
     def unknowns(self) -> int:
         return int(np.prod(self.grid)) * len(self.components)
 
-    @cached_property
-    def interface_unknowns(self) -> int:
-        return self.unknowns
-
     @property
     def cell(self) -> float:
         """Area of a cell [length^2]."""
@@ -78,9 +74,7 @@ class HalfSpaceBody(AssembledBody, Body):
 
     @cached_property
     def kernel(self) -> Kernel:
-        """The compliance as a convolution, in components n, t1[, t2] with n along the last
-        component and t1 along the first.
-        """
+        """The compliance as a convolution, in components n, t1[, t2] with n the last one."""
         make = _periodic if self.part.periodic else _infinite
         grid_kernel = make(self)
         return grid_kernel.scaled(1 / self.thickness) if len(self.grid) == 1 else grid_kernel
@@ -215,9 +209,7 @@ class HalfSpaceBody(AssembledBody, Body):
     def material_change(
         self, constant: str, U: np.ndarray, force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The compliance is a polynomial of second degree in nu over E: central differences by nu
-        are exact.
-        """
+        """C is quadratic in nu, over E: central differences by nu are exact."""
         E, nu = self.part.material.E, self.part.material.nu
         change = np.zeros(len(U))
         if constant == "E":
@@ -244,9 +236,7 @@ class HalfSpaceBody(AssembledBody, Body):
         return float(force @ self._compliance_product(force)[: self.unknowns]) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """What keeps the body in equilibrium with the contact forces; it acts on the body as a
-        whole.
-        """
+        """What keeps the body in equilibrium; it acts on the body as a whole."""
         m, dim = self.unknowns, len(self.components)
         return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
 
@@ -313,9 +303,7 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
 def assemble_half_space(
     scene: Scene, part: HalfSpace, elements: int, zone: float | None
 ) -> HalfSpaceBody:
-    """A half-space on its grid, which `elements` and `zone` may resolve; the upper body fills the
-    upper half. InputError in an axisymmetric scene and in one with mirror images.
-    """
+    """A half-space on its grid; InputError in an axisymmetric or mirrored scene."""
     if scene.kind == "axisymmetric" or scene.copies > 1:
         raise InputError(
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with"

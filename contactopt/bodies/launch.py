@@ -1,6 +1,4 @@
-"""Ranks started by the command line itself, on the cores of this machine, and watched until they
-end.
-"""
+"""Ranks started by the command line itself, and watched until they end."""
 
 from __future__ import annotations
 
@@ -73,10 +71,7 @@ def _tell(sentence: str) -> None:
 
 
 def _watched(command: list[str], environment: dict[str, str]) -> int:
-    """The exit code of mpiexec.
-
-    A rank that somebody stopped is waited for with a word, and ended after PATIENCE.
-    """
+    """The exit code of mpiexec; a rank that was stopped is waited for, and ended after PATIENCE."""
     import psutil
 
     since: dict[int, float] = {}  # number of a stopped process -> when that was first seen
@@ -104,10 +99,7 @@ def _watched(command: list[str], environment: dict[str, str]) -> int:
 
 
 def mpiexec(ranks: int) -> list[str]:
-    """The beginning of a command that runs on several ranks of this machine.
-
-    InputError where MPI is missing, and for more ranks than PER_CORE on each core.
-    """
+    """The beginning of a command on several ranks; InputError without MPI, or beyond PER_CORE."""
     check_count("the number of ranks", ranks)
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1

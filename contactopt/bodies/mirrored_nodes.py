@@ -1,10 +1,6 @@
-"""Where the mirror image of a body goes on beyond its surface: on planes that are held along their
-normal alone.
-
-In a scene of several copies these are the planes of symmetry. No shear acts on such a plane, and no
-displacement crosses it. So displacement and stress go on beyond it as their own mirror images, and
-a recovered stress may look there from both sides: its shear across the plane is zero, and not what
-the elements on the one side show.
+"""Where the mirror image of a body goes on beyond its surface: on planes of symmetry, which are
+held along their normal alone. No shear acts there, and a recovered stress may look from both sides:
+its shear across the plane is zero, and not what the elements on the one side show.
 """
 
 from __future__ import annotations
@@ -21,11 +17,8 @@ FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 def mirrored_nodes(
     scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray
 ) -> np.ndarray:
-    """Nodes in planes across an axis beyond which the body goes on as its mirror image.
-
-    Returns (dim, nodes) whether a node lies in a plane across that axis on which nothing else than
-    the displacement along this axis is held (n,), and no traction acts; none where the scene has no
-    copies.
+    """(dim, nodes) whether a node lies in a plane across that axis on which nothing else than the
+    displacement along it is held (n,), and no traction acts; none where the scene has no copies.
     """
     mesh, unknowns = basis.mesh, node_unknowns(basis)
     names = list(scene.surfaces_of(part))

@@ -57,9 +57,7 @@ class Motions:
 
 
 def rigid_fields(x: np.ndarray) -> np.ndarray:
-    """All rigid motions of points x (dim, k) as displacements (dim, k, m): translations of length
-    one, then rotations about the middle of the points, which move the furthest of them by one.
-    """
+    """Rigid motions (dim, k, m) of points: unit translations, then rotations about the middle."""
     dim = len(x)
     made = np.zeros((*x.shape, dim * (dim + 1) // 2))
     made[range(dim), :, range(dim)] = 1.0
@@ -78,11 +76,8 @@ def _planes(dim: int) -> list[tuple[int, int]]:
 def free_motions(
     kind: str, components: tuple[str, ...], basis: skfem.CellBasis, held: np.ndarray, weight: Weight
 ) -> Motions:
-    """The rigid motions of a body that leave all held unknowns (n,) at rest.
-
-    kind and components are those of the scene; basis and weight are the displacement basis of n
-    unknowns and the measure of its integrals (contactopt.bodies.elements.weight_at). In an
-    axisymmetric scene there is one motion, along the axis.
+    """The rigid motions of a body that leave all held unknowns (n,) at rest, with inertia by the
+    measure `weight`; where axisymmetric, the one along the axis.
     """
     unknowns = node_unknowns(basis)
     x = basis.doflocs[:, unknowns[0]]
@@ -106,9 +101,7 @@ def free_motions(
 
 def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
     """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, with their
-    names.
-
-    A translation or rotation that is free by itself is a column of its own.
+    names; translations and rotations that are free by themselves are columns of their own.
     """
     count = len(labels)
     values, vectors = np.linalg.eigh(held.T @ held)
@@ -141,9 +134,7 @@ def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.nd
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
-    """Check that the stiffness A (n, n) of a body does not resist its free motions, because of the
-    rounding of extreme coordinates.
-    """
+    """Refuse a stiffness (n, n) that resists its free motions, by rounding of coordinates."""
     if not len(motions.names):
         return
     error = np.abs(A @ motions.fields).max(axis=0) / (

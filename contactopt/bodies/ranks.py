@@ -1,13 +1,10 @@
 """Processes that MPI started: rank 0 runs the program, the others keep objects for it and act on
 them.
 
-Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. Or
-the result stays on its rank, and rank 0 holds a Kept that stands for it in later orders; then no
-message comes back. Every rank follows its orders one after the other. All messages are counted with
-their bytes.
-
-Whoever waits for a message sleeps between two looks, so that ranks that share a core do not take it
-from each other.
+Rank 0 sends an order, a function with its arguments, and receives what it returned or raised; or
+the result stays, and rank 0 holds a Kept for later orders, without a message back. Every rank
+follows its orders one after the other; all messages are counted. Whoever waits sleeps between two
+looks, so that ranks that share a core do not take it from each other.
 """
 
 from __future__ import annotations
@@ -132,10 +129,7 @@ class Team:
         return end
 
     def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
-        """What stands for the result of a function, which stays on its rank.
-
-        Nobody waits for it: whoever uses it learns of an exception.
-        """
+        """What stands for a function's result, or its exception, on its rank."""
         kept = Kept(rank, self._next_number())
         self._order(rank, (None, function, arguments), kept.number)
         weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
@@ -161,9 +155,7 @@ class Team:
             return self._number
 
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
-        """Send without waiting; the bytes are kept until they have arrived. InputError once the
-        ranks were dismissed.
-        """
+        """Send without waiting, bytes kept until arrival; InputError after dismissal."""
         if self._dismissed:
             raise InputError(
                 "the ranks that hold the bodies of this result were dismissed; ask before, or run"
@@ -192,18 +184,8 @@ class RemotePart(Part):
 
 
 def spread(scene: Scene, team: Team) -> Scene:
-    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on.
-
+    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on, as RemotePart.
     All other bodies stay on rank 0.
-
-    Parameters
-    ----------
-    scene : The scene, which stays as it is.
-    team : The ranks.
-
-    Returns
-    -------
-    The scene with RemotePart in place of the bodies on other ranks.
     """
     elastic = list(scene.meshed)
 
@@ -245,9 +227,7 @@ def serve(comm: Any) -> None:
 
 
 def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """What the function makes of its arguments, or the exception: its own, or that which an
-    argument should have been.
-    """
+    """What the function makes of its arguments, or its exception or that of an argument."""
     found = [kept[item.number] if isinstance(item, _Reference) else item for item in arguments]
     for item in found:
         if isinstance(item, Raised):
@@ -268,9 +248,7 @@ def _portable(error: Exception) -> Exception:
 
 
 def shipped(message: Any) -> bytes:
-    """Pack anything as bytes: functions without a name, such as those that make meshes, travel by
-    their code.
-    """
+    """Pack anything as bytes; functions without a name travel by their code."""
     import cloudpickle
 
     return bytes(cloudpickle.dumps(message))

@@ -1,9 +1,5 @@
-"""A body on another rank: what rank 0 knows of it are the displacement unknowns of its contact
-surfaces.
-
-The body itself, its mesh, its stiffness and its solver stay on their rank. Here its unknowns are
-only those m of the nodes of its contact surfaces, in the order in which the body itself numbers
-them. Contact forces go there, and displacements of these unknowns come back. A displacement of the
+"""A body on another rank, where it stays with its mesh, stiffness and solver. Here its unknowns are
+only those m of the nodes of its contact surfaces, in the order of the body. A displacement of the
 whole body is kept on its rank and stands here as a Field.
 """
 
@@ -170,9 +166,7 @@ class RemoteEquilibrium:
 
 
 def _sendable(value: Any) -> Any:
-    """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it
-    is.
-    """
+    """An argument as its rank takes it: a vector there, forces on contacts, or the same."""
     if isinstance(value, Field):
         return value.kept
     return resident.Forces(value) if isinstance(value, np.ndarray) else value
@@ -283,9 +277,7 @@ class RemoteBody(Remote, Body):
 
 @dataclass(frozen=True, eq=False)
 class RemoteStressMap(Remote):
-    """A contactopt.bodies.stress_recovery.StressMap on the rank of its body, with its places and
-    sources here.
-    """
+    """A StressMap on the rank of its body, with its places and sources here."""
 
     body: Kept
     places: np.ndarray
@@ -324,10 +316,6 @@ class AssembledRemote(Remote, AssembledBody):
     @cached_property
     def unknowns(self) -> int:
         return int(self._ask("unknowns"))
-
-    @cached_property
-    def interface_unknowns(self) -> int:
-        return int(self._ask("interface_unknowns"))
 
     @cached_property
     def work(self) -> Work:

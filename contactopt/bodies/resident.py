@@ -1,7 +1,5 @@
-"""An elastic body on its rank: what rank 0 orders of it (contactopt.bodies.remote).
-
-Its contact unknowns m are those of the nodes of its contact surfaces, in the order in which the
-body numbers them.
+"""An elastic body on its rank: what rank 0 orders of it (contactopt.bodies.remote). Its m contact
+unknowns are those of the nodes of its contact surfaces, in the order of the body.
 """
 
 from __future__ import annotations
@@ -46,9 +44,7 @@ class AssembledResident(AssembledElastic):
         return np.sort(self.body.contact_dofs, axis=None)
 
     def shipped_surface(self, name: str | None) -> bytes:
-        """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the
-        contact surfaces alone.
-        """
+        """The surface and its mesh by the contact unknowns and nodes alone."""
         body, skin, whole = self.body, self.skin, self.surface(name)
         place = np.full(len(body.load), -1)
         place[skin] = np.arange(len(skin))

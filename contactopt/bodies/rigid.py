@@ -29,14 +29,12 @@ FLAT = 1e-3  # normals of a surface that differ by less than this are one direct
 
 @dataclass(frozen=True, eq=False)
 class RigidBody(AssembledBody, Body):
-    """A rigid body of a scene with the components of its displacement; it needs no preparation, so
-    it is both stages.
-    """
+    """A rigid body; it needs no preparation, so it is both stages."""
 
     part: Rigid
     components: tuple[str, ...]
 
-    unknowns = interface_unknowns = 0
+    unknowns = 0
     meshed = False
 
     @cached_property
@@ -99,9 +97,8 @@ class RigidBody(AssembledBody, Body):
         return surface, gap
 
     def _check_side(self, other: Surface, facing: np.ndarray, gap: np.ndarray) -> None:
-        """Refuse a normal that points away from the other body where the bodies are nearest.
-
-        `facing` (k,) is the cosine between the normal and the one that the other body suggests.
+        """Refuse a normal away from the other body where they are nearest; `facing` (k,) is its
+        cosine with the normal that the other body suggests.
         """
         nearest = gap <= gap.min(initial=np.inf) + NEAREST * float(np.max(np.abs(gap), initial=0.0))
         if (
@@ -115,9 +112,7 @@ class RigidBody(AssembledBody, Body):
             )
 
     def _gap(self, other: Surface) -> np.ndarray:
-        """The initial gap at the contacts from that at the nodes, by the weights of the
-        displacements.
-        """
+        """The initial gap at the contacts from that at the nodes, by their weights."""
         if other.mesh is None:  # its points lie in a plane, its places on the surface
             height = np.sum(other.normals * (other.places - other.points), axis=0)
             if self.part.gap is None:

@@ -70,10 +70,8 @@ def isotropic_stiffness(
 def _element_matrices(
     basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: Weight
 ) -> np.ndarray:
-    """Stiffness of some elements, (element, i, a, j, b) for component a of node i and b of node j.
-
-    With g_ia the derivative of shape function i along a, the entry is the integral of lambda g_ia
-    g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all elements.
+    """Element stiffness (element, i, a, j, b) as one product: the integral of lambda g_ia g_jb + G
+    g_ib g_ja + G (g_i . g_j) delta_ab, with g_ia the derivative of N_i by a.
     """
     lam, shear = constants
     mapping, places, shape = basis.mapping, basis.X, basis.elem.elem
@@ -113,9 +111,7 @@ def _node_graph(nodes: np.ndarray, count: int) -> sp.csr_matrix:
 
 
 def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
-    """Integrals of f_ia f_jb: f (element, i, a, point), measure (element, point) -> (element, i, a,
-    j, b).
-    """
+    """Integrals of f_ia f_jb (element, i, a, j, b), from f (element, i, a, point)."""
     flat = f.reshape(len(f), -1, f.shape[3])
     return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(
         *f.shape[:3], *f.shape[1:3]

@@ -25,22 +25,11 @@ PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2)
 
 
 def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]) -> np.ndarray:
-    """Compute the stress tensors below the points of a half-space.
+    """Stress tensors (j, n0[, n1], 3, 3) below the points of a half-space at depths (j,), in the
+    axes of the scene [stress].
 
-    Parameters
-    ----------
-    body : The half-space; not a periodic one.
-    force : (k, dim) forces on its points in its components [force].
-    depths : (j,) depths below the surface [length], at least half a spacing.
-
-    Returns
-    -------
-    (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid
-    [stress]. In plane strain the third axis is that across the plane.
-
-    Raises
-    ------
-    InputError : For a periodic surface and for depths that are too small.
+    The forces (k, dim) are in the components of the body. In plane strain the third axis is that
+    across the plane. InputError for a periodic surface and for depths of less than half a spacing.
     """
     if body.part.periodic:
         raise InputError(
@@ -69,24 +58,13 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Compute von Mises stresses.
-
-    Parameters
-    ----------
-    stress : (..., 3, 3) stress tensors [stress].
-
-    Returns
-    -------
-    (...) von Mises stresses [stress].
-    """
+    """The von Mises stresses (...) of stress tensors (..., 3, 3)."""
     deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1))))
 
 
 def _coefficients(body: HalfSpaceBody, padded: tuple[int, ...], depth: float) -> np.ndarray:
-    """(stress component, loaded component, *padded) stress per unit of force, at the distances of a
-    circulant.
-    """
+    """Stress per force at a circulant's distances: (stress component, loaded one, *padded)."""
     offsets = [np.fft.fftfreq(m, 1 / m) for m in padded]
     out, longer = _mean(body, offsets, depth, COARSE), max(body.spacing)
     if depth >= NEAR * longer:
@@ -116,9 +94,8 @@ def _mean(body: HalfSpaceBody, offsets: list[np.ndarray], depth: float, points: 
 
 
 def flamant(x: np.ndarray, z: float) -> np.ndarray:
-    """Stresses xx, zz and xz (3, 2, ...) under unit line forces along x and into the body, at
-    places x of any shape along the surface and the depth z [1 / length]. Source: Johnson (1985),
-    sections 2.2, 2.3.
+    """Stresses xx, zz, xz (3, 2, ...) at x and depth z under unit line forces along x and into the
+    body [1 / length]. Source: Johnson (1985), sections 2.2, 2.3.
     """
     square = x**2 + z**2
     radial = [-2 / np.pi * x / square**2, -2 / np.pi * z / square**2]
@@ -128,9 +105,8 @@ def flamant(x: np.ndarray, z: float) -> np.ndarray:
 
 
 def boussinesq_cerruti(x: np.ndarray, y: np.ndarray, z: float, nu: float) -> np.ndarray:
-    """Stresses xx, yy, zz, xy, xz and yz (6, 3, ...) under unit point forces along x, y and into
-    the body, at places x, y along the surface and the depth z > 0 [1 / length^2]. Sources: Johnson
-    (1985), sections 3.2 and 3.6.
+    """Stresses xx, yy, zz, xy, xz, yz (6, 3, ...) at x, y and depth z > 0 under unit point forces
+    along x, y and into the body [1 / length^2]. Sources: Johnson (1985), sections 3.2 and 3.6.
     """
     x, y = np.broadcast_arrays(x, y)
     rho = np.sqrt(x**2 + y**2 + z**2)

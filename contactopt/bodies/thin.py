@@ -32,9 +32,7 @@ THIN = 20.0  # bodies softer than this many times such a ground are thin
 
 
 def volumes(body: Assembly) -> np.ndarray:
-    """The volume (n,) of the elements shared out to their unknowns, with the measure of the
-    integrals [length^3].
-    """
+    """The volume (n,) of the elements shared out to their unknowns [length^3]."""
     basis = body.basis
     measure = weight_at(body.weight, np.asarray(basis.global_coordinates()))
     volume = np.sum(basis.dx * measure, axis=1)
@@ -43,11 +41,9 @@ def volumes(body: Assembly) -> np.ndarray:
 
 
 def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether a body resists some displacement little more than a ground of its own material would.
-
-    relieved takes nodal forces (n,) to the displacements (n,) that they make. The least eigenvalue
-    of A U = lambda M U, which one step of inverse iteration finds within a factor where it is far
-    below the others, is below 20 p: so it is for layers up to about a thirtieth of their width.
+    """Whether a body resists some displacement little more than a ground of its own material would:
+    the least eigenvalue of A U = lambda M U, by one step of inverse iteration with `relieved`,
+    forces -> displacements (n,), is below 20 p, as for layers up to a thirtieth of their width.
     """
     M = volumes(body)
     forces = M * np.random.default_rng(0).standard_normal(len(body.load))
@@ -57,9 +53,7 @@ def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> boo
 
 
 def _per_volume(body: Assembly, M: np.ndarray, modulus: float) -> float:
-    """p: a small share of the stiffness of a block of a modulus on the contact surface, as high as
-    the body is wide.
-    """
+    """p: a small share of the stiffness of a block on the surface, as high as wide."""
     surface = max(float(trace.areas.sum()) for trace in body.traces.values())
     size = float(np.ptp(body.locations, axis=1).max())
     return SHARE * modulus * surface * len(body.unknowns) / (size * float(M.sum()))

@@ -1,6 +1,4 @@
-"""From reactions back to the bodies: displacements by the reduction, and stresses by the fields of
-each body (paper, eq (13)).
-"""
+"""From reactions back to the bodies: displacements and stresses (paper, eq (13))."""
 
 from __future__ import annotations
 

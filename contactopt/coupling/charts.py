@@ -1,8 +1,5 @@
-"""The contact surface's own coordinates and local frames, laid out from the surface itself.
-
-Neither depends on how the bodies lie in space: everything is derived from contact normals, from the
-cells that join the contacts, from planes of symmetry and from the distribution of the areas. A body
-that is turned takes its chart and its frames along.
+"""The contact surface's own coordinates and local frames, laid out from contact normals, cells,
+planes of symmetry and areas alone: a body that is turned takes them along.
 """
 
 from __future__ import annotations
@@ -56,11 +53,8 @@ def lay_out(
 def _line(
     contacts: ContactPoints, tangents: np.ndarray, planes: list[SymmetryPlane], mirrors: bool
 ) -> tuple[np.ndarray, tuple[bool, ...], float | None]:
-    """Arc length (1, k) along t1, whether it is mirrored at 0, and its period if the line is
-    closed.
-
-    It is measured from an end in a plane of symmetry, otherwise from the middle; on a closed line
-    from the contact with the least gap.
+    """Arc length (1, k) along t1, whether it is mirrored at 0, and the period of a closed line:
+    from an end in a plane of symmetry, else from the middle or, if closed, the least gap.
     """
     chains, period = _chains(contacts, tangents)
     place = np.zeros(contacts.points.shape[1])
@@ -84,9 +78,7 @@ def _line(
 def _chains(
     contacts: ContactPoints, tangents: np.ndarray
 ) -> tuple[list[tuple[np.ndarray, np.ndarray]], float | None]:
-    """The pieces of the contact line in their order, each as contacts and the steps between them;
-    the period of a loop.
-    """
+    """The pieces of the contact line, each as contacts and steps; the period of a loop."""
     k = contacts.points.shape[1]
     following, length = np.full(k, -1), np.zeros(k)
     step = _steps(contacts.points, tangents, *contacts.cells)
@@ -116,9 +108,7 @@ def _walk(following: np.ndarray, start: int) -> np.ndarray:
 
 
 def _steps(points: np.ndarray, tangents: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """From the contacts i to the contacts j along the mean of their tangents; on a circle this is
-    the chord.
-    """
+    """From contacts i to contacts j along their mean tangents; the chord on a circle."""
     mean, chord = tangents[:, i] + tangents[:, j], points[:, j] - points[:, i]
     size, along = np.linalg.norm(mean, axis=0), np.sum(mean * chord, axis=0)
     return np.where(size > NEAR, along / np.maximum(size, NEAR), np.linalg.norm(chord, axis=0))
@@ -130,11 +120,9 @@ def _least(gap: np.ndarray, size: float) -> int:
 
 
 def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndarray, np.ndarray]:
-    """Two orthogonal directions (3,) of a surface, right-handed with its normal.
-
-    Planes of symmetry give them: both point into the bodies. One such plane gives the second.
-    Without any the first is the direction in which the areas spread most, or, where they spread
-    evenly, that of the longest edge of the rim.
+    """Two orthogonal directions (3,) of a surface, right-handed with its normal: into the bodies
+    from planes of symmetry; without any, the first is that in which the areas spread most, or else
+    that of the longest edge of the rim.
     """
     n = _mean_normal(contacts)
     inward = [plane.inward - (plane.inward @ n) * n for plane in planes]
@@ -160,10 +148,8 @@ def _mean_normal(contacts: ContactPoints) -> np.ndarray:
 
 
 def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
-    """The first direction of a surface without planes of symmetry.
-
-    Its sense is that in which the areas reach further, or, where they reach equally far, that of
-    the first contact.
+    """The first direction of a surface without planes of symmetry, in the sense in which the areas
+    or else the first contact reach further.
     """
     points, areas = contacts.points, contacts.areas
     centred = points - (points @ areas / areas.sum())[:, None]
@@ -183,9 +169,7 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
 
 
 def _rim_direction(contacts: ContactPoints) -> np.ndarray:
-    """Along the longest edge of the rim, which belongs to one cell only; the first of those that
-    are equally long.
-    """
+    """Along the longest edge of the rim, whose edges belong to one cell only."""
     corners = contacts.cells
     edges = np.concatenate([corners[[i, i - 1]] for i in range(len(corners))], axis=1)
     known, count = np.unique(np.sort(edges, axis=0), axis=1, return_counts=True)
@@ -201,9 +185,7 @@ def _plane(
     planes: list[SymmetryPlane],
     mirrors: bool,
 ) -> tuple[np.ndarray, tuple[bool, ...]]:
-    """Coordinates (2, k) along the axes, from planes of symmetry or from the middle, and which of
-    them are mirrored.
-    """
+    """Coordinates (2, k) along the axes, and which of them are mirrored."""
     places, mirrored = np.stack(axes) @ contacts.points, []
     for axis, row in zip(axes, places):
         across = [p for p in planes if abs(axis @ p.inward) > 1 - NEAR]
@@ -216,9 +198,7 @@ def _plane(
 
 
 def _rank(row: np.ndarray, size: float) -> np.ndarray:
-    """(k,) numbers of the rows that values belong to; neighbours closer than rounding belong to
-    one.
-    """
+    """(k,) the row that each value belongs to; neighbours closer than rounding share one."""
     order = np.argsort(row)
     rank = np.empty(len(row), dtype=int)
     rank[order] = np.concatenate([[0], np.cumsum(np.diff(row[order]) > RANK * size)])
@@ -226,9 +206,7 @@ def _rank(row: np.ndarray, size: float) -> np.ndarray:
 
 
 def _frames(normals: np.ndarray, axes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Rows n, t1, t2 at each contact: t1 is the first direction made orthogonal to n, or the second
-    where n is close to it.
-    """
+    """Rows n, t1, t2: t1 is the first direction made orthogonal to n, or the second near n."""
     n = normals.T
     steep = np.abs(n @ axes[0]) > STEEP
     towards = np.where(steep[:, None], axes[1], axes[0])

@@ -13,12 +13,7 @@ from contactopt.coupling.coupling import Coupling
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import each
 from contactopt.linear.convolution import Convolution
-from contactopt.linear.operators import (
-    Interface,
-    InterfaceOperator,
-    Product,
-    dense,
-)
+from contactopt.linear.operators import Interface, InterfaceOperator, Product, dense
 from contactopt.linear.saddle_point import BodyTerm, CoupledForm
 from contactopt.problem.chart import nodal_weights
 
@@ -40,9 +35,7 @@ def filling(maps: Maps) -> int:
 
 
 def _entries(bodies: Sequence[Body], maps: Maps) -> np.ndarray | sp.csr_array:
-    """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs
-    share no body.
-    """
+    """Q by its entries, symmetric to the last digit: sparse where most pairs share no body."""
     n = maps[0].shape[0]
     moving = _moving(bodies, maps)
     made = each(lambda term: term[0].compliance(term[1]), moving, _parallel(moving))
@@ -64,9 +57,7 @@ def _entries(bodies: Sequence[Body], maps: Maps) -> np.ndarray | sp.csr_array:
 def operator(
     bodies: Sequence[Body], maps: Maps, couplings: Sequence[Coupling]
 ) -> InterfaceOperator:
-    """Q by its products: a convolution where every body has one. Otherwise its diagonal is an
-    estimate, which takes one product.
-    """
+    """Q by its products: a convolution if every body has one, else with an estimated diagonal."""
     kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
     known = [kernel for kernel in kernels if kernel is not None]
     if known and len(known) == len(kernels):
@@ -110,9 +101,7 @@ def operator(
 
 
 def _before_condensation(bodies: Sequence[Body], maps: Maps) -> CoupledForm:
-    """Q from the equilibrium of the iterative bodies, at least one, all at once, and from products
-    with the others.
-    """
+    """Q from the equilibrium of the iterative bodies, and from products with the others."""
     terms: list[BodyTerm] = []
     others = []
     for body, B in zip(bodies, maps):
@@ -132,9 +121,7 @@ def _before_condensation(bodies: Sequence[Body], maps: Maps) -> CoupledForm:
 
 
 def _moving(bodies: Sequence[Body], maps: Maps) -> list[tuple[Body, sp.csr_matrix, np.ndarray]]:
-    """The bodies that contact forces move, with the rows of their maps that are needed, and which
-    rows of Q these are.
-    """
+    """The bodies that contact forces move, their maps' needed rows, and these rows of Q."""
     needed = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
     return [(body, B[rows], rows) for body, B, rows in needed]
 
@@ -144,9 +131,7 @@ def _parallel(moving: list[tuple[Body, sp.csr_matrix, np.ndarray]]) -> list[bool
 
 
 def _rows(B: sp.csr_matrix) -> np.ndarray:
-    """The rows of a map that are not empty; all of them where most are not, so that nothing needs
-    to be picked out.
-    """
+    """The rows of a map that are not empty; all of them where most are not."""
     filled = np.flatnonzero(np.diff(B.indptr))
     return filled if 4 * len(filled) < 3 * B.shape[0] else np.arange(B.shape[0])
 
@@ -154,21 +139,13 @@ def _rows(B: sp.csr_matrix) -> np.ndarray:
 def estimate_diagonal(
     product: Product, weights: Sequence[np.ndarray], moves: np.ndarray
 ) -> np.ndarray:
-    """The diagonal of Q from one product with a column for each pair of surfaces.
+    """The diagonal (k dim,) of Q from one product with a column for each pair of surfaces; exactly
+    0 outside the mask `moves`.
 
     The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared
-    out by the weights. Each pair has signs of its own: a thin body between two pairs moves one of
-    them by forces on the other as far as by its own, and such a share may be negative.
-
-    Parameters
-    ----------
-    product : The product with Q.
-    weights : (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
-    moves : (k dim,) mask of the components that can move.
-
-    Returns
-    -------
-    array (k dim,) : The estimate [length / force], 0 where a component cannot move.
+    out by its weights, those of `nodal_weights`. Each pair has signs of its own: a thin body
+    between two pairs moves one of them by forces on the other as far as by its own, and such a
+    share may be negative.
     """
     dim = len(moves) // max(sum(len(own) for own in weights), 1)
     ends = np.cumsum([0, *(dim * len(own) for own in weights)])

@@ -22,11 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody
-from contactopt.coupling.planes_of_symmetry import (
-    ContactPoints,
-    SymmetryPlane,
-    symmetry_planes,
-)
+from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law, Place, make_law
@@ -90,16 +86,8 @@ def couple(
 ) -> Coupling:
     """Make the coupling of a pair of surfaces of two assembled bodies.
 
-    Parameters
-    ----------
-    scene, pair : The scene and one of its pairs.
-    upper, lower : Its bodies.
-    kind : A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes
-        where they match, or where a body has no mesh, and otherwise mortar.
-
-    Returns
-    -------
-    The contacts, and the maps from the bodies' displacements to theirs. InputError for an unknown
+    `kind` is a name in COUPLINGS or 'auto', by default that of the pair. 'auto' is matching nodes
+    where they match, or where a body has no mesh, and otherwise mortar. InputError for an unknown
     kind, and for surfaces that this kind cannot couple.
     """
     kind = kind or pair.coupling
@@ -137,9 +125,7 @@ def of_contacts(
     maps: tuple[sp.csr_matrix, sp.csr_matrix],
     share: np.ndarray | None = None,
 ) -> Coupling:
-    """The coupling at some contacts, from their chart, frames and order, and the maps in this
-    order.
-    """
+    """The coupling at contacts, from their chart, frames and order, and maps in this order."""
     chart, frames, order = laid_out
     gap, areas, places = points.gap[order], points.areas[order], points.points[:, order]
     cells = points.cells if chart.cells is None else chart.cells
@@ -151,11 +137,8 @@ def of_contacts(
 def local_map(
     traces: Sequence[sp.csr_matrix], contacts: np.ndarray, frames: np.ndarray
 ) -> sp.csr_matrix:
-    """T (k dim, n) from a body's unknowns to the displacement of contacts in their frames, with dim
-    rows for each contact.
-
-    `traces` has a matrix (m, n) for each component of the displacement of the surface's contacts,
-    `contacts` (k,) are the numbers of some of them, and `frames` (k, dim, dim) hold n, t1[, t2].
+    """T (k dim, n) from a body's unknowns to the displacement of the contacts (k,) of a surface in
+    their frames (k, dim, dim), from a trace (m, n) for each component in space.
     """
     k, dim = frames.shape[:2]
     shape = k * dim, traces[0].shape[1]

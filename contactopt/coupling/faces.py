@@ -86,9 +86,7 @@ class Faces:
 
     @cached_property
     def curved(self) -> bool:
-        """Whether a node on an edge or within a face lies off the linear interpolation of the
-        corners.
-        """
+        """Whether an inner node of a face lies off the linear interpolation of the corners."""
         count = self.corners
         hats = evaluate(FACES[self.kind][1], self.places)[0][:count, count:]
         nodes = self.points[:, self.faces]
@@ -98,9 +96,7 @@ class Faces:
 
     @cached_property
     def distorted(self) -> bool:
-        """Whether the map from the reference face is more than affine: no polynomial is one in the
-        other's coordinates.
-        """
+        """Whether the map from the reference face is more than affine."""
         nodes = self.points[:, self.faces]
         size = np.ptp(nodes, axis=2).max(axis=0)
         if self.curved or self.corners < 4:
@@ -123,9 +119,7 @@ class Faces:
         return evaluate(FACES[self.kind][1], local)[0]
 
     def locations(self, face: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (dim, m) on faces (m,) at reference coordinates (dim - 1, m), and tangents (dim,
-        dim - 1, m) there.
-        """
+        """Places (dim, m) on faces (m,) at reference points, tangents (dim, dim - 1, m) there."""
         element = _SHAPES[self.kind][1][self.degree] if self.curved else FACES[self.kind][1]
         N, slope = evaluate(element, at)
         place, tangents = np.zeros((self.dim, len(face))), np.zeros((self.dim, len(at), len(face)))
@@ -141,9 +135,7 @@ class Faces:
         return np.asarray(normal / np.linalg.norm(normal, axis=0))
 
     def mirrored(self, vectors: np.ndarray, nodes: np.ndarray | None = None) -> np.ndarray:
-        """Vectors (dim, k) at some nodes (k,), or at all, summed up with their mirror images: none
-        points out of its plane.
-        """
+        """Vectors (dim, k) at nodes (k,), or at all, summed with their mirror images."""
         if self.mirror is None:
             return vectors
         return np.where(self.mirror if nodes is None else self.mirror[:, nodes], 0.0, vectors)
@@ -156,9 +148,7 @@ class Faces:
         self, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray
     ) -> np.ndarray:
         """Reference coordinates (dim - 1, m) on faces (m,) where axes (m, dim - 1, dim) see the
-        points x (dim, m).
-
-        Newton's iteration from `start`; a single step is exact on affine faces.
+        points x (dim, m), by Newton's iteration from `start`; one step is exact on affine faces.
         """
         at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
         for _ in range(STEPS):
@@ -185,9 +175,7 @@ def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
 
 
 def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (j, m) of an element and their derivatives (j, dim - 1, m) at reference
-    coordinates (dim - 1, m).
-    """
+    """Shape functions (j, m) and derivatives (j, dim - 1, m) of an element at (dim - 1, m)."""
     both = [element.lbasis(at, j) for j in range(len(element.doflocs))]
     value = np.stack([np.broadcast_to(v, at.shape[1:]) for v, _ in both])
     slopes = [np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in both]
@@ -204,8 +192,8 @@ def faces_of(
     points: np.ndarray,
     curve: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Faces:
-    """The surface of faces whose nodes are `nodes` (f, j), with the sign of each that makes its
-    normal point out of the body, as the vectors `outward` (dim, f) do. The rest is as in Faces.
+    """The surface of faces with `nodes` (f, j) and normals like `outward` (dim, f); the rest as in
+    Faces.
     """
     made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
     return replace(made, turn=np.sign(np.sum(face_normals(made) * outward, axis=0)))
@@ -219,9 +207,7 @@ def face_normals(surface: Faces) -> np.ndarray:
 
 
 def cross(tangents: np.ndarray) -> np.ndarray:
-    """Normals (dim, m), as long as the surface is stretched, from its tangents (dim, dim - 1, m):
-    in 3D their cross product, in 2D the tangent turned clockwise.
-    """
+    """Normals (dim, m), as long as the surface is stretched, from tangents (dim, dim - 1, m)."""
     if len(tangents) == 2:
         return np.stack([tangents[1, 0], -tangents[0, 0]])
     return np.cross(tangents[:, 0], tangents[:, 1], axis=0)
@@ -229,9 +215,7 @@ def cross(tangents: np.ndarray) -> np.ndarray:
 
 def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
     """The polygons that stand for a face when surfaces are cut: their vertices (p, v) among its
-    nodes, and the linear cell (p,) in which each lies.
-
-    Those of the side with the multipliers (`own`) never reach over two of its cells.
+    nodes, and their linear cell (p,), over which they never reach where the side is `own`.
     """
     if surface.curved and surface.kind == "RefTet":
         return _QUARTERS, np.zeros(4, dtype=int)

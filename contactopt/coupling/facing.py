@@ -55,10 +55,8 @@ class Facets:
 
 
 def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray, np.ndarray]:
-    """All pairs of facets of which the first may see the second along its normals, on either side.
-
-    The normals of facets which face each other have a cosine below `facing`, at most zero. Returns
-    the numbers (j,) of the own and of the other facet of each pair, sorted by the own one.
+    """All pairs of facets of which the first may see the second along its normals, on either side:
+    numbers (j,) sorted by the own one. Facets face each other with a cosine below `facing` <= 0.
     """
     trees = [_tree(facets) for facets in (own, other)]
     first, second = np.zeros(1, dtype=int), np.zeros(1, dtype=int)
@@ -90,9 +88,8 @@ def _seen(own: Facets, other: Facets, facing: float) -> np.ndarray:
 
 def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
     """Clusters of every level, from one to as many as there are facets, and the facets of the last.
-
-    Cluster c of a level is halved, across its longest side, into 2 c and 2 c + 1 of the next one.
-    Some of the last level are empty: their radius is not a number, so that they are never seen.
+    Cluster c is halved, across its longest side, into 2 c and 2 c + 1 of the next level; those that
+    stay empty have the radius nan, so that they are never seen.
     """
     n = len(facets.radius)
     order, levels = np.arange(n), []
@@ -113,9 +110,7 @@ def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
 
 
 def _clusters(facets: Facets, centre: np.ndarray, start: np.ndarray, cluster: np.ndarray) -> Facets:
-    """Balls and cones of clusters of facets in their order: each begins at `start` and has its
-    `centre`; every facet belongs to a `cluster`.
-    """
+    """Balls and cones of clusters: each begins at `start`; `cluster` is that of each facet."""
     axis = np.add.reduceat(facets.axis, start, axis=1)
     length = np.linalg.norm(axis, axis=0)
     axis = np.where(length > 0, axis, facets.axis[:, start]) / np.where(length > 0, length, 1.0)

@@ -13,12 +13,9 @@ ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 
 
 def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The levers l_i (dim, k) [length] by which displacements are carried: the part of e_i that is
-    no gap, and a share of the gap. They are zero where they would be rounding alone.
-
-    The vectors e (dim, k) lead from where forces act on the other side to where they act on the own
-    one, the unit normals `up` (dim, k) are those along which e opens the gap (k,), and `sizes` (k,)
-    are those of the contacts' cells.
+    """The levers l_i (dim, k) [length]: the part of e_i that is no gap, and a share of the gap;
+    zero where they would be rounding alone. The vectors e (dim, k) lead from the other side to the
+    own one and open the gap (k,) along the unit normals `up`; `sizes` (k,) are those of the cells.
     """
     limit = SHARE * sizes
     lever = e - up * (gap - np.clip(gap, -limit, limit))
@@ -27,12 +24,11 @@ def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) ->
 
 
 def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
-    """Matrices [c][d] (k, n) from the component d of the displacement of a surface of n points to
-    the component c of omega_i x l_i at the contacts, which are its points `nodes` (k,).
+    """Matrices [c][d] (k, n) from the component d of the displacement of a surface to the component
+    c of omega_i x l_i at the contacts, its points `nodes` (k,).
 
-    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas
-    of the faces. In a plane of symmetry, where the mirror images of these faces count as well, it
-    turns about the normal of the plane alone.
+    omega_i is the mean rotation of the nodes of all faces around contact i, by the areas of the
+    faces; in a plane of symmetry it turns about the normal alone.
     """
     # Weight of node j around contact i: the sizes of the faces that hold both, summed.
     f, size = len(own.faces), own.points.shape[1]
@@ -54,9 +50,7 @@ def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[li
 def _rotations(
     around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray, about: np.ndarray
 ) -> list[list[sp.csr_matrix]]:
-    """As above, from the weights (k, n) of the nodes around every contact, and its axes (3, k); in
-    the plane, embedded in space.
-    """
+    """The same from the weights (k, n) of the nodes around every contact, and axes (3, k)."""
     dim, k = lever.shape
     w = sp.coo_matrix(around)
     active = w.data > 0

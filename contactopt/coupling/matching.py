@@ -73,9 +73,7 @@ def couple_nodes(
 def _laid_out(
     scene: Scene, lead: Surface, points: ContactPoints
 ) -> tuple[Chart, np.ndarray, np.ndarray]:
-    """Chart, frames and order of the contacts: those of a surface that knows its coordinates, or
-    else laid out.
-    """
+    """Chart, frames and order of the contacts, known to the surface or laid out."""
     n = points.normals
     along = np.all(np.abs(n) == np.abs(lead.normals)) and np.all(n == n[:, :1])
     if lead.chart is None or not along:
@@ -87,11 +85,9 @@ def _laid_out(
 
 
 def _match(upper: Surface, lower: Surface) -> np.ndarray:
-    """For every contact of the lower surface (k,) the number of its partner on the upper one.
-
-    Partners lie on one normal of the lower surface. If this finds no partners and the lower surface
-    nowhere turns away from its mean normal, partners on a common parallel to the mean normal are
-    accepted as well. InputError if there are none, or if the numbers of contacts differ.
+    """The partner on the upper surface of every lower contact (k,), on one normal of the lower
+    surface or, if it nowhere turns away from its mean normal, on a parallel to that. InputError if
+    there are none, or if the numbers of contacts differ.
     """
     k = lower.points.shape[1]
     if upper.points.shape[1] != k:
@@ -125,11 +121,7 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
 
 def _turn(surface: Surface) -> np.ndarray:
     """(k,) twice the largest difference between the normal at a contact and those next to it: a
-    bound on its error.
-
-    Normals are means over facets. Inside a smooth surface they are off by less than the turn from
-    one facet to the next, at its rim, where there is one facet only, by half of the facet's own
-    turn.
+    bound on the error of normals, which are means over facets.
     """
     turn, normals = np.zeros(surface.points.shape[1]), surface.normals
     for corner, other in permutations(surface.cells, 2):
@@ -144,11 +136,9 @@ def _along(
     """The partner (k,) of every lower contact along a direction (dim, k), its distance from that
     line, and what is allowed.
 
-    Each search starts at the nearest contact of the upper surface and moves along the line to the
-    height of the contact found, until it finds the same one again. Contacts that face the same way
-    as the lower one, on the far side of a pin in a bush, do not count. Where the search ends
-    further off than is allowed, all contacts of the upper surface are compared, up to the first
-    ones that have no partner among them either: then the surfaces do not match.
+    Each search starts at the nearest upper contact that does not face the same way and moves along
+    the line to the height of the contact found, until it finds the same again. Where that is too
+    far off, all upper contacts are compared, up to the first without a partner.
     """
     count = lower.points.shape[1]
     tree, height = KDTree(upper.points.T), np.zeros(count)

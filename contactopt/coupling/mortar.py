@@ -195,9 +195,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
 
 
 def _seen(other: Faces, weights: sp.csr_matrix) -> np.ndarray:
-    """Unit normals (dim, k) of the other side where it faces the contacts, by their weights (k,
-    nodes).
-    """
+    """Unit normals (dim, k) of the other side at the contacts, by their weights (k, nodes)."""
     normals = contact_normals(other)[0]
     # nodes that are no vertices of linear cells
     between = np.setdiff1d(np.arange(other.faces.shape[1]), other.cells)
@@ -248,9 +246,7 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def _alone(
     own: Faces, other: Faces, points: Overlap, nodes: np.ndarray, normals: np.ndarray
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The own node of every contact, and the shape functions of the other side at the place on its
-    normal.
-    """
+    """The own node of every contact, and the other side's shape functions on its normal."""
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
     x = own.points[:, nodes]

@@ -130,9 +130,7 @@ class _Dual:
         self.fit = _slopes(mass, self.area, self.whole)
 
     def functional(self, values: np.ndarray, block: slice, pairs: np.ndarray) -> np.ndarray:
-        """(pair, v, j) int psi_v f_j from values (j, g) at the points of a block, summed over those
-        of each pair of a cell and a face, which begin at `pairs`.
-        """
+        """(pair, v, j) int psi_v f_j from values (j, g) of a block, summed pair by pair."""
         c = self.cell[block]
         slopes = np.einsum("gvw,wg->vg", self.fit[c], self.centred[:, block])
         weighted = self.area[c].T * (1 / self.whole[c] + slopes) * self.measure[block]
@@ -142,10 +140,8 @@ class _Dual:
 def _contacts_of(
     dual: _Dual, full: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices of cells become contacts; those that are hardly covered pass their share on.
-
-    Returns the nodes (k,) of the contacts, the contact (cell, v) of every vertex, and of every
-    contact its area and whether a cell around it is covered in part only.
+    """The nodes (k,) of the contacts at the vertices of cells, of which those hardly covered pass
+    their share on; the contact (cell, v) of every vertex; area and `partial` of every contact.
     """
     nodes, rows = np.unique(dual.corners, return_inverse=True)
     rows = _pass_on(rows.reshape(dual.area.shape), dual.area, full[nodes])
@@ -158,9 +154,8 @@ def _contacts_of(
 
 
 def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest.
-
-    The force of the other surface's edge would be divided by an area as small as you like.
+    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest,
+    for an edge's force over an area as small as you like would be no pressure.
     """
     share = np.bincount(rows.ravel(), area.ravel(), len(full)) / full
     weak = (share < WEAK)[rows]
@@ -170,9 +165,7 @@ def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray
 
 
 def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """(cell, v, w) from the moments of a field with the centred hat functions to its fit at the
-    vertices, less its mean.
-    """
+    """(cell, v, w) from moments with the centred hat functions to the fit less its mean."""
     values, vectors = np.linalg.eigh(mass)
     large = values > SLIVER * whole[:, None]
     inverse = np.where(large, 1 / np.where(large, values, 1.0), 0.0)
@@ -185,17 +178,13 @@ def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray
 def collect(
     values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]
 ) -> sp.csr_matrix:
-    """The sparse matrix of values (pair, v, j) at rows (pair, v) and columns (pair, j); values at
-    the same place are added.
-    """
+    """The sparse matrix of values (pair, v, j) at rows (pair, v), columns (pair, j), summed."""
     rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
 def tidy(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Weights (k, n) without what is only rounding, whose rows add up to one exactly, whatever the
-    condition of a sliver.
-    """
+    """Weights (k, n) without rounding, whose rows add up to one exactly."""
     W = sp.csr_matrix(W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
     W.eliminate_zeros()

@@ -1,6 +1,4 @@
-"""Planes of symmetry, recognised by what supports hold or named by the scene: those that cut a
-contact surface, and those across which copies make the bodies whole.
-"""
+"""Planes of symmetry, recognised by what supports hold or named by the scene."""
 
 from __future__ import annotations
 
@@ -44,31 +42,18 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class SymmetryPlane:
-    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the
-    contacts.
-    """
+    """A plane that holds bodies along its normal only; `inward` (dim,) points to the contacts."""
 
     inward: np.ndarray
     offset: float
 
     def contains(self, points: np.ndarray, size: float) -> np.ndarray:
-        """Tell which points lie in the plane.
-
-        Parameters
-        ----------
-        points, size : Points (dim, k), and the size of the surface that they belong to [length].
-
-        Returns
-        -------
-        (k,) mask.
-        """
+        """Which of the points (dim, k), on a surface of that size [length], lie in the plane."""
         return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes across one component, at most one for each, on which exactly the tangential
-    displacement along it is held.
-    """
+    """The planes, at most one per component, on which exactly this component is held."""
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
         if not mask.any():
@@ -85,9 +70,7 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
 
 
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
-    """Unit normals (dim, k) that lie in the planes of symmetry at their contacts: the mean over the
-    facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
-    """
+    """Unit normals (dim, k) that lie in the planes at their contacts, as with mirror images."""
     normals = contacts.normals
     for plane in symmetry_planes(contacts):
         out = plane.inward @ normals
@@ -101,13 +84,10 @@ def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
 def mirror_planes(
     scene: Scene, guides: Sequence[Guides], cutting: Sequence[SymmetryPlane]
 ) -> tuple[SymmetryPlane, ...]:
-    """Find the planes of symmetry, one for each direction, of a scene with two copies or more,
-    whose bodies are parts of the whole ones.
-
-    These are the planes `cutting` a contact surface, those of the axes that the scene names, and
-    those on which supports guide a body and which have all bodies on one side, unless there are
-    more of these than the copies ask for. InputError if the scene names an axis across which no
-    such plane lies.
+    """The planes of symmetry, one for each direction, of a scene with two copies or more: those
+    `cutting` a contact surface, those of the axes that the scene names, and those on which supports
+    guide a body and which have all bodies on one side, unless there are more of these than the
+    copies ask for. InputError if no such plane lies across an axis that the scene names.
     """
     found: list[SymmetryPlane] = []
     for plane in cutting:

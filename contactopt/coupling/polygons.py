@@ -15,8 +15,8 @@ def areas(polygons: np.ndarray) -> np.ndarray:
 
 
 def clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Parts (p, v', 2) of polygons (p, v, 2) inside convex counterclockwise windows (p, w, 2) of
-    `size` (p,). Unused places at the end repeat the last vertex; polygons without any are zero.
+    """Parts (p, v', 2) of polygons (p, v, 2) in convex counterclockwise windows (p, w, 2) of `size`
+    (p,), padded by the last vertex; zero if empty.
     """
     count = np.full(len(polygon), polygon.shape[1])
     for edge in range(window.shape[1]):

@@ -1,6 +1,4 @@
-"""The interface problem of bodies whose couplings are made and whose Q is known: the signed maps of
-the bodies, and q, V, s and the law of all pairs (contactopt.coupling.reduction has the formulas).
-"""
+"""The signed maps of bodies, and q, V, s and the law of all pairs."""
 
 from __future__ import annotations
 
@@ -23,9 +21,7 @@ def signed_map(
     sides: Sequence[tuple[AssembledBody, AssembledBody]],
     couplings: Sequence[Coupling],
 ) -> sp.csr_matrix:
-    """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and
-    zeros elsewhere.
-    """
+    """B (k dim, n) of a body: the maps of its pairs with their signs, else zeros."""
     blocks = [
         made.upper if body is upper else -made.lower if body is lower else None
         for (upper, lower), made in zip(sides, couplings)

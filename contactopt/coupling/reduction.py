@@ -133,30 +133,13 @@ class Reduction:
         return sum(body.unknowns for body in self.bodies)
 
     def own_multipliers(self, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Split the multipliers of the problem body by body.
-
-        Parameters
-        ----------
-        multipliers : (p,) multipliers of the problem.
-
-        Returns
-        -------
-        The multipliers (p_b,) of each body.
-        """
+        """The multipliers (p_b,) of each body, out of those of the problem."""
         ends = np.cumsum([len(body.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
-        """Compute the displacements of every body, once for each solution. Bodies whose
-        displacements came with the contact forces are not solved at all.
-
-        Parameters
-        ----------
-        solution : A solution of the problem.
-
-        Returns
-        -------
-        U (n_b,) of each body [length].
+        """The displacements U (n_b,) of each body [length], computed once for each solution. Bodies
+        whose displacements came with the contact forces are not solved at all.
         """
         if solution in self._known:
             return self._known[solution]
@@ -174,18 +157,14 @@ class Reduction:
         return self._known[solution]
 
     def seen(self, displaced: Sequence[Any]) -> np.ndarray:
-        """The displacements u (k, dim) of the contacts [length], with the initial gap, from those
-        (n_b,) of each body.
-        """
+        """Displacements u (k, dim) of the contacts with the gap, from those of the bodies."""
         q = self.problem.q
         parts = (B @ U for B, U in zip(self.maps, displaced))
         u = np.asarray(sum(parts, 0 * q.ravel())).reshape(q.shape)
         return u + self.gap[:, None] * np.eye(self.problem.dim)[0]
 
     def grounded(self) -> Reduction | None:
-        """With thin bodies on a soft ground (contactopt.bodies.thin), whose answer is right where
-        it no longer pulls them; None without thin bodies.
-        """
+        """With thin bodies on a soft ground (contactopt.bodies.thin); None without any."""
         if self.on_ground:
             return self
         bodies = _on_ground(self.scene, self.bodies)
@@ -196,9 +175,7 @@ class Reduction:
         return replace(self._with(bodies, Q), on_ground=True)
 
     def pulled(self, solution: Solution) -> Reduction:
-        """With other displacements at rest: the ground of each body pulls it towards its
-        displacement, from which those of the contacts are taken anew.
-        """
+        """With the ground pulling each body towards its displacement in a solution."""
         displaced = self.displaced(solution)
         bodies = tuple(body.pulled(U) for body, U in zip(self.bodies, displaced))
         made = self._with(bodies, self.problem.Q)
@@ -216,11 +193,8 @@ class Reduction:
         return replace(self, bodies=bodies, problem=problem)
 
     def loaded(self, scene: Scene) -> Reduction:
-        """Put the loads of another scene of the same structure on the same bodies, coupling and Q.
-
-        Values of tractions, body forces, plate forces and support displacements may differ, and mu.
-        InputError if meshes, materials or other parts differ, or if supports or plates hold other
-        unknowns.
+        """Put the loads of another scene on the same bodies, coupling and Q: tractions, body and
+        plate forces, support displacements and mu. InputError if anything else differs.
         """
         check_same(self.scene, scene)
         start = time.perf_counter()

@@ -66,9 +66,7 @@ class Rounding:
 
 
 def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
-    """(f e, n) from the nodes' values to m_e; zero where the gradient at an end of an edge is
-    unknown.
-    """
+    """(f e, n) from the nodes' values to m_e; zero where a gradient is unknown."""
     gradients = _gradients(surface)
     a, b = (surface.faces[:, edges[:, i]].ravel() for i in (0, 1))
     along = (surface.points[:, b] - surface.points[:, a]) / 8
@@ -80,9 +78,7 @@ def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
 
 def _gradients(surface: Faces) -> list[sp.csr_matrix]:
     """Matrices (n, n), one for each component of space, from the nodes' values to the tangential
-    gradient at the nodes.
-
-    Rows of nodes that too few others surround are empty.
+    gradient; empty rows where too few others surround a node.
     """
     n, (f, j) = surface.points.shape[1], surface.faces.shape
     at = surface.faces.ravel(), np.repeat(np.arange(f), j)
@@ -107,9 +103,7 @@ def _gradients(surface: Faces) -> list[sp.csr_matrix]:
 
 
 def _fit(apart: np.ndarray, directions: int, terms: int) -> np.ndarray | None:
-    """(dim, m) weights of m nodes in the gradient of the quadratic fit where `apart` (dim, m) is
-    zero; None: undetermined.
-    """
+    """(dim, m) weights of m nodes in the quadratic fit's gradient at `apart` = 0, or None."""
     if apart.shape[1] < terms:
         return None
     # Coordinates y in the tangent plane through the nodes, scaled to one.

@@ -36,18 +36,14 @@ def check_same(one: Scene, other: Scene) -> None:
 
 
 def _same_mesh(one: Any, other: Any) -> bool:
-    """Whether two meshes have the same nodes and elements; functions that make them are compared by
-    what they enclose.
-    """
+    """Whether two meshes, or what the functions that make them enclose, are the same."""
     if callable(one) or callable(other):
         return callable(one) and callable(other) and not _differ(one, other)
     return one is other or (np.array_equal(one.p, other.p) and np.array_equal(one.t, other.t))
 
 
 def _differ(one: Any, other: Any) -> bool:
-    """Whether two values are known to be different: numbers, texts, arrays, and functions of one
-    code that enclose such.
-    """
+    """Whether numbers, texts, arrays, or functions that enclose such, surely differ."""
 
     def both(*kinds: type) -> bool:
         return isinstance(one, kinds) and isinstance(other, kinds)

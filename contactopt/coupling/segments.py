@@ -67,10 +67,8 @@ class Overlap:
 
 
 def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
-    """Find where two surfaces overlap, with points of integration in the order of the own cells.
-
-    The own side carries the contacts; `normals` (dim, n) are its normals at its points. InputError
-    if the other surface is folded, so that some cell faces two of its layers.
+    """Find where two surfaces overlap, with points of integration in the order of the own cells,
+    whose normals `normals` (dim, n) are given at its points. InputError if the other is folded.
     """
     return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 
@@ -135,15 +133,13 @@ def _nearest(
     direction: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mask (q,) of the pieces on that layer of the other surface which the own one faces, and how
-    much of each own cell they cover. `pairs` are the own and the other polygon of each piece,
-    `content` (q,) is its part of the own cell, `middle` (dim, q) a place within it, and `direction`
-    (dim, q) the normal there.
+    much of each own cell they cover, from the polygons of each piece, its part of the own cell, a
+    place within it and the normal there (dim, q).
 
-    A line along the normal may meet the other surface more than once, and goes on behind the own
-    one as well. Behind it counts what overlaps no deeper than about twice the distance of the
-    nearest place of the other surface. Where a cell is covered more than once, layers count that
-    are no further away than twice the nearest one. If these still cover the cell more than once,
-    the surface is folded: an InputError.
+    A line along the normal may meet the other surface more than once. Behind the own one counts
+    what overlaps no deeper than about twice the distance of the nearest place. Where a cell is
+    covered more than once, layers count that are no further than twice the nearest one; if these
+    still do, the surface is folded: an InputError.
     """
     first, second = pairs
     m, cell = theirs.normal[:, second], mine.cell[first]
@@ -212,9 +208,7 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
 
 
 class _Seen:
-    """Places s from 0 to 1 on m of the lines that the own side is cut into, with normals that are
-    linear from those at the ends (2, m, 2).
-    """
+    """Places s, 0 to 1, on m own lines, whose normals are linear from ends (2, m, 2)."""
 
     def __init__(self, own: Faces, mine: _Polygons, lines: np.ndarray, ends: np.ndarray) -> None:
         self.own, self.mine, self.lines, self.ends = own, mine, lines, ends
@@ -254,9 +248,7 @@ class _Seen:
 
 
 def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners
-    (dim - 1, q, v) of pieces on cells (q,); all of a cell where it is covered as a whole.
-    """
+    """Begin and width (2, dim - 1, cells) of the least similar cells around corners of pieces."""
     low, high = np.ones((own.dim - 1, len(covered))), np.zeros((own.dim - 1, len(covered)))
     for d, x in enumerate(corners):
         np.minimum.at(low[d], cell, x.min(axis=1))
@@ -339,9 +331,7 @@ def _in_space(mine: _Polygons, axes: np.ndarray, number: np.ndarray, y: np.ndarr
 
 
 def _order(own: Faces, other: Faces) -> int:
-    """Degree of the quadrature on triangles: exact for products of hat functions and shape
-    functions on affine faces.
-    """
+    """Degree of the quadrature on triangles, exact on affine faces."""
     hats, theirs = (2 if side.corners == 4 else 1 for side in (own, other))
     order = hats + max(hats, own.degree * hats, other.degree * theirs)
     if not (own.distorted or other.distorted):

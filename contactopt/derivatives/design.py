@@ -47,9 +47,7 @@ SETTLED = 1e-6
 
 @dataclass(frozen=True)
 class Visit:
-    """One state visited: the largest pressure [stress], its certificate, the radius, whether the
-    step was taken, weak contacts.
-    """
+    """Peak [stress], certificate, radius, whether the step was taken, and weak contacts."""
 
     peak: float
     certificate: float
@@ -235,9 +233,7 @@ def _program(
     limits: tuple[np.ndarray, np.ndarray],
     constraints: Rules | None,
 ) -> tuple[np.ndarray, float]:
-    """The step (variables,) of the convex program, written in units of the reach of each variable
-    and of the largest pressure, and the gain that it promises [stress].
-    """
+    """The step (variables,) in units of its reach and of the peak; the promised gain [stress]."""
     import cvxpy as cp
 
     loaded, peak = now.problem.areas > 0, _peak(now)
@@ -278,9 +274,7 @@ def _peak(step: Step) -> float:
 
 
 def _usual(states: _States, now: Step, x: np.ndarray) -> np.ndarray:
-    """What each variable would change the forces by if every contact were on its own, for
-    parameters in units of their own.
-    """
+    """How much each variable would change the forces of contacts that are on their own."""
     compliance, rest = float(np.mean(diagonal(now.problem.Q))), x[states.shapes.shape[1] :]
     largest = float(np.abs(now.solution.reactions).max())
     shapes = np.abs(states.shapes).max(axis=0, initial=0.0) / compliance

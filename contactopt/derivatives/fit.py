@@ -230,10 +230,8 @@ def fit(
 def _minimised(
     model: _Model, first: np.ndarray, limits: tuple[np.ndarray, np.ndarray], estimated: bool
 ) -> tuple[np.ndarray, Any]:
-    """The values (p,) of the smallest misfit, and what the optimiser says, which works in units of
-    the first values.
-
-    Where the data hardly know friction because contacts stick, it goes on from less friction.
+    """The values (p,) of the smallest misfit, and what the optimiser says; where the data hardly
+    know friction because contacts stick, it goes on from less friction.
     """
     size = np.where(first != 0, np.abs(first), 1.0)
     low, high = limits[0] / size, limits[1] / size
@@ -270,9 +268,7 @@ def _minimised(
 def _slipping(
     misfit: Callable[[np.ndarray], np.ndarray], x: np.ndarray, sticks: np.ndarray, low: np.ndarray
 ) -> np.ndarray | None:
-    """The best point with less of the friction coefficients that do not matter at x, a mask (p,);
-    None if there is none.
-    """
+    """The best point with less of the frictions in the mask (p,) that do not matter, or None."""
     here, best, least = float(np.sum(misfit(x) ** 2)), None, np.inf
     for i in range(1, HALVINGS + 1):
         point = np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x)

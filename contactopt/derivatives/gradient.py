@@ -41,9 +41,7 @@ class Gradient:
         return of_kinks("quantity", names)
 
     def onesided(self, direction: dict[str, Any]) -> float:
-        """The derivative along a direction, name of a parameter -> amount, one-sided where contacts
-        are weakly active.
-        """
+        """The one-sided derivative along a direction, name of a parameter -> amount."""
         scene = self.chain.steps[0].reduction.scene
         chosen = {which: direction[which.name] for which in parameters_of(tuple(direction), scene)}
         *_, moved = self.chain.forward(chosen)  # of the last state, at which the quantity is read

@@ -1,6 +1,4 @@
-"""The derivative of a solution by the data of its interface problem: q, the law's parameter mu, s,
-Q and V.
-"""
+"""The derivative of a solution by q, the law's parameter mu, s, Q and V of its problem."""
 
 from __future__ import annotations
 
@@ -33,9 +31,7 @@ ROUNDING = 100  # and this many times the certificate, if that is more
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """How a solution changes: reactions (k, dim), multipliers (p,) and displacements u (k, dim),
-    for one direction.
-    """
+    """By how much reactions (k, dim), multipliers (p,), displacements u (k, dim) change."""
 
     reactions: np.ndarray
     multipliers: np.ndarray
@@ -62,9 +58,7 @@ class Dual:
         return self.by_parameter()
 
     def along_Q(self, change: Any) -> float:
-        """df for a change of Q (k dim, k dim): an array, a sparse matrix, or an operator with
-        products.
-        """
+        """df for a change of Q: an array, a sparse matrix, or an operator with products."""
         return float(self.q.ravel() @ np.asarray(change @ self.reactions.ravel()))
 
     @property
@@ -107,9 +101,7 @@ class Sensitivity:
 
     @property
     def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What M and its right sides are made of, in the problem's units: D and D rho
-        [force / length], (k, dim, dim), and P_mu (k, dim) [force].
-        """
+        """D and D rho [force / length], (k, dim, dim), and P_mu (k, dim) [force]."""
         D = self.tangent.D
         by_parameter = np.broadcast_to(self._by_parameter, self._point.shape)
         return D, D * (self._rho[:, None] * self._moves)[:, None, :], by_parameter
@@ -154,9 +146,7 @@ class Sensitivity:
 
     @cached_property
     def _moves(self) -> np.ndarray:
-        """1 where a component can move, else 0 (k, dim): on a plane of symmetry a displacement is
-        no datum.
-        """
+        """1 where a component can move, else 0 (k, dim): there is no datum."""
         return np.where(immovable(self.problem), 0.0, 1.0).reshape(self.problem.q.shape)
 
     @cached_property
@@ -247,9 +237,7 @@ class Sensitivity:
         return self.step(error, -ds)
 
     def step(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dr (k, dim) [force] and dlambda (p,) of M (dr, dlambda) = (error, balance), both given
-        in units of force.
-        """
+        """dr (k, dim), dlambda (p,) of M (dr, dlambda) = (error, balance), given in force."""
         _, scales = self._scaled
         right = balance * scales.multipliers / (scales.force * scales.length)
         return self._unscaled(*self.tangent.solve(error.ravel() / scales.force, right))

@@ -46,9 +46,7 @@ class Weak:
 
 
 def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
-    """The contacts whose points r - rho u (k, dim), normal first [force], lie within a distance
-    [force] of a kink of the law's map, with the names of the kinks.
-    """
+    """Contacts whose y (k, dim) lie within a distance [force] of the named kinks."""
     kinks = law.kinks(y, distance)
     names = "", "open / closed", "stick / slip", "apex: open / closed, stick / slip"
     edges = (kinks.normal + 2 * kinks.tangential).tolist()
@@ -110,9 +108,7 @@ class Onesided:
         self.S = dy[:, contacts].reshape(len(dy), -1).T
 
     def step(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What to add to dr (k, d) and dlambda (p,) of the piece M, from its dy (k, d) and dmu
-        (k,).
-        """
+        """What to add to dr (k, d), dlambda (p,) of M, from its dy (k, d) and dmu (k,)."""
         dy0, dmu = dy[self.contacts], dmu[self.contacts]
         z = self._solve(dy0, dmu)
         return np.tensordot(z, self.dr, 1), z @ self.dlam

@@ -104,9 +104,7 @@ class Tangent:
 
     @cached_property
     def solve(self) -> Solve:
-        """What gives dr and dlambda with M (dr, dlambda) = (error, balance), by the means that fit
-        the form of Q; InputError where M is singular.
-        """
+        """The solver of M (dr, dlambda) = (error, balance); InputError where M is singular."""
         Q = self.equations.Q
         if not len(self.closed) + self.equations.V.shape[1]:
             return lambda error, balance: (error, balance)
@@ -136,9 +134,7 @@ def _stuck(tangent: Tangent) -> Solve:
 def _closed_alone(
     tangent: Tangent, factors: Callable[[Tangent], Callable[[np.ndarray], np.ndarray]]
 ) -> Solve:
-    """By factors of the square system of the closed contacts and the multipliers: open contacts, D
-    = 0, have unit rows and leave it.
-    """
+    """By factors of the system without open contacts, whose rows are those of 1."""
     Q, V, closed, n = tangent.equations.Q, tangent.equations.V, tangent.closed, len(tangent.closed)
     inverse = factors(tangent)
 
@@ -206,9 +202,7 @@ def _sparse_factors(tangent: Tangent) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _by_products(tangent: Tangent) -> Solve:
-    """By products with Q: GMRES, preconditioned by the same system with the model of Q
-    (contactopt.methods.preconditioners).
-    """
+    """By products with Q: GMRES, preconditioned by the system with the model of Q."""
     linearised = Linearised(tangent.equations, tangent.D)
     inverse = linearised.inverse(model_of(tangent.problem), INNER)
     Q, V = tangent.equations.Q, tangent.equations.V
@@ -229,9 +223,7 @@ def _by_products(tangent: Tangent) -> Solve:
 
 
 def _with_bodies(tangent: Tangent, form: CoupledForm) -> Solve:
-    """With the equilibrium of the bodies beside the contacts, so that no product with Q is needed
-    (contactopt.methods.kernels.coupled_newton).
-    """
+    """With the equilibrium of the bodies beside the contacts, without products with Q."""
     equations = tangent.equations
     P = fitted(model_of(tangent.problem, deflate=False), form, equations.V)
     coupled, linearised = Coupled(equations, form, P), Linearised(equations, tangent.D)
@@ -256,10 +248,8 @@ def _refined(
     right: Stacked,
     weights: Stacked | float,
 ) -> Stacked:
-    """Solve A x = b to ACCURACY by solving again for what is left, from x -> A x, b -> an
-    approximate x, and weights W of the rows, like b: the residual is |W (b - A x)| / |W b|.
-
-    InputError if that is out of reach, because the solution is not unique.
+    """Solve A x = b by `solve` again and again for what is left, until |W (b - A x)| / |W b| is
+    ACCURACY; InputError if that is out of reach, because the solution is not unique.
     """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)

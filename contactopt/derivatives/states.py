@@ -40,9 +40,7 @@ Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
 
 @dataclass(frozen=True, eq=False)
 class Explicit:
-    """What a direction changes at fixed forces and multipliers: u (k, dim), the balance (p,), the
-    law (k,), U of each body.
-    """
+    """Changes at fixed forces: u (k, dim), balance (p,), law (k,), U of each body."""
 
     u: np.ndarray
     s: np.ndarray
@@ -52,9 +50,7 @@ class Explicit:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """How one state changes: in all, in its displacements measured from the state before (k, dim),
-    and explicitly.
-    """
+    """How one state changes: in all, since the state before (k, dim), and explicitly."""
 
     change: Change
     slip: np.ndarray
@@ -75,10 +71,7 @@ class Step(State):
         return sensitivity(self.problem, self.solution, self.distance)
 
     def _changed(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
-        """The scene with a load changed by a step, its part that stands for a body, and the step.
-
-        Bodies are affine in their loads, so that a step of any size gives the derivative.
-        """
+        """The scene with a load changed by a step, its part of a body, and the step."""
         scene = self.reduction.scene
         value = which.read(scene)
         step = abs(value) or 1.0
@@ -125,9 +118,7 @@ class Step(State):
         return Explicit(du, np.concatenate(ds), dmu, tuple(dU))
 
     def work(self, which: Parameter, back: Duals, base: Reduction) -> Any:
-        """The derivative by one parameter, (k,) where it has one number per contact, from the
-        gradient by the data of the problem.
-        """
+        """The derivative by one parameter, or by one per contact (k,), from the duals."""
         by_gap, by_law = self._on_contacts(which)
         each = by_gap * back.dual.q[:, 0] + (by_law * back.dual.mu if np.any(by_law) else 0.0)
         if which.is_field:
@@ -148,9 +139,7 @@ class Step(State):
 
 @dataclass(frozen=True, eq=False)
 class Duals:
-    """The gradient by the data of one state's problem, taken back to the bodies: G, s* and W of the
-    module's head.
-    """
+    """The gradient by a state's data taken to the bodies: G, s* and W of the head."""
 
     state: State
     dual: Dual
@@ -187,9 +176,7 @@ class Chain:
         )
 
     def forward(self, direction: Direction) -> Iterator[Moved]:
-        """State by state, how the solution changes along a direction; displacements are total
-        ones.
-        """
+        """State by state, how the solution changes in all along a direction."""
         base = self.steps[0].reduction
         before = np.zeros(self.steps[0].problem.q.shape)
         for step in self.steps:
@@ -226,9 +213,7 @@ class Chain:
 
 
 def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
-    """The directional derivative of a function of a state, which moves as Chain.forward says along
-    a direction, in the unit of the function.
-    """
+    """The derivative of a function of a state along the direction of `moved`."""
     total = sum(
         amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field
     )
@@ -289,11 +274,8 @@ def solved_chain(
     Q: str = "auto",
     gap: np.ndarray | float = 0.0,
 ) -> Chain:
-    """Solve the states of a load path, without their energies, to the certificate `tol`.
-
-    `base` is a reduction of the same bodies, which is then only loaded anew; `starts` has a
-    solution for every state to start from; `gap` (k,) is added to the initial gap. InputError where
-    a state has no solution or is not solved.
+    """Solve the states of a load path, without their energies, to the certificate `tol`, with `gap`
+    (k,) added and a start for each, on `base` loaded anew if given. InputError if one is unsolved.
     """
     steps: list[Step] = []
     slipped: Any = 0.0

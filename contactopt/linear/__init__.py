@@ -1,3 +1,1 @@
-"""Linear algebra that knows no mechanics: operators known by their products, convolutions, stacked
-vectors, threads.
-"""
+"""Linear algebra that knows no mechanics."""

@@ -1,6 +1,4 @@
-"""Cores, memory, the threads of BLAS, and the one place where threads share work: bodies side by
-side, and the pieces of one large product.
-"""
+"""Cores, memory, the threads of BLAS, and the one place where threads share work."""
 
 from __future__ import annotations
 
@@ -20,14 +18,7 @@ Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """Count the cores that this process may use.
-
-    OMP_NUM_THREADS does not bound it: that is for the threads of BLAS.
-
-    Returns
-    -------
-    The number of cores, at least 1.
-    """
+    """The number of cores that this process may use, which OMP_NUM_THREADS does not bound."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -37,20 +28,13 @@ def one_blas_thread() -> Iterator[None]:
 
     It is for work with many small dense products, between which further threads would only spin.
     The limit holds for the whole process, so that one thread alone may set it at a time.
-
-    Yields
-    ------
-    Nothing; the block runs under the limit.
     """
     with threadpool_limits(1, user_api="blas"):
         yield
 
 
 def give_back() -> None:
-    """Return the memory that was freed to the system.
-
-    The C library of GNU keeps much of it for the thread that freed it; with others nothing happens.
-    """
+    """Return freed memory to the system: GNU's C library keeps it for the thread that freed it."""
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -91,10 +75,8 @@ def each(
 
 
 class Crew:
-    """Threads that help with pieces of one caller's work, one for each core but the caller's own.
-
-    They sleep in between. They start with the first piece and end with the object. A forked process
-    makes its own.
+    """Threads, one for each core but the caller's, that help with pieces of one caller's work. They
+    start with the first piece, sleep in between and end with the object; a fork makes its own.
     """
 
     def __init__(self, size: int | None = None):
@@ -103,14 +85,7 @@ class Crew:
         self._process = os.getpid()
 
     def each(self, acts: Sequence[Callable[[], None]]) -> None:
-        """Do all of them, in any order.
-
-        Whoever is free takes the next one, so that a busy machine costs no waiting.
-
-        Parameters
-        ----------
-        acts : functions without arguments
-        """
+        """Do all of them in any order; whoever is free takes the next."""
         waiting = deque(acts)
 
         def work() -> None:

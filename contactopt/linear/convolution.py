@@ -1,15 +1,15 @@
-"""Interface operators that are convolutions over a regular grid of contacts, with products by fast
-Fourier transforms.
+"""Interface operators that are convolutions over a regular grid of contacts, by fast Fourier
+transforms.
 
-The displacement of a contact then depends on the forces through the distances between contacts
-alone, as on a half-space:
+The displacement of a contact then depends on the forces through distances alone, as on a
+half-space:
 
     u_a(x) = sum_b sum_y K_ab(x - y) r_b(y),        a, b the components n, t1[, t2],
 
-where t1 lies along the first axis of the grid and t2 along the second. K_ab is even in the distance
-along an axis, or odd if exactly one of a and b lies along it. On a grid that does not repeat itself
-the forces are padded by zeros to at least twice its size. Only the Fourier transforms of K are
-kept: real numbers times 1 or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
+where t1 and t2 lie along the axes of the grid. K_ab is even in the distance along an axis, or odd
+if exactly one of a and b lies along it. On a grid that does not repeat itself the forces are padded
+by zeros to at least twice its size. Only the Fourier transforms of K are kept: real numbers times 1
+or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
 """
 
 from __future__ import annotations
@@ -32,18 +32,8 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
-    """Choose the size of the padded grid on which a convolution is transformed.
-
-    Each of its sizes is twice a number that is at least that of the contacts and easy to halve and
-    to transform.
-
-    Parameters
-    ----------
-    grid : Number of contacts along each of the one or two axes.
-
-    Returns
-    -------
-    Number of points M along each axis.
+    """The size M of the padded grid on which a convolution is transformed, along each axis: twice a
+    number that is at least that of the contacts and easy to halve and to transform.
     """
     from scipy.fft import next_fast_len
 
@@ -81,17 +71,8 @@ class Kernel:
 
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
-        """Make a kernel from its coefficients.
-
-        Parameters
-        ----------
-        grid : Number of contacts along each axis.
-        coefficients : For each pair of components (a, b) with a <= b the coefficients K_ab at
-            distances 0 to M / 2 along each axis, with M as `embedding` gives it [length / force].
-
-        Returns
-        -------
-        The kernel.
+        """Make a kernel from K_ab [length / force] at distances 0 to M / 2 along each axis, with M
+        as `embedding` gives it, for pairs of components a <= b.
         """
         from scipy.fft import dct, dst
 
@@ -116,9 +97,7 @@ class Kernel:
         return len(self.grid) + 1
 
     def __add__(self, other: Kernel) -> Kernel:
-        """The sum of two kernels on the same grid; pairs of components that cancel but for rounding
-        are left out.
-        """
+        """The sum on the same grid, without pairs that cancel but for rounding."""
         symbols = dict(self.symbols)
         for pair, symbol in other.symbols.items():
             symbols[pair] = symbols[pair] + symbol if pair in symbols else symbol
@@ -149,9 +128,7 @@ class Kernel:
 
     @property
     def halves(self) -> bool:
-        """Whether there is a grid of half as many contacts along each axis for which `coarse`
-        works.
-        """
+        """Whether a grid of half as many contacts along each axis exists for `coarse`."""
         doubled = all(m % 4 == 0 and m >= 2 * n for m, n in zip(self.padded, self.grid))
         periodic = all(m == n and n % 4 == 0 for m, n in zip(self.padded, self.grid))
         return doubled or periodic
@@ -159,13 +136,9 @@ class Kernel:
     def coarse(self) -> Kernel:
         """Make the kernel between pairs (in 2D) or squares of four contacts.
 
-        A force is spread evenly over them, and displacements are means. Along each axis
-        K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by
-        the sum over the two frequencies that fall on one.
-
-        Returns
-        -------
-        The kernel on the grid of half as many contacts along each axis.
+        A force is spread evenly over them, and displacements are means. Along each axis K_c(I) =
+        (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum
+        over the two frequencies that fall on one.
         """
         symbols = {}
         for pair, symbol in self.symbols.items():
@@ -189,18 +162,7 @@ class Kernel:
     def act(
         self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False
     ) -> np.ndarray:
-        """Compute displacements under forces.
-
-        Parameters
-        ----------
-        x : (columns, n0[, n1]) forces on the grid [force].
-        rows, columns : The components of the displacements and of the forces.
-        single : Whether single precision is enough.
-
-        Returns
-        -------
-        (rows, n0[, n1]) displacements [length].
-        """
+        """Displacements (rows, n0[, n1]) [length] under forces x (columns, n0[, n1]) [force]."""
         symbols, kind = (self.single, np.float32) if single else (self.symbols, np.float64)
         spectra = {
             b: forward(part.astype(kind, copy=False), self.padded)
@@ -223,20 +185,7 @@ class Kernel:
         return out
 
     def entries(self, contacts: np.ndarray | None = None) -> np.ndarray:
-        """Write the operator as an array.
-
-        Parameters
-        ----------
-        contacts : The numbers (k,) of the contacts whose entries are wanted; by default all.
-
-        Returns
-        -------
-        (k dim, k dim) [length / force].
-
-        Raises
-        ------
-        InputError : If it would be too large.
-        """
+        """Q between contacts (k,) as an array (k dim, k dim); InputError if too large."""
         numbers = np.arange(np.prod(self.grid)) if contacts is None else contacts
         k, dim = len(numbers), self.dim
         check_dense(k * dim)
@@ -252,16 +201,11 @@ class Kernel:
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
-    """Transform values on a grid, padded by zeros. Rows that hold nothing but padding are skipped.
+    """Transform real values (n0[, n1]) on a grid, padded by zeros to (M0[, M1]), in their
+    precision.
 
-    Parameters
-    ----------
-    x : (n0[, n1]) real values, in single or double precision.
-    padded : Sizes (M0[, M1]) of the padded grid.
-
-    Returns
-    -------
-    The transform, (M0 / 2 + 1,) in 2D and (M0, M1 / 2 + 1) in 3D, in the precision of x.
+    Rows that hold nothing but padding are skipped. The transform is (M0 / 2 + 1,) in 2D and (M0, M1
+    / 2 + 1) in 3D.
     """
     from scipy.fft import fft, rfft
 
@@ -273,18 +217,7 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
 
 
 def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...]) -> np.ndarray:
-    """Transform back and keep the part of the grid.
-
-    Parameters
-    ----------
-    spectrum : The transform as `forward` gives it. It is overwritten.
-    padded : Sizes (M0[, M1]) of the padded grid.
-    grid : Number of contacts along each axis.
-
-    Returns
-    -------
-    (n0[, n1]) real values.
-    """
+    """Transform back what `forward` gives, which is overwritten, and keep the part of the grid."""
     from scipy.fft import ifft, irfft
 
     workers = _workers_for(padded)
@@ -303,9 +236,7 @@ def _workers_for(padded: tuple[int, ...]) -> int:
 
 
 class Convolution(InterfaceOperator):
-    """The interface operator of a kernel, in double precision, or in single precision where that is
-    accurate enough.
-    """
+    """The operator of a kernel, in double precision, or single where that is accurate enough."""
 
     def __init__(
         self, kernel: Kernel, accuracy: float | None = None, counter: Counter | None = None

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(eq=False)
 class Counter:
-    """Products with Q, or applications of a preconditioner, so far.
-
-    An operator and the operators made from it, such as its normal block or one with less accurate
-    products, are handed the same counter. The work that a solve costs is then known wherever it was
-    asked for.
+    """Products with Q, or applications of a preconditioner, so far. An operator and those made from
+    it share one, so that the work of a solve is known wherever it was asked for.
     """
 
     total: int = 0

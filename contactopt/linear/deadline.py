@@ -1,9 +1,5 @@
-"""The moment at which the step of a method that runs must give up, for inner iterations of
-thousands of steps.
-
-The driver looks at its clock after each outer iteration. An inner loop that can last longer than a
-user's patience calls `check_time`, which ends the step; the solve then ends with status
-`time_limit` and the last outer iterate.
+"""The moment at which the step of a method that runs must give up. The driver looks at its clock
+after each outer iteration; an inner loop that can last longer calls `check_time`.
 """
 
 from __future__ import annotations
@@ -38,16 +34,7 @@ def time_left() -> float:
 
 @contextmanager
 def until(moment: float) -> Iterator[None]:
-    """Set the deadline for the `with` block. An earlier one of an outer solve stays.
-
-    Parameters
-    ----------
-    moment : The deadline, a value of time.perf_counter() [s].
-
-    Yields
-    ------
-    Nothing.
-    """
+    """Set the deadline, a time.perf_counter() [s], in the block; an earlier one stays."""
     token = _deadline.set(min(moment, _deadline.get()))
     try:
         yield

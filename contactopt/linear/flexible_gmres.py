@@ -1,11 +1,8 @@
-"""GMRES with a preconditioner that may change from iteration to iteration, in the norm of given
-weights.
+"""GMRES with a preconditioner that may change, in the norm of given weights.
 
-The basis is kept in single precision, which halves its memory and limits the reduction by one run
-to about 1e-5; Newton's steps ask for less. Scalar products do not use BLAS, whose threads would
-spin until the next call.
-
-Source: Saad (1993), A flexible inner-outer preconditioned GMRES algorithm.
+The basis is kept in single precision, which limits the reduction by one run to about 1e-5. Scalar
+products do not use BLAS, whose threads would spin until the next call. Source: Saad (1993), A
+flexible inner-outer preconditioned GMRES algorithm.
 """
 
 from __future__ import annotations
@@ -29,17 +26,8 @@ def flexible_gmres(product: Act, inverse: Act, right: Vector, weights: Vector, r
     """Solve A x = b by GMRES with a preconditioner that may change, to |W (b - A x)| <= rtol |W b|
     with W = diag(weights).
 
-    Parameters
-    ----------
-    product : x -> A x.
-    inverse : r -> an approximation of A^-1 r.
-    right, weights : Right-hand side b, and positive weights of its entries; both are arrays (n,) or
-        both are Stacked.
-    rtol : Relative size of the residual.
-
-    Returns
-    -------
-    The solution x, or the best after RUNS runs of RESTART iterations.
+    `inverse` approximates A^-1. The right side b and the positive weights are both arrays (n,) or
+    both Stacked. The best x after RUNS runs of RESTART iterations comes back.
     """
     x, residual = 0.0 * right, right
     goal = rtol * norm(weights * right)

@@ -1,9 +1,6 @@
-"""The interface operator Q known by its products: what every method needs that never looks at an
-entry of Q.
-
-A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that
-need them ask for `dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse
-matrix in compressed rows (csr_array), and an InterfaceOperator.
+"""The interface operator Q as an array, a scipy sparse matrix in compressed rows (csr_array), or an
+InterfaceOperator known by its products, of which each costs one solve per body. Methods that need
+the entries, one product for each interface unknown, ask for `dense(Q)`.
 """
 
 from __future__ import annotations
@@ -88,16 +85,7 @@ class InterfaceOperator(LinearOperator):
         return self
 
     def to_dense(self) -> np.ndarray:
-        """Write Q as an array. It takes n products unless there is a cheaper way.
-
-        Returns
-        -------
-        (n, n), symmetric to the last digit [length / force].
-
-        Raises
-        ------
-        InputError : If it would be too large.
-        """
+        """Q (n, n), symmetric to the last digit, by n products or a cheaper way."""
         n = self.shape[0]
         check_dense(n)
         if self.entries is not None:
@@ -112,11 +100,11 @@ class InterfaceOperator(LinearOperator):
     def scaled(
         self, factor: float, added: np.ndarray, counter: Counter | None = None
     ) -> InterfaceOperator:
-        """Make the operator factor Q + diag(added), with added (n,).
+        """Make the operator factor Q + diag(added).
 
         Parameters
         ----------
-        factor, added : As above.
+        factor, added : One number, and (n,).
         counter : Counts its products; by default one of its own.
 
         Returns
@@ -136,32 +124,13 @@ class InterfaceOperator(LinearOperator):
         )
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
-        """Make the same operator with less accurate products, counted together with its own.
-
-        Parameters
-        ----------
-        accuracy : Relative accuracy of a product that is good enough.
-
-        Returns
-        -------
-        The operator.
-        """
+        """The same operator with less accurate products, counted together with its own."""
         loose = copy(self)
         loose.accuracy = accuracy
         return loose
 
     def block(self, unknowns: np.ndarray) -> InterfaceOperator:
-        """Take Q on some unknowns (m,) alone, such as its normal block (every dim-th) or an active
-        set. Both count together.
-
-        Parameters
-        ----------
-        unknowns : Their numbers.
-
-        Returns
-        -------
-        The operator (m, m).
-        """
+        """Q (m, m) on some unknowns (m,), such as its normal block; both count together."""
         unknowns = np.asarray(unknowns)
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
@@ -181,16 +150,7 @@ Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or I
 
 
 def sparse(Q: object) -> sp.csr_array:
-    """Any scipy sparse matrix as compressed rows of floats, in memory of its own.
-
-    Parameters
-    ----------
-    Q : A scipy sparse matrix in any format.
-
-    Returns
-    -------
-    With sorted columns, duplicates summed and zeros left out.
-    """
+    """A sparse matrix as new, canonical compressed rows of floats without zeros."""
     rows = sp.csr_array(Q, dtype=float, copy=True)
     rows.sum_duplicates()
     rows.eliminate_zeros()
@@ -198,17 +158,7 @@ def sparse(Q: object) -> sp.csr_array:
 
 
 def check_dense(n: int) -> None:
-    """Before Q is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse
-    it beyond MOST_BYTES.
-
-    Parameters
-    ----------
-    n : Number of rows of Q.
-
-    Raises
-    ------
-    InputError : With the size in bytes, if the array would take more than MOST_BYTES.
-    """
+    """Log the size of Q as an array, a warning from NOTABLE_BYTES; InputError beyond MOST_BYTES."""
     size = 8 * n**2
     if size > MOST_BYTES:
         raise InputError(
@@ -221,20 +171,7 @@ def check_dense(n: int) -> None:
 
 
 def dense(Q: Interface) -> np.ndarray:
-    """Q as an array.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-
-    Returns
-    -------
-    array (n, n) : Q itself if it is an array.
-
-    Raises
-    ------
-    InputError : If it would be larger than MOST_BYTES.
-    """
+    """Q (n, n) as an array; InputError if it would be larger than MOST_BYTES."""
     if isinstance(Q, InterfaceOperator):
         return Q.to_dense()
     if not sp.issparse(Q):
@@ -244,7 +181,7 @@ def dense(Q: Interface) -> np.ndarray:
 
 
 def diagonal(Q: Interface) -> np.ndarray:
-    """The diagonal of Q, or the estimate of it that an operator has.
+    """The diagonal of Q [length / force], or the estimate of it that an operator has.
 
     Parameters
     ----------
@@ -252,7 +189,7 @@ def diagonal(Q: Interface) -> np.ndarray:
 
     Returns
     -------
-    array (n,) : [length / force].
+    (n,).
     """
     if isinstance(Q, InterfaceOperator):
         return Q.diagonal
@@ -260,32 +197,14 @@ def diagonal(Q: Interface) -> np.ndarray:
 
 
 def row_sizes(Q: np.ndarray | sp.csr_array) -> np.ndarray:
-    """The largest |Q_ij| of each row.
-
-    Parameters
-    ----------
-    Q : An array or sparse rows.
-
-    Returns
-    -------
-    array (n,) : [length / force].
-    """
+    """The largest |Q_ij| of each row (n,) [length / force]."""
     if sp.issparse(Q):
         return np.asarray(abs(Q).max(axis=1).toarray()).ravel() if Q.shape[0] else np.zeros(0)
     return np.asarray(np.abs(Q).max(axis=1, initial=0.0))
 
 
 def asymmetry(Q: Interface) -> float:
-    """By how much Q misses to be symmetric:  max |Q - Q'| / max |Q|.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-
-    Returns
-    -------
-    0 for an operator, which is symmetric by definition.
-    """
+    """max |Q - Q'| / max |Q|, which is 0 for an operator by definition."""
     if isinstance(Q, InterfaceOperator):
         return 0.0
     whole, skew = (Q.data, (Q - Q.T).data) if sp.issparse(Q) else (Q, Q - Q.T)
@@ -302,7 +221,7 @@ def held(Q: Interface) -> np.ndarray:
 
     Returns
     -------
-    array (n,) of bool : A mask.
+    (n,) mask.
     """
     if isinstance(Q, InterfaceOperator):
         return Q.held
@@ -312,17 +231,7 @@ def held(Q: Interface) -> np.ndarray:
 
 
 def shifted(Q: Interface, added: np.ndarray) -> Interface:
-    """Q + diag(added), of the same form as Q.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-    added : (n,) what is added to the diagonal [length / force].
-
-    Returns
-    -------
-    Products with it count with those of Q.
-    """
+    """Q + diag(added), of the same form as Q; products with it count with those of Q."""
     if sp.issparse(Q):
         return sp.csr_array(Q + sp.diags_array(added))
     if not isinstance(Q, InterfaceOperator):
@@ -331,17 +240,7 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
 
 
 def turned(Q: Interface, S: sp.csr_array) -> Interface:
-    """S Q S, of the same form as Q.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
-    S : (n, n) symmetric, regular.
-
-    Returns
-    -------
-    (n, n) [length / force].
-    """
+    """S Q S for a symmetric regular S, of the same form as Q."""
     if sp.issparse(Q):
         return sp.csr_array(S @ Q @ S)
     if not isinstance(Q, InterfaceOperator):
@@ -357,33 +256,13 @@ def turned(Q: Interface, S: sp.csr_array) -> Interface:
 
 
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:
-    """Q on some unknowns alone, of the same form as Q.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-    unknowns : (m,) their numbers.
-
-    Returns
-    -------
-    (m, m); products with it count with those of Q.
-    """
+    """Q on some unknowns (m,) alone, of the same form; products count with those of Q."""
     if sp.issparse(Q):
         return sp.csr_array(Q[unknowns][:, unknowns])
     return Q.block(unknowns) if isinstance(Q, InterfaceOperator) else Q[np.ix_(unknowns, unknowns)]
 
 
 def loosened(Q: Interface, accuracy: float) -> Interface:
-    """Q with products that are no more accurate than asked, where this saves work.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-    accuracy : Relative error of a product that is good enough.
-
-    Returns
-    -------
-    Q itself where a lower accuracy makes nothing cheaper.
-    """
+    """Q with products no more accurate than asked, or Q where this saves no work."""
     accuracy = max(accuracy, FINEST)
     return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q

@@ -1,6 +1,4 @@
-"""Q before condensation: the equilibrium of the bodies beside the contact forces, for methods that
-iterate on both at once.
-"""
+"""Q before condensation, for methods that iterate on bodies and contact forces at once."""
 
 from __future__ import annotations
 
@@ -39,61 +37,19 @@ class BodyTerm(Protocol):
     def low_rank(self) -> tuple[np.ndarray, np.ndarray]: ...
 
     def diagonal(self) -> Any:
-        """Give the diagonal of A.
-
-        Returns
-        -------
-        (N,) [force / length], or a vector elsewhere.
-        """
+        """The diagonal of A (N,) [force / length]."""
 
     def stiffness(self, X: Any) -> Any:
-        """Multiply with A.
-
-        Parameters
-        ----------
-        X : (N,) displacement [length].
-
-        Returns
-        -------
-        A X (N,) [force], or a vector elsewhere.
-        """
+        """A X [force] for a displacement X (N,) [length]."""
 
     def cycle(self, F: Any) -> Any:
-        """Multiply with B, which is symmetric positive definite and close to A^-1, such as one
-        V-cycle of multigrid.
-
-        Parameters
-        ----------
-        F : (N,) forces [force].
-
-        Returns
-        -------
-        B F (N,) [length], or a vector elsewhere.
-        """
+        """B F [length] for forces F (N,), with B positive definite and close to A^-1."""
 
     def pulled(self, r: np.ndarray) -> Any:
-        """Take contact forces to the unknowns of the body.
-
-        Parameters
-        ----------
-        r : (n,) contact forces [force].
-
-        Returns
-        -------
-        T' r (N,) [force], or a vector elsewhere.
-        """
+        """T' r (N,): the contact forces r (n,) on the unknowns of the body [force]."""
 
     def started_trace(self, X: Any) -> Callable[[], np.ndarray]:
-        """Begin to take a displacement to the contacts. Elsewhere the work is ordered at once.
-
-        Parameters
-        ----------
-        X : (N,) displacement [length].
-
-        Returns
-        -------
-        A function without arguments that returns T X (n,) [length].
-        """
+        """Begin with T X (n,) [length], elsewhere at once, and return the function that ends it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,51 +126,21 @@ class CoupledForm:
         return self._each(lambda term, own: term.stiffness(own) / self.factor, X)
 
     def approximate(self, F: Stacked) -> Stacked:
-        """Multiply forces on the bodies with B, and count it.
-
-        Parameters
-        ----------
-        F : The forces in parts, one for each body [force].
-
-        Returns
-        -------
-        B F [length].
-        """
+        """B F [length] for forces F on the bodies, which is counted."""
         self.counter.total += 1
         return self._each(lambda term, own: term.cycle(own) * self.factor, F)
 
     def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:
-        """Compute the displacement at the contacts from displacements of the bodies and contact
-        forces.
-
-        Parameters
-        ----------
-        X, r : Displacements of the bodies in parts [length], and (n,) contact forces [force].
-
-        Returns
-        -------
-        T X + rest r (n,) [length], which is Q r in equilibrium.
-        """
+        """T X + rest r (n,) [length], which is Q r in equilibrium."""
         started = in_turn(lambda term, own: term.started_trace(own), self.terms, X.parts)
         return np.asarray(sum((own() for own in started), self.rest(r)))
 
     def unbalanced(self, X: Stacked, r: np.ndarray) -> Stacked:
-        """Compute the forces that are missing to equilibrium.
-
-        Parameters
-        ----------
-        X, r : Displacements of the bodies in parts [length], and (n,) contact forces [force].
-
-        Returns
-        -------
-        T' r - A X [force].
-        """
+        """T' r - A X: the forces that are missing to equilibrium."""
         return self.pulled(r) - self.stiffness(X)
 
     def scaled(self, factor: float, added: np.ndarray) -> CoupledForm:
-        """Make the form of factor Q + diag(added), with added (n,), whose displacements X are in
-        units in which A is A / factor.
-        """
+        """The form of factor Q + diag(added), added (n,), with X in units where A is A / factor."""
         rest = self.rest
         return replace(
             self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor

@@ -1,9 +1,6 @@
-"""Vectors in parts: one array for each body, some of which may lie in other processes.
-
-A part is an array, or an object with the same operators that is `elsewhere`
-(contactopt.bodies.remote.Field). What is done with a part elsewhere is only ordered here; so the
-orders go out first, and all processes work at the same time. Sums are made part by part, wherever
-the parts are, so that the result does not depend on it.
+"""Vectors in parts: one array for each body, some in other processes, where what is done with them
+is only ordered (contactopt.bodies.remote.Field): so the orders go out first, and all work at the
+same time. Sums are made part by part, so that the result does not depend on it.
 """
 
 from __future__ import annotations
@@ -19,18 +16,7 @@ Act = Callable[..., Any]
 
 
 def in_turn(act: Act, *columns: Iterable[Any]) -> list[Any]:
-    """Apply a function to the entries of columns row by row, first where the entry of the first
-    column is elsewhere.
-
-    Parameters
-    ----------
-    act : A function of as many arguments as there are columns.
-    columns : Columns of equal length.
-
-    Returns
-    -------
-    What the function returned, in the order of the rows.
-    """
+    """Apply a function row by row, first where the first column's entry is elsewhere."""
     rows = list(zip(*columns))
     made = {
         i: act(*rows[i])
@@ -78,29 +64,11 @@ class Stacked:
         return self._each(operator.mul, -1.0)
 
     def astype(self, kind: Any) -> Stacked:
-        """Convert the vector to another precision.
-
-        Parameters
-        ----------
-        kind : The type of its entries.
-
-        Returns
-        -------
-        The vector in the same parts.
-        """
+        """The vector in another precision."""
         return self._each(lambda part, kind: part.astype(kind), kind)
 
     def dot(self, other: Stacked) -> float:
-        """Compute the scalar product with another vector.
-
-        Parameters
-        ----------
-        other : A vector in the same parts.
-
-        Returns
-        -------
-        The sum over all parts.
-        """
+        """The scalar product with a vector in the same parts."""
         return sum(own() for own in in_turn(_started_dot, self.parts, other.parts))
 
 
@@ -117,28 +85,10 @@ def _started_dot(x: Any, y: Any) -> Callable[[], float]:
 
 
 def dot(x: Vector, y: Vector) -> float:
-    """Compute the scalar product x' y.
-
-    Parameters
-    ----------
-    x, y : Two arrays (n,), or two vectors in the same parts.
-
-    Returns
-    -------
-    The sum. It does not depend on where the parts are.
-    """
+    """The scalar product of two arrays, or of two vectors in the same parts, wherever these are."""
     return float(x.dot(y)) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
 
 
 def norm(x: Vector) -> float:
-    """Compute the Euclidean norm of a vector.
-
-    Parameters
-    ----------
-    x : An array (n,), or a vector in parts.
-
-    Returns
-    -------
-    The square root of x' x.
-    """
+    """The Euclidean norm of an array, or of a vector in parts."""
     return float(np.sqrt(dot(x, x)))

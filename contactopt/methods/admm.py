@@ -84,10 +84,7 @@ def _balancing(
     x: np.ndarray,
     rho: float,
 ) -> float:
-    """The factor by which rho should change.
-
-    The larger error says which way: a larger rho lets r = z fall faster, a smaller one velocities.
-    """
+    """The factor for rho: a larger rho lets r = z fall faster, a smaller one velocities."""
     primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
     parts = problem.Q @ z.ravel(), problem.q, rho * x  # the velocity is their difference
     size = max(*(float(np.linalg.norm(part)) for part in parts), 1e-300)
@@ -97,9 +94,7 @@ def _balancing(
 
 
 class Balanced:
-    """The solution of (Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is
-    factorised once.
-    """
+    """(Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is factorised once."""
 
     def __init__(self, problem: InterfaceProblem, rho: float):
         (k, d), self.V = problem.q.shape, problem.V

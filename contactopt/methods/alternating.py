@@ -49,11 +49,9 @@ class TwoStage(Method):
         return law.bounded and not law.dilatant
 
     def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
-        """Solvers of the normal and of the tangential problem.
-
-        Each has `solve(r, multipliers)`, which returns r (k, dim) with its own components renewed,
-        and the multipliers of its own plates: those of the mask `pushes` (p,) belong to the normal
-        problem, all others to the tangential one.
+        """Solvers of the normal problem, with the plates of the mask `pushes` (p,), and of the
+        tangential one, with all others. `solve(r, multipliers)` returns r (k, dim) with its own
+        components renewed, and the multipliers of its own plates.
         """
         raise NotImplementedError
 

@@ -69,9 +69,7 @@ def accelerate(
     step: float,
     accuracy: float,
 ) -> Iterate:
-    """Minimise a quadratic over the convex set of prox, from r (k, d), until a step moves r by at
-    most `accuracy`.
-    """
+    """Minimise a quadratic over the set of prox until a step moves r by `accuracy` at most."""
     y, momentum = r, 1.0
     for _ in range(INNER):
         check_time()

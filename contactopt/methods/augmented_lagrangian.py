@@ -50,9 +50,7 @@ class AugmentedLagrangian(Method):
         check_number("the penalty rho", self.rho, low=0.0)
 
     def solves(self, law: Law) -> bool:
-        """The exact variant solves every law; Uzawa's holds friction bounds, which associated
-        friction has not.
-        """
+        """Uzawa's variant holds friction bounds, which associated friction lacks."""
         return law.bounded and not (self.explicit and law.dilatant)
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:

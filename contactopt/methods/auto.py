@@ -117,10 +117,8 @@ class Auto(Method):
 
 
 class _Robust:
-    """The stages after Newton's method, on a problem whose Q is an array or sparse.
-
-    A stage yields its iterates, and returns the best of its points or a better one that it was
-    given.
+    """The stages after Newton's method, on a problem whose Q is an array or sparse. A stage yields
+    its iterates, and returns the best of its points or a better one that it was given.
     """
 
     def __init__(self, problem: InterfaceProblem, loose: bool):
@@ -172,9 +170,7 @@ class _Robust:
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
     def jammed(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
-        """Without end: paths drawn at random, and the gentle proximal loop from the best point so
-        far.
-        """
+        """Paths drawn at random and the gentle proximal loop from the best point, without end."""
         problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
             if self.conic and restarts:
@@ -207,9 +203,7 @@ class _Robust:
     def interior(
         self, start: Iterate, points: Iterator[tuple[Iterate, float]]
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Points with their errors and, where they came near to a solution, a few proximal steps
-        for the last digits.
-        """
+        """Points with their errors and, near a solution, a few proximal steps."""
         found, best = yield from _followed(points, lambda steps, since: False)
         reached = found or start
         if best < constants.CLOSE:
@@ -252,10 +246,8 @@ def _newton(
 ) -> Generator[Iterate | Known, None, Iterate]:
     """Newton's iterates; returns the best.
 
-    What comes next needs the entries of Q. Where there are many, or bodies are solved by iteration,
-    these are dear, and Newton's method goes on until its own products have cost as much. A start
-    that leads nowhere is given up for the solution of the bonded problem, from which Newton's
-    method begins where it has none.
+    What comes next needs the entries of Q. Where these are dear, Newton's method goes on until its
+    own products have cost as much. A start that leads nowhere is given up for the bonded solution.
     """
     Q = problem.Q
     dear = isinstance(Q, InterfaceOperator) and (

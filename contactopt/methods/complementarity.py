@@ -94,9 +94,7 @@ def complementarity_problem(
 
 
 def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """A solution z (m,) >= 0 with M z + q >= 0 and z'(M z + q) = 0, by complementary pivots on
-    w - M z - z0 = q; None if the pivots end on a ray.
-    """
+    """z >= 0 with M z + q >= 0, z'(M z + q) = 0 by pivots on w - M z - z0 = q; None on a ray."""
     m = len(q)
     if np.all(q >= 0):
         return np.zeros(m)

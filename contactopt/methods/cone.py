@@ -93,9 +93,7 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 def cone_program(
     problem: InterfaceProblem, bridge: str, backend: str
 ) -> Callable[[np.ndarray], Iterate]:
-    """The cone program of the module's head, as a function of the opening mu s (k,) [length] that
-    returns r (k, dim) and multipliers (p,).
-    """
+    """The cone program of the module's head, from the opening mu s (k,) [length] to its answer."""
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
         from contactopt.models import acary_cadoux

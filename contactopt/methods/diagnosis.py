@@ -283,9 +283,7 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray) -> Thresholds:
 
 
 def _largest(A: np.ndarray, B: np.ndarray) -> float:
-    """Largest eigenvalue of A x = value B x, at least 0; LinAlgError if B is not positive
-    definite.
-    """
+    """Largest eigenvalue of A x = value B x, at least 0; LinAlgError unless B is definite."""
     symmetric = (A + A.T) / 2, (B + B.T) / 2
     last = (len(A) - 1,) * 2
     return max(0.0, float(la.eigh(*symmetric, eigvals_only=True, subset_by_index=last)[0]))
@@ -330,9 +328,7 @@ def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: float) -> Local:
-    """Per closed contact  G D r_t + H D w = -mu d D g:  stick G = 0, H = I; slip along d; no
-    friction G = I, d = 0.
-    """
+    """Per closed contact G D r_t + H D w = -mu d D g: H = I in stick, slip along d, G = I else."""
     k, dim = r.shape
     bound, force = problem.mu * np.abs(r[:, 0]), np.linalg.norm(r[:, 1:], axis=1)
     status = contact_status(problem, r)

@@ -182,10 +182,7 @@ def _run(
 def _follow(
     steps: Iterator[Iterate | Known], scaled: InterfaceProblem, recorder: _Recorder
 ) -> tuple[Status | None, str, Infeasible | None]:
-    """Take iterates until they end, or a proof is found that there is no solution.
-
-    Returns how the iteration ended, why, and the proof.
-    """
+    """Take iterates until they end, or a proof ends them: how, why, and the proof."""
     ended: Status | None = None
     repeated: Status | None = None
     message, proof, doubt = "", None, DOUBT
@@ -206,11 +203,8 @@ def _follow(
 def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None
 ) -> tuple[Iterate | Known | None, Status | None, str]:
-    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended
-    and why.
-
-    `repeated` says how the last iterates repeat earlier ones. A method that does not go on in
-    another way ends so.
+    """The next iterate with `left` seconds to go, or how and why the iteration ended; `repeated`
+    says how the last iterates repeat earlier ones, which ends a method without another way.
     """
     try:
         # what overflows is seen below
@@ -230,9 +224,7 @@ def _next(
 
 
 def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
-    """The next iterate of a method that was told that it repeats itself; None where it has no other
-    way to go on.
-    """
+    """The next iterate of a method told that it repeats itself; None if it ends."""
     try:
         return steps.throw(Repeated()) if isinstance(steps, Generator) else None
     except (Repeated, StopIteration):
@@ -240,9 +232,7 @@ def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
 
 
 def _counts(Q: Interface) -> dict[str, float]:
-    """What a method has spent so far: products with an operator Q and, where it works on the bodies
-    themselves, V-cycles.
-    """
+    """Products with an operator Q so far and, where a method works on the bodies, V-cycles."""
     if not isinstance(Q, InterfaceOperator):
         return {}
     counts: dict[str, float] = {"products": Q.products}
@@ -250,9 +240,7 @@ def _counts(Q: Interface) -> dict[str, float]:
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
-    """No contact, so no force: it solves the problem unless a plate needs forces that balance its
-    load.
-    """
+    """Without contacts no force is the solution, unless a plate needs some."""
     r, multipliers = at_rest(problem)
     residual = natural_map_residual(problem, r, multipliers)
     status, message = Status.SOLVED, Status.SOLVED.sentence
@@ -303,10 +291,8 @@ class _Recorder:
         self.certified += time.perf_counter() - begin
 
     def _certificate(self, known: Sequence[Moved]) -> float:
-        """The natural-map residual, by Q r from the method where it is known.
-
-        Where products cost iterations it is computed to a digit as long as it is far from the
-        tolerance.
+        """The natural-map residual, by the method's own Q r; where products cost iterations, to a
+        digit only as long as it is far from the tolerance.
         """
         self.displacements, point = None, (self.reactions, self.multipliers)
         if known:
@@ -369,10 +355,8 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 
 
 def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """Contact only pushes: InputError for a load that it cannot balance.
-
-    Where the multipliers are known by name, the motion along which the bodies escape is looked for.
-    Otherwise only a plate that moves along the normals and is pulled off is refused.
+    """InputError for a load that no contacts can balance: bodies escape along a named motion, or a
+    plate is pulled off along the normals.
     """
     if problem.motions:
         found = escape(problem)

@@ -140,9 +140,7 @@ class _Program:
         return np.argmax(answer.x[n:].reshape(4, k), axis=0), answer.x[:n]
 
     def point(self, states: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r (k, 2) and lambda (p,): the solution of the linear system of these states that is
-        nearest to `near`.
-        """
+        """The solution r (k, 2), lambda (p,) of these states' linear system nearest to `near`."""
         problem, k = self.problem, self.problem.contacts
         A, b = np.hstack([problem.Q, problem.V]), -problem.q.ravel()
         shut, opened, slips = np.flatnonzero(states != OPEN), states == OPEN, states >= FORWARD
@@ -159,9 +157,7 @@ class _Program:
         return r, x[2 * k :]
 
     def exclude(self, possible: np.ndarray) -> None:
-        """Cut every combination that takes the state of each contact from its `possible` ones (k,
-        4).
-        """
+        """Cut every combination that takes each contact's state from its `possible` ones (k, 4)."""
         cut = np.concatenate([np.zeros(len(self.integer) - possible.size), possible.T.ravel()])
         self.A = np.vstack([self.A, cut])
         self.low, self.high = np.append(self.low, -np.inf), np.append(self.high, len(possible) - 1)
@@ -186,9 +182,7 @@ def _states_of(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> np.
 
 
 def _bounds(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds of |r| (k, 2), |u| (k, 2) and |lambda| (p,) at every solution, derived in the module's
-    head.
-    """
+    """Bounds of |r| (k, 2), |u| (k, 2), |lambda| (p,) at every solution, from the module's head."""
     k, p = problem.contacts, len(problem.s)
     r0, Z, V_n = np.zeros(2 * k), np.eye(2 * k), problem.V[::2]
     if p:

@@ -1,13 +1,13 @@
-"""Lagrange multiplier method for friction inside the two-stage iteration: Uzawa's iteration (paper,
-section 5.1).
+"""Lagrange multipliers for friction inside the two-stage iteration: Uzawa's iteration (paper, 5.1).
 
-Normal problem, r_t fixed: the QP (21), solved by conjugate gradients with bounds
-(contactopt.methods.kernels.mprgp) and made exact by active set steps. Tangential problem, r_n
-fixed: the friction force is the Lagrange multiplier of the bound on the slip rate; Uzawa's ascent
+The normal problem (21) is solved by conjugate gradients with bounds
+(contactopt.methods.kernels.mprgp) and made exact by active set steps. The tangential program (22)
+is solved by Uzawa's ascent on the multiplier of the bound on the slip rate,
+
     r_t <- projection of r_t - rho u_t on |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
-is repeated until it has converged. It minimises the convex program (22) of `alternating`;
-tangentially moving plates keep their balance within the projection. rho = 1 / largest eigenvalue of
-Q_tt, so that the inner iteration always converges.
+
+repeated until it has converged; tangentially moving plates keep their balance within the
+projection. rho = 1 / largest eigenvalue of Q_tt, so that the inner iteration always converges.
 
 Sources: Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational Inequalities, for
 Uzawa's method; Panagiotopoulos (1975) for the alternation.
@@ -63,9 +63,7 @@ class Normal(Components):
 
 
 class Tangential(Components):
-    """The tangential program, until a step moves r_t by no more than `accuracy` of its size: a
-    hundredth of what the last solve moved it.
-    """
+    """The tangential program, to a hundredth of what the last solve moved r_t."""
 
     accuracy = SHARPER
 

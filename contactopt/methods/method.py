@@ -21,9 +21,7 @@ class Method(Protocol):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        """Iterate on a dimensionless problem, from a cold start if `start` is None. The driver
-        decides when to stop.
-        """
+        """Iterate on a dimensionless problem until the driver stops; start None is a cold start."""
         ...
 
     def backends(self, dim: int) -> tuple[str, str]:

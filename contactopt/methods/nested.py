@@ -1,11 +1,10 @@
 """Newton's method on nested grids, for problems whose Q is a convolution: half-spaces, rough
 surfaces.
 
-The problem is solved on coarse grids first, where it costs little to find out which contacts close
-and slip; each solution starts the next finer grid. The steps are those of the primal-dual active
-set method (`newton`), whose linear systems are solved by PCG or GMRES in single precision to the
-accuracy that the step is worth, while residuals are computed in double precision. Without friction
-only the normal components are computed.
+Coarse grids tell cheaply which contacts close and slip; each solution starts the next finer grid.
+The steps are those of `newton`, by PCG or GMRES in single precision to the accuracy that they are
+worth, while residuals are computed in double precision. Without friction only the normal components
+are computed.
 
 Sources: Polonsky, Keer (1999), A numerical method for solving rough contact problems based on the
 multi-level multi-summation and conjugate gradient techniques; Hueber, Stadler, Wohlmuth (2008) for
@@ -64,11 +63,9 @@ class Nested(Method):
         while levels[-1].halves:
             levels.append(levels[-1].coarse())
         given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
-        point = (
-            _robust_start(levels[-1], _first_guess(levels, given))
-            if len(levels) > 1
-            else _first_guess(levels, given)
-        )
+        point = _first_guess(levels, given)
+        if len(levels) > 1:
+            point = _robust_start(levels[-1], point)
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
             point, at = _solve_level(coarse, point)
             logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
@@ -76,9 +73,8 @@ class Nested(Method):
         finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
         if given is not None:
             other = finest.evaluate(*given)
-            point, at = (
-                (given, other) if other.residual < constants.CLOSER * at.residual else (point, at)
-            )
+            if other.residual < constants.CLOSER * at.residual:
+                point, at = given, other
         while True:
             near = NEAR * max(1.0, float(np.linalg.norm(point[0])))
             if at.residual <= near or at.residual > 0.5 * last:
@@ -92,19 +88,12 @@ class Nested(Method):
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
             at = finest.evaluate(*point)
-            logger.info(
-                "grid %s: %d closed, %d iterations, residual %.1e",
-                finest.kernel.grid,
-                len(at.closed),
-                count,
-                at.residual,
-            )
+            told = finest.kernel.grid, len(at.closed), count, at.residual
+            logger.info("grid %s: %d closed, %d iterations, residual %.1e", *told)
 
 
 def _first_guess(levels: list[Level], given: Point | None) -> Point:
-    """A point on the coarsest level: the one given, or the forces spread evenly that balance the
-    loads.
-    """
+    """The given point on the coarsest level, or forces spread evenly that balance the loads."""
     coarsest = levels[-1]
     if given is not None:
         for level in levels[:-1]:
@@ -122,9 +111,7 @@ def _first_guess(levels: list[Level], given: Point | None) -> Point:
 
 
 def _robust_start(coarsest: Level, point: Point) -> Point:
-    """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default
-    method on an array Q.
-    """
+    """A solution on the coarsest grid: by Newton's steps, or else by `auto` on an array Q."""
     reached, at = _solve_level(coarsest, point, constants.COARSEST_ENOUGH)
     if (
         at.residual <= constants.COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
@@ -170,13 +157,8 @@ def _solve_level(
 
 def _worth(residual: float, last: float) -> float:
     """Accuracy of a step: low while the residual does not fall, because contacts still change."""
-    return forcing(
-        residual,
-        last,
-        constants.NESTED_LOOSEST,
-        constants.NESTED_LOOSEST,
-        constants.NESTED_TIGHTEST,
-    )
+    loosest, tightest = constants.NESTED_LOOSEST, constants.NESTED_TIGHTEST
+    return forcing(residual, last, loosest, loosest, tightest)
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:

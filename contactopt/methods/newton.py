@@ -1,14 +1,12 @@
 """Semismooth Newton method on the Alart-Curnier equations, the primal-dual active set method for
 Coulomb friction.
 
-Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law
-(contactopt.problem.laws): each step sorts the contacts into open, sticking and slipping and solves
-one linear system of the closed ones: dense, by sparse factors where Q is sparse, or, where Q is an
-operator, by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker 1996). Where
+Each step on r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 sorts the contacts by the map P of
+the law and solves one linear system of the closed ones: dense, by sparse factors, or for an
+operator Q by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker 1996). Where
 the bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
-(contactopt.methods.kernels.coupled_newton). Full steps from the bonded solution. Motions that
-friction alone holds, and no sticking contact, follow from a convex problem before each step
-(contactopt.methods.kernels.balance).
+(contactopt.methods.kernels.coupled_newton). Motions that friction alone holds follow from a convex
+problem before each step (contactopt.methods.kernels.balance).
 
 Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm
 for three-dimensional contact problems with Coulomb friction.
@@ -83,10 +81,7 @@ class Newton(Method):
     def with_residuals(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
-        """Iterates, each with the residual of the equations that its step began with.
-
-        Raises InputError if the linear algebra that was asked for does not fit Q.
-        """
+        """Iterates with the residual before each step; InputError if `linear` does not fit."""
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:
             raise InputError(

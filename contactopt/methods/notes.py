@@ -1,9 +1,6 @@
-"""What a solve did otherwise than asked or expected, in sentences: logged where it happens and kept
-in the Solution.
-
-A method that falls back on something weaker or dearer calls `note`. The driver opens `collected`
-around each solve; the list belongs to that solve alone, also where solves run in several threads or
-one inside another.
+"""What a solve did otherwise than asked or expected: a method calls `note`, which logs the
+sentence. The driver opens `collected` around each solve, whose Solution keeps them, also among
+threads.
 """
 
 from __future__ import annotations
@@ -17,9 +14,7 @@ _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs"
 
 
 def note(logger: logging.Logger, sentence: str) -> None:
-    """Log what was done otherwise than asked or expected, and keep the sentence for the Solution of
-    the solve that runs. A sentence is kept once.
-    """
+    """Log what was done otherwise than asked or expected, and keep it once for the Solution."""
     logger.info(sentence)
     notes = _notes.get()
     if notes is not None and sentence not in notes:

@@ -58,9 +58,8 @@ class NSGS(Method):
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         (k, dim), V, s = problem.q.shape, problem.V, problem.s
-        r, lam = (
-            (np.zeros((k, dim)), np.zeros(len(s))) if start is None else (start[0].copy(), start[1])
-        )
+        r, lam = start or (np.zeros((k, dim)), np.zeros(len(s)))
+        r = r.copy()
         flat = r.reshape(-1)  # a view: changes with r
         tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
         motions = V.reshape(k, dim, -1)
@@ -82,11 +81,9 @@ class NSGS(Method):
                 if len(s):
                     moved += T @ (tau * pushed)
                 new = local.solve((moved - local.W @ old).tolist())
-                r[i] = (
-                    new
-                    if self.relaxation == 1.0
-                    else local.admissible(old + self.relaxation * (new - old))
-                )
+                if self.relaxation != 1.0:
+                    new = local.admissible(old + self.relaxation * (new - old))
+                r[i] = new
                 if len(s):
                     pushed += T.T @ (r[i] - old)
             lam = lam + tau * (V.T @ flat + s)
@@ -94,9 +91,7 @@ class NSGS(Method):
 
 
 def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.ndarray, np.ndarray]:
-    """The components that move contact i, their part (dim, m) of Q, and the contact's own block
-    (dim, dim).
-    """
+    """The components that move contact i, their part (dim, m) of Q, its own block (dim, dim)."""
     own = slice(dim * i, dim * (i + 1))
     if not sp.issparse(Q):
         return slice(None), Q[own], Q[own, own]
@@ -106,10 +101,7 @@ def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.nd
 
 
 class Local:
-    """Coulomb's law at one contact, u = W r + v: W (dim, dim), mu >= 0.
-
-    Scalar arithmetic, for speed.
-    """
+    """Coulomb's law at one contact, u = W r + v, by scalar arithmetic: W (dim, dim), mu >= 0."""
 
     def __init__(self, W: np.ndarray, mu: float, bilateral: bool):
         self.W, self.mu, self.bilateral = W, mu, bilateral

@@ -1,9 +1,4 @@
-"""The heart: the interface problem of frictional contact, its solution and its certificate.
-
-Optimisation only.
-
-Nothing here, or below in what it imports, knows finite elements.
-"""
+"""The interface problem of frictional contact, its solution and its certificate."""
 
 from contactopt.problem.certificate import (
     balance_residual,

@@ -70,11 +70,9 @@ STIFFEST = 1e4  # largest rho_i, over the mean one
 class Moved:
     """Q r, known from displacements that are carried along with the forces r.
 
-    value     (k dim,) [length]
-    accuracy  error of these displacements in the energy norm, relative to them: how far the bodies
-              are from equilibrium
-    displacements  (N,) these displacements, the unknowns X of contactopt.linear.saddle_point
-                   [length]
+    value          (k dim,) [length]
+    accuracy       relative error of these displacements in the energy norm
+    displacements  (N,) the unknowns X of contactopt.linear.saddle_point [length]
     """
 
     value: np.ndarray
@@ -84,18 +82,14 @@ class Moved:
 
 @dataclass(frozen=True)
 class Yardsticks:
-    """What errors are compared with: a force F, a length L, and the steps rho (k,) of the natural
-    map [force/length].
-    """
+    """What errors are compared with: force F, length L, steps rho (k,) of the natural map."""
 
     force: float
     length: float
     rho: np.ndarray
 
     def errors(self, law: Law, r: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """e_i = |r_i - P(r_i - rho_i u_i)| / F (k,) of the head of this module, for forces r (k,
-        dim) [force] and displacements u (k, dim) [length].
-        """
+        """e_i (k,) of the head of this module, for forces r and displacements u, both (k, dim)."""
         return lengths(r - law.mapped(r - self.rho[:, None] * u)) / self.force
 
 
@@ -147,18 +141,8 @@ def natural_map_residual(
 def yardsticks(
     problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray
 ) -> Yardsticks:
-    """Find the force F, the length L and the steps rho of the certificate, as in the head of this
-    module.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    r : (k, dim) forces [force].
-    d, w : (k, dim) displacements d = Q r and w = q + V lambda [length]; all finite.
-
-    Returns
-    -------
-    What the errors are compared with.
+    """Force F, length L and steps rho, as in the head of this module, for forces r and the finite
+    displacements d = Q r and w = q + V lambda, all (k, dim).
     """
     size, gap = lengths(r), w[:, 0]
     largest = float(size.max())
@@ -200,9 +184,7 @@ def _plate_force(problem: InterfaceProblem) -> float:
 
 
 def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
-    """The least displacement that is an error or may be one: of a contact that bears force or
-    overlaps. 0 without any.
-    """
+    """The least |u_i| of contacts that bear force or overlap; 0 without any."""
     size = np.linalg.norm(u, axis=1)
     counts = ((np.any(r != 0, axis=1)) | (u[:, 0] < 0)) & (size > 0)
     return float(size[counts].min()) if counts.any() else 0.0

@@ -1,6 +1,4 @@
-"""The contact surface's own coordinates: what every reader of places on it uses, whatever way the
-bodies are turned.
-"""
+"""The contact surface's own coordinates, whatever way the bodies are turned."""
 
 from __future__ import annotations
 
@@ -53,14 +51,12 @@ class Chart:
 
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
-        """Lay a chart through bare points, of which nothing else is known, along the directions in
-        which they extend most.
+        """Lay a chart through bare points (d, k) [length], of which nothing else is known, open and
+        without symmetry.
 
         Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
         Otherwise the origin is the middle of the points, the axes are their principal directions,
-        and the sign of each axis is chosen so that its largest component in space is positive. The
-        chart is open and without symmetry. `coordinates` are the points (d, k) [length], and `dim`
-        is the number of components of a contact.
+        and the sign of each makes its largest component in space positive.
         """
         count = dim - 1
         if len(coordinates) <= count:
@@ -144,20 +140,12 @@ class Pair:
 
 
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
-    """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
+    """Compute positive weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2,
+    scaled so that the mean of w^2 is one.
 
     A force that is spread over the area of a node makes a displacement proportional to 1 / length
     of the contact line there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area /
     spacing on a line, sqrt(area) on a surface.
-
-    Parameters
-    ----------
-    chart : The places of the k contacts on their surface [length].
-    areas : (k,) nodal areas [length^2].
-
-    Returns
-    -------
-    (k,) positive weights [-]. The mean of w^2 is one.
     """
     if len(chart.places) == 2:
         square = np.sqrt(areas)

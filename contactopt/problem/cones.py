@@ -14,9 +14,7 @@ DIRECTIONS = 16  # of the polygon in a disc
 
 
 def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split forces or displacements (k, dim) into views of their normal part (k,) and of their
-    tangential part (k, dim - 1).
-    """
+    """Views of the normal part (k,) and of the tangential part (k, dim - 1) of blocks."""
     return blocks[:, 0], blocks[:, 1:]
 
 
@@ -34,9 +32,7 @@ def unit(t: np.ndarray) -> np.ndarray:
 
 
 def polygon(dim: int) -> tuple[np.ndarray, float]:
-    """Directions of slip (j, dim - 1), the corners of a regular polygon in 3D, and the factor by
-    which a polygon with edges normal to them is wider than the disc inside it.
-    """
+    """Directions (j, dim - 1) of a regular polygon, and by what it is wider than its inner disc."""
     if dim == 2:
         return np.array([[1.0], [-1.0]]), 1.0
     angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
@@ -44,34 +40,14 @@ def polygon(dim: int) -> tuple[np.ndarray, float]:
 
 
 def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Nearest points of discs |t| <= radius; of intervals for d = 1.
-
-    Parameters
-    ----------
-    t : (k, d) points.
-    radius : (k,) radii, at least 0.
-
-    Returns
-    -------
-    (k, d) the nearest points.
-    """
+    """Nearest points of discs |t| <= radius (k,) to t (k, d); of intervals for d = 1."""
     length = lengths(t)
     shrink = np.divide(radius, length, out=np.ones_like(length), where=length > radius)
     return np.asarray(t * shrink[:, None])
 
 
 def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """Nearest points of Coulomb's cones |r_t| <= mu r_n.
-
-    Parameters
-    ----------
-    r : (k, dim) points, normal component first.
-    mu : (k,) friction coefficients, at least 0.
-
-    Returns
-    -------
-    (k, dim) the nearest points.
-    """
+    """Nearest points of Coulomb's cones |r_t| <= mu r_n to r (k, dim), normal component first."""
     n, t = split(r)
     length = lengths(t)
     inside = (length <= mu * n) & (n >= 0)  # without friction a tension is outside, too
@@ -83,34 +59,15 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
 def half_line_derivative(
     y: np.ndarray, low: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection on the half-line [low, inf), and its generalised derivative.
-
-    Parameters
-    ----------
-    y : (k, 1) points.
-    low : One number or (k,); it may be -inf.
-
-    Returns
-    -------
-    The nearest points (k, 1), and the derivative (k, 1, 1), 0 or 1.
-    """
+    """Projection of y (k, 1) on the half-line [low, inf), and its derivative (k, 1, 1)."""
     bound = np.broadcast_to(low, len(y))[:, None]
     return np.maximum(y, bound), (y > bound).astype(float)[:, :, None]
 
 
 def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection on discs |y| <= radius, and its generalised derivative.
+    """Projection of y (k, d) on discs |y| <= radius, and its generalised derivative (k, d, d).
 
     Outside the disc the derivative is (radius / |y|) (I - y y' / |y|^2), which is zero for d = 1.
-
-    Parameters
-    ----------
-    y : (k, d) points.
-    radius : (k,) radii, at least 0.
-
-    Returns
-    -------
-    The nearest points (k, d), and the derivative (k, d, d).
     """
     k, d = y.shape
     if d == 1:
@@ -128,18 +85,7 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
 def cylinder_derivative(
     y: np.ndarray, radius: np.ndarray, low: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection on the cylinders r_n >= low, |r_t| <= radius, and its generalised derivative.
-
-    Parameters
-    ----------
-    y : (k, dim) points, normal component first.
-    radius : (k,) radii, at least 0.
-    low : One number or (k,); it may be -inf.
-
-    Returns
-    -------
-    The nearest points (k, dim), and the derivative (k, dim, dim).
-    """
+    """Projection of y (k, dim) on cylinders r_n >= low, |r_t| <= radius, and its derivative."""
     P, D = np.empty_like(y), np.zeros((*y.shape, y.shape[1]))
     P[:, :1], D[:, :1, :1] = half_line_derivative(y[:, :1], low)
     P[:, 1:], D[:, 1:, 1:] = disc_derivative(y[:, 1:], radius)
@@ -149,10 +95,8 @@ def cylinder_derivative(
 def disc_of_height(
     height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of tangential components t (k, dim - 1) alone, on discs whose radius is
-    mu |height|, and its derivative; the heights (k,) stay.
-
-    slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
+    """Projection of t (k, dim - 1) alone on discs of radius mu |height|, and its derivative; the
+    heights (k,) stay. `slope` (k,) is the derivative of |height|.
     """
     k, dim = len(t), t.shape[1] + 1
     bound, length = mu * np.abs(height), lengths(t)
@@ -167,20 +111,11 @@ def disc_of_height(
 
 
 def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection on Coulomb's cones as in coulomb_cone(), and its generalised derivative.
+    """Projection of y (k, dim) on Coulomb's cones, and its generalised derivative (k, dim, dim).
 
     The derivative is the identity inside the cone and zero in its polar. Between them the nearest
     point is h (1, mu unit) with h = (y_n + mu |y_t|) / (1 + mu^2). The derivative projects on that
     ray and shrinks what is tangent to the disc.
-
-    Parameters
-    ----------
-    y : (k, dim) points, normal component first.
-    mu : (k,) friction coefficients, at least 0.
-
-    Returns
-    -------
-    The nearest points (k, dim), and the derivative (k, dim, dim).
     """
     k, dim = y.shape
     n, t = split(y)

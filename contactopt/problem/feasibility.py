@@ -112,9 +112,7 @@ def _definite(problem: InterfaceProblem) -> bool:
 def _verified(
     problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray
 ) -> bool:
-    """Whether (weights, motions) is a ray, with its conditions met to rounding and its margin far
-    above it.
-    """
+    """Whether (weights, motions) is a ray to rounding, with a margin far above it."""
     k, d = problem.q.shape
     if np.any(weights < 0) or not (np.all(np.isfinite(weights)) and np.all(np.isfinite(motions))):
         return False
@@ -135,9 +133,7 @@ def _verified(
 def _program(
     problem: InterfaceProblem, Q: sp.csr_array, time_limit: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """min q' e + s' z over rays with y, z in the unit box; None if it is not negative or there is
-    no answer in time.
-    """
+    """min q' e + s' z over rays with y, z in the unit box; None unless it is negative in time."""
     from scipy.optimize import linprog
 
     k, d = problem.q.shape

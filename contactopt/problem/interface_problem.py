@@ -182,9 +182,7 @@ class InterfaceProblem:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether Q is symmetric to 1 %: methods that minimise an energy need it, and use (Q + Q')
-        / 2.
-        """
+        """Whether Q is symmetric to 1 %, as methods that minimise an energy need it."""
         return asymmetry(self.Q) <= SYMMETRIC
 
     @cached_property
@@ -203,9 +201,7 @@ class InterfaceProblem:
 
     @cached_property
     def compliances(self) -> np.ndarray:
-        """(k,) mean of the positive diagonal entries of each block [length / force]; 0 where there
-        is none above rounding.
-        """
+        """(k,) mean positive diagonal of each block [length / force], or 0."""
         entries = np.asarray(diagonal(self.Q), dtype=float).reshape(self.q.shape)
         entries = np.where(entries > NOISE * entries.max(initial=0.0), entries, 0.0)
         return np.asarray(entries.sum(axis=1) / np.maximum(np.count_nonzero(entries, axis=1), 1))

@@ -1,7 +1,5 @@
-"""One pair of surfaces of an interface problem, taken alone.
-
-Places on a contact surface mean something within one pair only. Whoever reads them (figures,
-half-widths, preconditioners) does so pair by pair.
+"""One pair of surfaces of an interface problem, taken alone: places on a contact surface mean
+something within one pair only.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""The form of an interface problem in which every method works: without units, and with friction
-that is the same in all directions.
-"""
+"""The form in which methods work: without units, with friction the same in all directions."""
 
 from __future__ import annotations
 
@@ -147,26 +145,15 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 
 def without_rounding(V: np.ndarray) -> np.ndarray:
-    """Motions V (n, p) without the entries that are rounding beside the largest of their column.
-
-    Normals of a flat surface that are off by rounding would let forces without friction hold a body
-    along it: by motions without bound, which the certificate does not see.
+    """Motions V (n, p) without entries that are rounding beside the largest of their column: forces
+    without friction would hold a body along a flat surface by them, unseen by the certificate.
     """
     size = np.abs(V)
     return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """Find the components that neither forces nor multipliers nor q move.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-
-    Returns
-    -------
-    (k dim,) mask, True where a component cannot move.
-    """
+    """The components (k dim,) that neither forces nor multipliers nor q move, as a mask."""
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
@@ -177,9 +164,7 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _closing(problem: InterfaceProblem) -> float:
-    """Root mean square of the overlaps of the contacts that overlap at r = 0; without any, of the
-    least |q_i| > 0.
-    """
+    """Root mean square of the overlaps at r = 0; without any, of the least |q_i| > 0."""
     normal = problem.q[:, 0]
     overlap = np.where(problem.law.lowest < 0, np.abs(normal), -normal)
     overlap = overlap[overlap > 0]

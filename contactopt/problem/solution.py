@@ -75,9 +75,7 @@ class Solution:
 
     @property
     def products(self) -> int:
-        """Products with Q that the method took, of which the certificate has its own; 0 where Q is
-        an array.
-        """
+        """Products with Q that the method took; 0 where Q is an array."""
         return int(self.history[-1].get("products", 0)) if self.history else 0
 
     @property

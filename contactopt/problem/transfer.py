@@ -77,9 +77,7 @@ def _by_pair(source: InterfaceProblem, solution: Solution, target: InterfaceProb
 
 
 def _plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The two orthonormal directions (d, 2) in which points (d, k) extend most, and their centre
-    (d, 1).
-    """
+    """The orthonormal directions (d, 2) in which points (d, k) extend most, and their centre."""
     centre = (points.max(axis=1) + points.min(axis=1))[:, None] / 2
     axes = np.linalg.svd(points - centre, full_matrices=False)[0][:, :2]
     return np.pad(axes, ((0, 0), (0, 2 - axes.shape[1]))), centre
@@ -111,9 +109,7 @@ def _along_a_line(
 
 
 def _over_a_surface(x: np.ndarray, new: np.ndarray, traction: np.ndarray) -> np.ndarray:
-    """Values at `new` (m, 2), linear on the triangles between the points x (k, 2); the nearest
-    value outside of them.
-    """
+    """Values at `new` (m, 2), linear on triangles between x (k, 2), the nearest one outside."""
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
     values = LinearNDInterpolator(x, traction)(new)

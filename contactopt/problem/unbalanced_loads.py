@@ -51,18 +51,10 @@ class Escape:
 
 
 def escape(problem: InterfaceProblem) -> Escape | None:
-    """Look for a motion along which the loads drive the bodies away from all contacts.
+    """Find a motion along which the loads drive the bodies away from all contacts, or None.
 
     Looked at are laws under which contacts can only push. Under laws whose friction is no cone,
     only motions count that do not slide where there is friction.
-
-    Parameters
-    ----------
-    problem : The interface problem, with free bodies or plates (V, s).
-
-    Returns
-    -------
-    The motion; None if none is found.
     """
     if not problem.law.unilateral or not np.any(problem.s):
         return None
@@ -95,9 +87,7 @@ def _along(rows: sp.csr_array, dim: int) -> list[Any]:
 
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
-    """Whether forces in polygons inside the cones are found that balance the loads: those of least
-    size, if they are in the cones already, as under a flat surface, or else by a search.
-    """
+    """Whether forces in polygons inside the cones are found that balance the loads."""
     even = problem.V @ np.linalg.lstsq(problem.V.T @ problem.V, -s, rcond=None)[0]
     r = even.reshape(problem.q.shape)
     held = np.all(np.linalg.norm(r[:, 1:], axis=1) <= problem.mu * r[:, 0])
@@ -137,9 +127,7 @@ def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
 
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
-    """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if
-    there are none.
-    """
+    """min |z|_1 with s' z = 1 and V z in a polygon inside each dual cone; None without any."""
     from scipy.optimize import linprog
 
     normal, factor = V[:: problem.dim], polygon(problem.dim)[1]
@@ -186,17 +174,7 @@ def _passes(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> boo
 
 
 def sentence(problem: InterfaceProblem, found: Escape) -> str:
-    """Say in a sentence what a motion without resistance means.
-
-    Parameters
-    ----------
-    problem : The interface problem, whose `motions` name the columns of V.
-    found : The motion that `escape` found in it.
-
-    Returns
-    -------
-    What happens to which body, and what to change.
-    """
+    """Say what a motion without resistance does to which body, and what to change."""
     label = (
         problem.motions[found.strongest] if problem.motions else f"column {found.strongest} of V"
     )

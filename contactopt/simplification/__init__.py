@@ -5,16 +5,9 @@ saves.
     >>> print(found)                          # what was found, in sentences
     >>> result = contactopt.run(found.scene)  # all that is exact is applied
 
-Three kinds of simplification are looked for, the exact ones first:
-
-| module | what may be left out | error |
-|---|---|---|
-| `sections.py` | the third dimension, of prisms between rollers | none |
-| `mirrors.py` | one half, across each plane of mirror symmetry | none |
-| `joints.py` | slip of pairs that stick, friction of pairs that hardly rub | measured coarsely |
-
-"Exact" means that the certificate of the whole was computed from the solution of the smaller scene,
-and is that of a solution (`proof.py`).
+Exact are the third dimension of prisms between rollers (`sections`) and one half across planes of
+mirror symmetry (`mirrors`), where `proof` certifies the whole from the smaller solution. Slip that
+sticks and friction that hardly rubs (`joints`) have an error measured coarsely.
 """
 
 from contactopt.simplification.findings import Simplification, Simplified

@@ -1,9 +1,8 @@
 """One half of a scene that is its own mirror image across a plane normal to an axis.
 
-`Scene.copies` doubles, so that forces, reactions and areas stay those of the whole. What the plane
-cuts keeps the half on the positive side and is held there along the normal. Of two bodies, contacts
-or plates that are each other's images the one on the positive side stays, and stands for both: its
-forces are those of both together. No element is cut.
+`Scene.copies` doubles, so that forces and areas stay those of the whole. What the plane cuts is
+held there along the normal; of two images the one on the positive side stays, with the forces of
+both. No element is cut.
 """
 
 from __future__ import annotations
@@ -24,10 +23,7 @@ from contactopt.simplification.whole import Whole, of_mesh, with_pairs
 
 
 def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
-    """The half on the positive side of a plane across an axis, and how the whole lies on it.
-
-    Raises InputError if the plane runs through elements.
-    """
+    """The positive half, and how the whole lies on it; InputError if elements are cut."""
     scene, near = whole.scene, NEAR * whole.size
     component = scene.components[int(np.argmax(np.abs(plane.normal)))]
     heights = {name: float(np.mean(plane.height(mesh.p))) for name, mesh in whole.meshes.items()}
@@ -87,10 +83,8 @@ def _restricted(mesh: Any, elements: np.ndarray) -> Any:
 
 
 def roller(whole: Whole) -> str:
-    """A support that holds one component of contacts in a plane across it; empty if there is none.
-
-    In a scene of mirror images such a support is a plane of symmetry
-    (contactopt.coupling.planes_of_symmetry), in a whole scene it is not.
+    """A support that holds a component of contacts in a plane across it, or none: it would be a
+    plane of symmetry in a scene of mirror images (contactopt.coupling.planes_of_symmetry).
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]

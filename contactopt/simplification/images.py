@@ -1,10 +1,6 @@
-"""Whether a scene is its own mirror image: meshes, materials, supports, loads, laws, friction and
-gaps.
-
-A mesh is its own image, or that of another body, if every node and every element has one. The
-solution of the whole scene is then its own image, too, on this mesh and to the last digits.
-Boundaries are compared by their facets, and functions of the place at the nodes and between them.
-Nothing is read from names.
+"""Whether a scene is its own mirror image, and so its solution to the last digits: every node and
+every element must have an image, in its own mesh or in that of another body. Boundaries are
+compared by their facets, functions at the nodes and between them; nothing is read from names.
 """
 
 from __future__ import annotations
@@ -75,10 +71,7 @@ class _Differs(Exception):
 
 
 def images_under(whole: Whole, plane: Plane) -> Images | str | None:
-    """How the scene lies on itself.
-
-    Half a sentence if the meshes lie on themselves and the rest does not; None if they do not.
-    """
+    """How the scene lies on itself; half a sentence if only its meshes do, None if they do not."""
     nodes = _images_of_meshes(whole, plane)
     if nodes is None:
         return None
@@ -140,9 +133,7 @@ def _cells(cells: np.ndarray) -> np.ndarray:
 
 
 class _Condition(NamedTuple):
-    """A support, load, force or normal: words, boundary, projection (dim, dim) on the components
-    that have values, these values (dim,), and the object of the scene.
-    """
+    """A support, load, force or normal by words, boundary, projection (dim, dim), values (dim,)."""
 
     kind: str
     where: str
@@ -173,9 +164,7 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
 
 @dataclass(frozen=True, eq=False)
 class _Comparison:
-    """A scene beside its image under one reflection; `nodes` as _images_of_meshes(). Each function
-    raises _Differs where something has no image.
-    """
+    """A scene beside its image; each function raises _Differs where something has none."""
 
     whole: Whole
     plane: Plane
@@ -212,9 +201,7 @@ class _Comparison:
         return twins
 
     def _plates(self, part: Any, image: Any) -> set[tuple[str, int]]:
-        """(body, number of a load) of plates that are their own images, if all conditions have
-        images.
-        """
+        """Plates that are their own images, if all conditions have images."""
         components, H, found = self.whole.scene.components, self.plane.reflection, set()
         others = list(_conditions(image, components))
         for one in _conditions(part, components):

@@ -32,10 +32,7 @@ def coarse(scene: Scene) -> Solved:
 
 
 def offered_joints(scene: Scene, solved: Solved) -> list[Simplification]:
-    """Pairs that can be tied or frictionless, as a solution on a coarse mesh shows them.
-
-    Only pairs under Coulomb's law are looked at, and one pair of the scene stays untied.
-    """
+    """Pairs under Coulomb's law, but one, that a coarse solution lets tie or be frictionless."""
     tied, smooth = [], []
     for contact, pair in zip(scene.pairs, solved.reduction.problem.pairs):
         if contact.law == "coulomb" and np.any(solved.reduction.problem.mu[pair.contacts] > 0):
@@ -97,10 +94,7 @@ def _rubbing(solved: Solved, pair: Pair) -> float:
 
 
 def _change(one: Solved, other: Solved) -> float:
-    """The largest relative change of energy, contact forces and largest pressures.
-
-    Forces and pressures are compared with the largest ones of the scene.
-    """
+    """The largest change of energy, forces and pressures, over the largest of the scene."""
     changes = []
     for a, b in zip(_readings(one), _readings(other)):
         scale = float(np.linalg.norm(a, axis=-1).max(initial=0.0))

@@ -58,10 +58,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
     """What is left of a scene after all simplifications that are proved, and its solution on that
-    scene's own mesh.
-
-    The note of the options is told what was found. Where nothing was proved the scene is the given
-    one, and the solution is None.
+    scene's own mesh, or None. The note of the options is told what was found.
     """
     notes: list[str] = []
     chain: list[Simplification] = []

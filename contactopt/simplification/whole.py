@@ -46,10 +46,7 @@ class Whole:
 
     @cached_property
     def sizes(self) -> tuple[int, int]:
-        """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
-
-        Contacts are the nodes of the finer surface of each pair; supports are not taken off.
-        """
+        """Displacement unknowns, held ones too, and contacts that are not tied, by the meshes."""
         numbers, contacts = {}, 0
         for name, mesh in self.meshes.items():
             element = SHAPES[mesh.refdom.__name__][1][self.scene.degree]()

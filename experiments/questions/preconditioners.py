@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 from matplotlib.figure import Figure
 from scipy.sparse.linalg import LinearOperator, cg
 
@@ -17,7 +18,6 @@ from contactopt.methods.preconditioners import (
     deflated,
     preconditioner,
     restricted,
-    selection,
     smooth_motions,
 )
 from experiments.report import write
@@ -163,7 +163,7 @@ def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
     x = problem.coordinates[: problem.dim - 1]
     inside = np.sqrt(np.sum(x**2, axis=0)) <= 2 * share + 1e-9
     active = np.flatnonzero(np.repeat(inside, problem.dim))
-    U, zero = selection(problem.q.size, active), np.zeros(len(active))
+    U, zero = sp.identity(problem.q.size, format="csr")[:, active], np.zeros(len(active))
     Q = problem.Q[np.ix_(active, active)]
     row: dict[str, object] = {
         "dim": problem.dim,

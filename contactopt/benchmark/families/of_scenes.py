@@ -92,9 +92,7 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
 
 
 def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
-    """Every contact of the scene `of` listed several times: forces are shared, and Q is
-    rank-deficient.
-    """
+    """Every contact of the scene listed several times, so that Q is rank-deficient."""
     p = reduced(of, **parameters)
     index = np.repeat(np.arange(p.q.size).reshape(p.q.shape), copies, axis=0).ravel()
     return InterfaceProblem(
@@ -111,9 +109,7 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
 def in_units(
     of: str, force: float = 1.0, length: float = 1.0, **parameters: Any
 ) -> InterfaceProblem:
-    """The numbers of the scene `of` in units in which one newton is `force` and one millimetre
-    `length`.
-    """
+    """The scene in units where one newton is `force` and one millimetre `length`."""
     p = reduced(of, **parameters)
     return replace(
         p,
@@ -131,9 +127,7 @@ def by_products(of: str, **parameters: Any) -> InterfaceProblem:
 
 
 def skewed(of: str, skew: float = 0.1, seed: int = 0, **parameters: Any) -> InterfaceProblem:
-    """The scene `of` with an unsymmetric Q, as of loads that follow the surface: D S D is added,
-    with S random and skew, D^2 the diagonal of Q, and norm |S| = skew. The energy r' Q r stays.
-    """
+    """The scene with D S D added to Q, S random and skew, |S| = skew, D^2 the diagonal."""
     made = reduced(of, **parameters)
     random = np.random.default_rng(seed).normal(size=made.Q.shape)
     S = random - random.T

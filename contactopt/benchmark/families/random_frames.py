@@ -13,9 +13,7 @@ from contactopt.problem.laws.coulomb import Coulomb
 def rigid_bodies(
     bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: int = 0
 ) -> InterfaceProblem:
-    """Random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H' v, so
-    that a solution exists.
-    """
+    """Random bodies and frames: Q = H' M^-1 H of low rank, q = H' v: a solution exists."""
     if bodies < 2 or contacts < 1:
         raise InputError("rigid_bodies needs at least two bodies and one contact.")
     rng = np.random.default_rng(seed)

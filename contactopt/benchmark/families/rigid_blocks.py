@@ -113,9 +113,7 @@ def _chain(size: int) -> _Blocks:
 
 
 def _row(size: int) -> _Blocks:
-    """A row of blocks between two walls. They may fall, and any pressure along the row that is
-    large enough holds them: there are many solutions.
-    """
+    """Blocks between two walls, held by any pressure that is large enough: many solutions."""
     made = _chain(size)
     made.touch(size, 0, (float(size), 0.5), (1.0, 0.0))
     made.loads = {}

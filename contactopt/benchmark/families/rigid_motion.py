@@ -9,19 +9,12 @@ import scipy.sparse as sp
 def velocities(
     places: np.ndarray, pairs: np.ndarray, where: np.ndarray, frame: np.ndarray
 ) -> sp.csr_array:
-    """Build H (dim m, freedom): velocity of the second body of each pair relative to the first, in
-    the contact's frame, from the velocities and spins of all bodies.
+    """H (dim m, freedom): velocity of the second body of each pair relative to the first, in the
+    contact's frame, from the velocities and spins of all bodies.
 
-    Parameters
-    ----------
-    places : (n, dim) of the bodies
-    pairs : (m, 2) bodies that touch; the normal points from the first to the second
-    where : (m, dim) points of contact
-    frame : (m, dim, dim) whose columns are the normal and the tangents
-
-    Returns
-    -------
-    H, with columns ordered body by body: dim velocities, then one spin in 2D, or three in 3D.
+    The n bodies are at `places`; `pairs` (m, 2) of them touch at `where` (m, dim), and the normal,
+    the first column of `frame` (m, dim, dim), points from the first to the second. The columns of H
+    go body by body: dim velocities, then one spin in 2D, or three in 3D.
     """
     dim = places.shape[1]
     freedom = 3 if dim == 2 else 6

@@ -19,9 +19,7 @@ BEYOND = 1.2  # the load over the largest one that friction holds
 
 
 def dragged(of: str, mu: float = 0.5, **parameters: Any) -> InterfaceProblem:
-    """The scene `of`, whose body moves freely along the first tangent, too, and is dragged there by
-    more than mu times the normal force.
-    """
+    """The scene, its body free along the first tangent and dragged by more than mu r_n."""
     made = reduced(of, mu=mu, **parameters)
     along = np.zeros(made.q.shape)
     along[:, 1] = 1.0
@@ -29,9 +27,7 @@ def dragged(of: str, mu: float = 0.5, **parameters: Any) -> InterfaceProblem:
 
 
 def toppled(of: str, **parameters: Any) -> InterfaceProblem:
-    """The scene `of`, whose body turns freely, too, and is pressed beside the place where it
-    stands: forces that push only have their resultant between the outermost contacts.
-    """
+    """The scene, its body free to turn and pressed beside the place where it stands."""
     made = reduced(of, **parameters)
     x = made.coordinates[0] - made.coordinates[0].mean()
     turn = np.zeros(made.q.shape)

@@ -8,16 +8,7 @@ from contactopt.problem import InterfaceProblem
 
 
 def invariants(problem: InterfaceProblem) -> dict[str, float]:
-    """Compute numbers that rounding hardly changes, unlike `problem.fingerprint`.
-
-    Parameters
-    ----------
-    problem : of any form
-
-    Returns
-    -------
-    Norms of q, of Q x and V' x with x_i = cos i, of the load s, and of mu, with ten digits.
-    """
+    """Norms of q, Q x, V' x (x_i = cos i), s and mu, to ten digits, which rounding keeps."""
     x = np.cos(np.arange(problem.q.size))
     parts = {"q": problem.q, "Qx": problem.Q @ x, "Vx": problem.V.T @ x, "s": problem.s}
     return {

@@ -58,21 +58,9 @@ class ConvexProgram:
 
 
 def convex_program(problem: InterfaceProblem, kind: str, r: np.ndarray) -> ConvexProgram:
-    """Make a subproblem.
+    """Make the subproblem of a `kind` in PROGRAMS at forces r (k, dim), under Coulomb's law.
 
-    Parameters
-    ----------
-    problem : under Coulomb's law
-    kind : a key of PROGRAMS
-    r : (k, dim) forces at which it is made
-
-    Returns
-    -------
-    The program.
-
-    Raises
-    ------
-    InputError : for another law, and for a Q that is unsymmetric or too large for an array.
+    InputError for another law, and for a Q that is unsymmetric or too large for an array.
     """
     law = problem.law
     plain = law.unilateral and law.proportional and not law.dilatant
@@ -139,9 +127,7 @@ PROGRAMS: dict[str, Callable[[InterfaceProblem, np.ndarray], ConvexProgram]] = {
 
 
 def write_npz(program: ConvexProgram, path: Path) -> None:
-    """Write P, q, G, h, A, b, lb, ub of min x'Px/2 + q'x, G x <= h, A x = b, lb <= x <= ub.
-    InputError if a cone bounds more than one component, so that it is no quadratic program.
-    """
+    """Write P, q, G, h, A, b, lb, ub for qpsolvers; InputError for a cone that is no interval."""
     import qpsolvers
 
     if program.T.shape[1] > 1:

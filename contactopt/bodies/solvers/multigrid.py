@@ -88,9 +88,7 @@ class Level:
     R: SparseProduct
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x =
-        r' - A z: x, r', z.
-        """
+        """x = p(A) r, close to A^-1 r for upper eigenvalues, and r', z: r - A x = r' - A z."""
         z = SINGLE(4 / 3) / self.largest * r
         x = z.copy()
         for k in range(2, DEGREE + 1):
@@ -147,10 +145,7 @@ class VCycle:
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
 
     def apply(self, r: np.ndarray) -> np.ndarray:
-        """B r: one V-cycle for the residual r (n,), in the units of A.
-
-        The residual is divided by its largest entry, for single precision has small exponents only.
-        """
+        """B r for a residual r (n,), scaled to one: single precision has small exponents."""
         size = float(np.abs(r).max(initial=0.0))
         if size == 0.0:
             return np.zeros(len(r))
@@ -160,9 +155,7 @@ class VCycle:
         return self.scale * size * self._correct(full, 0)[self.place]
 
     def _correct(self, r: np.ndarray, depth: int) -> np.ndarray:
-        """Approximate solution on the levels from `depth` on: smooth, correct on the next level,
-        smooth.
-        """
+        """Smooth, correct on the next level, smooth, from the level `depth` on."""
         if depth == len(self.levels):
             return np.asarray(self.coarsest @ r)
         level = self.levels[depth]
@@ -226,9 +219,8 @@ def _dot(x: np.ndarray, y: np.ndarray) -> float:
 def _coarsen(
     A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """Prolongation from the aggregates of nodes, and the modes and points of the aggregates.
-
-    A (n, n) in blocks of nodes;  modes (n, j) it should represent exactly;  points (dim, nodes)
+    """Prolongation from the aggregates of nodes, and the modes (n, j), represented exactly, and
+    points (dim, nodes) of these; A is in blocks of nodes.
     """
     try:
         with IMPORTING:
@@ -270,11 +262,8 @@ def _smoothed(
 
 
 def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
-    """Pattern (k, k) of ones of the neighbours in the graph of A at no more than NEAR times the
-    distance of the nearest one, with each node as its own neighbour.
-
-    The nearest neighbour of either node counts, so that the pattern is symmetric. A is in blocks of
-    the k nodes, which are at points (dim, k).
+    """Pattern (k, k) of ones of the neighbours in the graph of A, in blocks of k nodes at points
+    (dim, k), at no more than NEAR times the distance of the nearest one of either, and of itself.
     """
     return _pattern(A, _near(A, points))
 
@@ -311,11 +300,8 @@ def _starts(A: sp.bsr_matrix, chosen: np.ndarray) -> np.ndarray:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """The translations and rotations of points (dim, k) as columns, which are the near-kernel of
-    the stiffness: (k dim, 3) in 2D, (k dim, 6) in 3D, the unknowns of a point in consecutive rows.
-
-    An axisymmetric body keeps the motions of its section: its hoop strain is small across a few
-    elements.
+    """The translations and rotations of points (dim, k) as columns, (k dim, 3) in 2D and (k dim, 6)
+    in 3D, the near-kernel of the stiffness, hoop strain apart.
     """
     fields = rigid_fields(points)
     return fields.swapaxes(0, 1).reshape(-1, fields.shape[2])
@@ -334,12 +320,8 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A matrix in single precision and blocks of the k nodes present, (k dim, k dim), whose held
-    unknowns are rows of their own; the place (n,) of each unknown of A in it; and the nodes present
-    (k,).
-
-    A, node and component are as in contactopt.bodies.solvers.system.System, dim is the number of
-    components. The rows are made some at a time, for the copies take more than the result.
+    """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
+    their own, made some at a time; each unknown's place (n,) in it; the nodes (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim

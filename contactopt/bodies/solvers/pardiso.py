@@ -26,9 +26,7 @@ NO_MEMORY = -2, -9  # its errors
 
 
 class PardisoSolver(BodySolver):
-    """Cholesky factors of oneMKL PARDISO in its own nested dissection order, with `trailing`
-    eliminated last (pip install pypardiso).
-    """
+    """Cholesky factors of oneMKL PARDISO with `trailing` eliminated last (needs pypardiso)."""
 
     name = "pardiso"
     releases_lock = True

@@ -99,10 +99,7 @@ class _Piece:
 
 
 def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
-    """P' A P (m, m) of a prolongation P (n, m) and A, both in blocks, from pieces of rows of A,
-    each in a thread of its own: A P is never there as a whole. It is the same whatever thread is
-    done first.
-    """
+    """P' A P (m, m) in blocks, from pieces of rows of A, each in a thread of its own."""
     height = P.blocksize[0]
     found: dict[int, sp.bsr_matrix] = {}
 
@@ -154,10 +151,7 @@ def _at(array: np.ndarray) -> ctypes.c_void_p:
 
 
 def _handle(mkl: Any, A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | None:
-    """oneMKL's view of A, or None where it has none: 64-bit indices, blocks that are not square.
-
-    oneMKL is not asked to optimise the view: it would copy the matrix and gain little.
-    """
+    """oneMKL's view of A, not optimised, or None: 64-bit indices, blocks that are not square."""
     square = A.format == "csr" or A.blocksize[0] == A.blocksize[1]
     if not square or A.indices.dtype != np.int32 or A.nnz == 0:
         return None

@@ -19,13 +19,11 @@ from contactopt.linear.operators import Product
 
 
 class FactorThread:
-    """One thread that makes factors and frees them: SuperLU returns memory only in the thread that
-    took it.
+    """One thread that makes and frees factors: SuperLU returns memory only in the thread that took
+    it.
 
-    The thread ends, and its factors are freed, when nobody refers to this object any more. Python
-    may find that out in the middle of any other operation of any thread, one that holds the locks
-    of another pool, say. The thread is therefore told by a thread of a moment's life, which may
-    wait for these locks.
+    It ends when nobody refers to this object any more, which Python may find out while any thread
+    holds locks; it is therefore told by a short thread that may wait for them.
     """
 
     def __init__(self) -> None:
@@ -39,9 +37,7 @@ class FactorThread:
         return len(self._held) - 1
 
     def __getitem__(self, number: int) -> Any:
-        """SciPy's SuperLU object; whoever keeps it longer than this thread keeps its memory for
-        good.
-        """
+        """SciPy's SuperLU object; whoever keeps it longer than this thread keeps its memory."""
         return self._held[number]
 
 
@@ -52,10 +48,8 @@ def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
 
 
 def factorise(A: sp.csc_matrix) -> Any:
-    """Factors of a symmetric positive definite matrix, eliminated in its own order without
-    pivoting.
-
-    MemoryError, with a sentence, if they do not fit; RuntimeError if A is singular.
+    """Factors of a symmetric positive definite matrix in its own order without pivoting;
+    MemoryError, with a sentence, if they do not fit, RuntimeError if A is singular.
     """
     try:
         return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -66,9 +60,7 @@ def factorise(A: sp.csc_matrix) -> Any:
 
 
 class SuperLUSolver(BodySolver):
-    """Factors L U = L D L' of A, with `trailing` eliminated last: their last rows and columns give
-    its Schur complement.
-    """
+    """Factors L U = L D L' of A, `trailing` last, which give its Schur complement."""
 
     name = "superlu"
 
@@ -93,9 +85,7 @@ class SuperLUSolver(BodySolver):
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """None where SuperLU changed the order for its pivots, and where rounding left some that
-        are not positive.
-        """
+        """None where pivots changed the order or are not positive."""
         factors, n = self.factors, self.n
         head = n - len(self._asked())
         symmetric = np.array_equal(factors.perm_c, factors.perm_r)
@@ -108,11 +98,8 @@ class SuperLUSolver(BodySolver):
         return L * np.sqrt(pivots), factors.perm_c[head:] - head
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Products that use only the rows and columns of L and D that a load on `at` reaches: the
-        unknowns of `at` and their ancestors in the elimination tree.
-
-        In the plane they are few. In space they hold most of the entries of L, and a copy of them
-        costs more than it saves, so that whole solves are used.
+        """Products by only the rows and columns of L and D that `at` reaches in the elimination
+        tree; in space they hold most of L, and whole solves are used.
         """
         factors = self.factors
         if not self._plane or not np.array_equal(factors.perm_c, factors.perm_r):
@@ -134,9 +121,7 @@ class SuperLUSolver(BodySolver):
 
 
 def _ancestors(L: sp.csc_matrix, first: np.ndarray) -> np.ndarray:
-    """Unknowns (sorted) that substitution from `first` on reaches: those in the columns of L of
-    those reached before.
-    """
+    """Unknowns (sorted) that substitution from `first` on reaches, column by column."""
     reached = np.zeros(L.shape[0], dtype=bool)
     front = np.unique(first)
     while len(front):

@@ -125,9 +125,8 @@ class BodySolver(ABC):
 
     @property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular, zeros above, and the place (m,) of each of `trailing`: R R' is
-        the Schur complement of the others in these places. None where there is none without a
-        solve.
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
+        complement of the others there. None where a solve would be needed.
         """
         return None
 
@@ -139,9 +138,7 @@ class BodySolver(ABC):
         return self.trailing
 
     def trailing_inverse(self) -> np.ndarray:
-        """(m, m) block of the inverse of A on the unknowns `trailing`, symmetric to the last digit
-        [length / force]; InputError if it is not complete.
-        """
+        """The block (m, m) of A^-1 on `trailing`, exactly symmetric; InputError if incomplete."""
         at, triangle = self._asked(), self.trailing_triangle
         if triangle is not None:
             R, place = triangle

@@ -1,10 +1,7 @@
-"""Bridges to QP and conic solvers.
+"""Bridges to QP and conic solvers: a backend is one line of a table, imported when it is used.
 
-The tables say what exists; nothing is imported before it is used.
-
-A backend is one line here. `settings` are the tight settings it is run at, for a dimensionless
-problem; what each of them gets wrong is caught afterwards by the crossover and the certificate,
-never believed.
+`settings` are the tight settings it is run at, for a dimensionless problem; what each of them gets
+wrong is caught afterwards by the crossover and the certificate, never believed.
 """
 
 from __future__ import annotations
@@ -60,10 +57,7 @@ class Backend:
 
     def rounds(self) -> Iterator[dict[str, Any]]:
         """Settings for one try after another, each of more iterations, as many as fit into the time
-        that is left.
-
-        A backend with a clock, with few iterations, or in a solve without a time limit is tried
-        once.
+        that is left: one for a backend with a clock, with few iterations, or without a time limit.
         """
         if not self.steps or not isfinite(time_left()):
             yield self.timed()
@@ -149,18 +143,14 @@ def _tightened(settings: Mapping[str, Any]) -> dict[str, Any]:
 def attempts(
     solver: Any, solve: Callable[[Any], Answer]
 ) -> Iterator[tuple[str, Callable[[], Answer]]]:
-    """Two attempts for `semismooth.certified`, by a backend's name and a function that makes them:
-    a bridge, such as BoxQP or DiscSOCP, with its backend as it is, then at tighter settings.
-    """
+    """Attempts for `semismooth.certified`: a backend as it is, then at tighter settings."""
     for backend in (solver.backend, solver.backend.tightened()):
         bridge = replace(solver, backend=backend)
         yield backend.name, partial(solve, bridge)
 
 
 def find(name: str, table: Mapping[str, Backend]) -> Backend:
-    """The backend of a name in QP or CONIC; InputError, with what to do, if it is unknown or not
-    installed.
-    """
+    """The backend of a name; InputError that says what to do if it is unknown or not installed."""
     if name not in table:
         kind = next(iter(table.values())).kind
         raise InputError(

@@ -1,9 +1,6 @@
-"""Quadratic programs solved in a process of their own, for backends that can neither be told a time
-limit nor interrupted.
-
-The process waits for one program after another and is killed at the deadline of the solve that
-runs. It is started for programs of more than SMALL unknowns in solves with a time limit only:
-smaller ones take a few milliseconds, and the start takes up to a second.
+"""Quadratic programs in a process of their own, for backends that no time limit ends. It is killed
+at the deadline of the solve that runs, and started for programs of more than SMALL unknowns in
+solves with a time limit only, since the start takes up to a second.
 """
 
 from __future__ import annotations
@@ -49,26 +46,21 @@ while True:
 
 
 class Child:
-    """The process of one sequence of quadratic programs: started by the first that needs it, ended
-    with this object.
-    """
+    """The process of one sequence of quadratic programs, which ends with this object."""
 
     def __init__(self) -> None:
         self.process: subprocess.Popen[bytes] | None = None
 
     @staticmethod
     def needed(backend: Backend, n: int) -> bool:
-        """Whether a program of n unknowns might outlast the time limit of the solve that runs, if
-        there is one.
-        """
+        """Whether a program of n unknowns might outlast the time limit of the solve that runs."""
         return n > SMALL and not backend.clock and not backend.steps and isfinite(time_left())
 
     def solve(
         self, arguments: dict[str, Any], name: str, start: Any, settings: dict[str, Any]
     ) -> tuple[Any, Any]:
-        """x and the multipliers y of qpsolvers.Problem(**arguments), None where there are none.
-
-        Raises TimeUp at the deadline, BackendError if the backend fails or its process dies.
+        """x and the multipliers y of qpsolvers.Problem(**arguments), None where there are none;
+        TimeUp at the deadline, BackendError if the backend fails or its process dies.
         """
         check_time()
         if self.process is None:

@@ -32,9 +32,7 @@ class Conic:
         return cls(backend, program)
 
     def solve(self, **parameters: np.ndarray) -> dict[str, np.ndarray]:
-        """The variables and multipliers of the program by name; BackendError, naming the backend,
-        without an answer.
-        """
+        """The variables and multipliers of the program by name; BackendError without an answer."""
         for name, value in parameters.items():
             self.program.parameters[name].value = value
         run(self.backend, self.program.problem)
@@ -63,9 +61,7 @@ class DiscSOCP:
     def solve(
         self, c: np.ndarray, b: np.ndarray, radius: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """t (2k,) and the multipliers (p,) of A t = b; BackendError, naming the backend, if there
-        is no answer.
-        """
+        """t (2k,) and the multipliers (p,) of A t = b; BackendError if there is no answer."""
         self.parameters["c"].value, self.parameters["g"].value = c, radius
         if len(b):
             self.parameters["b"].value = b
@@ -75,10 +71,7 @@ class DiscSOCP:
 
 
 def run(backend: Backend, problem: Any) -> None:
-    """Solve a cvxpy problem, whose variables then hold the answer.
-
-    Raises BackendError, which names the backend, if it crashes or leaves no finite answer.
-    """
+    """Solve a cvxpy problem; BackendError if the backend crashes or leaves no finite answer."""
     import cvxpy as cp
 
     try:
@@ -99,9 +92,7 @@ def run(backend: Backend, problem: Any) -> None:
 
 
 def check_semidefinite(Q: np.ndarray) -> None:
-    """BackendError unless Q is positive semidefinite but for rounding, by a Cholesky factorisation:
-    cvxpy's own test of convexity fails at random and on small numbers.
-    """
+    """BackendError unless Q is semidefinite but for rounding: cvxpy's test fails at random."""
     try:
         la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)
     except la.LinAlgError as error:

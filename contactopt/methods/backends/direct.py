@@ -57,9 +57,7 @@ class CoulombSOCP:
         return cls(clarabel.DefaultSolver(P, np.zeros(len(Q)), A, b, cones, settings), p)
 
     def solve(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r (k dim,) and the multipliers lambda (p,) of the balance; BackendError if there is no
-        answer.
-        """
+        """r (k dim,) and multipliers (p,) of the balance; BackendError without an answer."""
         self.solver.update(q=np.ascontiguousarray(c))
         check_time()
         left = time_left()

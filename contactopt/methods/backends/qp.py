@@ -39,11 +39,11 @@ class BoxQP:
         high: np.ndarray,
         start: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """x (n,) and the multipliers y (p,) of A x = b, so that P x + c + A'y balances the bounds'
+        """x (n,) and the multipliers y (p,) of A x = b, with P x + c + A'y balancing the bounds'
         forces.
 
-        Raises BackendError, naming the backend, if it crashes or its answer is not a vector of
-        finite numbers. What the backend claims about optimality is ignored: the caller checks.
+        BackendError if the backend crashes or its answer is not finite. Its claims are not
+        believed.
         """
         import qpsolvers
 

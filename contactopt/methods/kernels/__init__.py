@@ -1,3 +1,1 @@
-"""The numerical algorithms that several methods share: Newton and Krylov steps, projections with
-balance, splittings.
-"""
+"""Numerical algorithms that several methods share."""

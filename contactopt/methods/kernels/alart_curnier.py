@@ -60,20 +60,10 @@ def coulomb_equations(
     """Write the Alart-Curnier equations of a problem, with rho_i = 1 over the mean compliance of
     contact i.
 
-    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to
-    Newton like solution methods.
-
-    Parameters
-    ----------
-    problem : A dimensionless interface problem.
-    center : (k, dim) forces from which a proximal term counts.
-    weight : The weight of the proximal term, a compliance.
-    stiffer : By what the compliance that Newton's steps should see is smaller than the diagonal of
-        Q, (k,) or one number.
-
-    Returns
-    -------
-    The equations, which can be evaluated and solved for a Newton step.
+    A proximal term of that `weight`, a compliance, counts from the forces `center` (k, dim). The
+    compliance that Newton's steps should see is smaller than the diagonal of Q by `stiffer`, (k,)
+    or one number. Source: Alart, Curnier (1991), A mixed formulation for frictional contact
+    problems prone to Newton like solution methods.
     """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) / stiffer + weight
     rho = 1 / np.maximum(compliance, 1e-3)
@@ -83,11 +73,9 @@ def coulomb_equations(
 
 def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Forces within the bounds of the law to the last digit, at the solution equal to r (k, dim):
-    P(y) = r + error.
-
-    Thin bodies between several pairs of surfaces are much softer under smooth forces than 1 / rho.
-    There P(y), which contains rho u, would make a displacement of the rounding of u, and r itself
-    is projected on the bounds instead.
+    P(y) = r + error. Thin bodies between several pairs of surfaces are much softer under smooth
+    forces than 1 / rho, so that P(y) would make a displacement of the rounding of u; there r is
+    projected.
     """
     if len(problem.pairs) == 1:
         return r + error
@@ -95,9 +83,7 @@ def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> n
 
 
 def definite(Q: np.ndarray | sp.csr_array) -> bool:
-    """Say whether a symmetric Q, sparse or an array, is safely positive definite, as that of
-    elastic bodies without redundant contacts; False also where its factorisation fails.
-    """
+    """Whether a symmetric Q is safely positive definite; False if its factorisation fails."""
     try:
         if sp.issparse(Q):
             factors = splu(
@@ -115,9 +101,7 @@ def definite(Q: np.ndarray | sp.csr_array) -> bool:
 
 
 def newton_steps(problem: InterfaceProblem, P: Preconditioner | None = None) -> tuple[Step, Step]:
-    """Make the functions for Newton's steps and for the bonded solution of a dimensionless problem:
-    from products with Q, if a preconditioner of them is given, else by factors of Q.
-    """
+    """Newton's steps and the bonded solution: by products with Q, or by its factors."""
     if P is not None:
 
         def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
@@ -164,10 +148,8 @@ def cold_start(
     """Find the bonded solution of a dimensionless problem, from which Newton's method starts, to a
     relative accuracy; by default with factors.
 
-    All contacts are glued if a plate presses the bodies together, else those that would penetrate.
     Without a plate the start has no force at all, if its residual is smaller: forces that bond
-    rigid bodies are of any size. On elastic bodies Newton's method cycles from there, because it
-    takes contacts for sliding before friction acts.
+    rigid bodies are of any size, but on elastic bodies Newton's method cycles from no force.
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     glued = glued_contacts(problem)
@@ -186,9 +168,7 @@ def cold_start(
 
 
 def _bonded(problem: InterfaceProblem, glued: np.ndarray) -> Iterate | None:
-    """The forces that hold the components `glued` (k dim,) at rest, for an array Q and no plate;
-    None if there are none.
-    """
+    """The forces that hold the components `glued` (k dim,) at rest, for an array Q and no plate."""
     Q = problem.Q if glued.all() else problem.Q[np.ix_(glued, glued)]
     inverse = factorised(Q + GLUE * np.eye(len(Q)))
     if inverse is None:
@@ -201,11 +181,9 @@ def _bonded(problem: InterfaceProblem, glued: np.ndarray) -> Iterate | None:
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
     """Choose the contacts (k,) that the bonded solution of a dimensionless problem glues.
 
-    Where loads press free bodies together these are all contacts that the loads may close, and
-    otherwise those that would penetrate. One contact i that bears the load F of a pair alone closes
-    once the bodies have approached by q_i + Q_ii F. Further contacts only stiffen the pair. So no
-    contact closes whose gap exceeds the least of these approaches, unless a body turns. All are
-    glued where the near ones alone would leave a motion free.
+    They are those that would penetrate and, where loads press free bodies together, those whose gap
+    is at most the least approach q_i + Q_ii F of a contact i that bears the load F of its pair
+    alone. All are glued where the near ones alone would leave a motion free.
     """
     gap = problem.q[:, 0]
     closed = np.asarray((problem.law.lowest < 0) | (gap < 0))
@@ -234,8 +212,6 @@ def _determined(problem: InterfaceProblem, closed: np.ndarray) -> bool:
 
 
 def glued_projection(equations: Equations, glued: np.ndarray) -> Equations:
-    """Write the linear equations in which the contacts of a mask (k,) are glued and the others
-    carry no force.
-    """
+    """The linear equations in which `glued` (k,) contacts stick and others have no force."""
     D = np.where(glued[:, None, None], np.eye(equations.q.shape[1]), 0.0)
     return replace(equations, project=lambda y: (np.where(glued[:, None], y, 0.0), D))

@@ -1,12 +1,10 @@
-"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with lambda such that V'
-r + s = 0.
+"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with V' r + s = 0.
 
-With P the projection on a convex set this is the projection on the set's part where V' r + s = 0,
-and lambda minimises a convex, piecewise smooth function of p unknowns: a few Newton steps with an
-exact line search, each O(k). It makes every first-order method on forces work with plates, without
-a penalty: lambda is the multiplier that the step itself determines. Where the forces are friction
-alone the function is nearly a sum of lengths, whose minimum is a weighted median: its slope jumps
-from contact to contact, and only the exact search finds the one that sticks.
+With P the projection on a convex set, lambda minimises a convex, piecewise smooth function of p
+unknowns: a few Newton steps with an exact line search, each O(k). So every first-order method on
+forces works with plates, without a penalty. Where the forces are friction alone the slope jumps
+from contact to contact, as at a weighted median, and only the exact search finds the one that
+sticks.
 """
 
 from __future__ import annotations
@@ -84,9 +82,7 @@ def project_balanced(
 
 
 def _least(slope: Callable[[float], float], first: float) -> float:
-    """The t > 0 at which a slope that grows from `first` < 0 vanishes; 0 if it does not, or not
-    above rounding.
-    """
+    """The t > 0 where a slope that grows from `first` < 0 vanishes; 0 if not above rounding."""
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
     for trial in range(SEARCH):
         value = slope(t)
@@ -109,10 +105,8 @@ def _least(slope: Callable[[float], float], first: float) -> float:
 
 
 def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Find the motions that no closed contact holds along its normal and no sticking one at all.
-
-    V (k d, p) are the rigid motions, D (k, d, d) the derivative of the law's map. The columns (p,
-    j) that come back are orthonormal combinations of the multipliers.
+    """Orthonormal combinations (p, j) of the motions V that no closed contact holds along its
+    normal and no sticking one at all, by the derivative D (k, d, d) of the law's map.
     """
     d = D.shape[1]
     firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
@@ -129,16 +123,13 @@ def settled(
     D: np.ndarray,
     displacements: Callable[[], np.ndarray],
 ) -> np.ndarray | None:
-    """Find the change (p,) of the multipliers with which friction balances motions that no contact
+    """The change (p,) of the multipliers with which friction balances motions that no contact
     holds; None where there are no such motions, or no friction balances the loads.
 
-    Newton's method linearises the contacts. Where all of them slip, their forces do not change with
-    such a motion, and its system says nothing about it: it is singular, or its steps jump to and
-    fro over the contact that should stick. Here the normal forces are bounds of the friction, and
-    the motion follows from a convex problem.
-
-    r are the forces (k, d), D is the derivative of the law's map there, and `displacements` gives u
-    (k, d).
+    Where all contacts slip, their linearised forces do not change with such a motion, and Newton's
+    system is singular or its steps jump over the contact that should stick. With the normal forces
+    as bounds of the friction, the motion follows from a convex problem. D is the derivative of the
+    law's map at the forces r (k, d), and `displacements` gives u (k, d).
     """
     if not len(equations.s):
         return None
@@ -171,9 +162,7 @@ def settled(
 
 
 def _softened(bound: np.ndarray, share: float) -> Projection:
-    """y -> the projection of share y on discs, and its derivative: friction that grows gradually
-    with the slip.
-    """
+    """The projection of share y on discs, for friction that grows with the slip."""
 
     def project(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         P, D = disc_derivative(share * y, bound)

@@ -39,9 +39,7 @@ class Bonded:
         self.place = np.full(n, -1)  # unknown -> its column of G, -1 if not there yet
 
     def solve(self, z: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The solution dr, dlambda of Q dr + V dlambda = z (n,) or (n, j), V' dr = -balance (p,) or
-        (p, j).
-        """
+        """dr, dlambda of Q dr + V dlambda = z (n,) or (n, j), V' dr = -balance (p,) or (p, j)."""
         dr = la.cho_solve(self.factor, z, check_finite=False)
         if self.V.shape[1] == 0:
             return dr, np.zeros_like(balance)
@@ -49,16 +47,7 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """Compute columns of G, the inverse of Q under the balance. Each is computed once and kept.
-
-        Parameters
-        ----------
-        unknowns : (m,) numbers of the columns.
-
-        Returns
-        -------
-        (n, m).
-        """
+        """Columns (n, m) of G, the inverse of Q under the balance, each computed once."""
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -71,16 +60,7 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the Newton step that `Equations.step` takes; LinAlgError if it is singular.
-
-        Parameters
-        ----------
-        rho, error, balance, D : (k,), (k, d), (p,) and (k, d, d), as there.
-
-        Returns
-        -------
-        dr (k, d) and dlambda (p,).
-        """
+        """The Newton step that `Equations.step` takes; LinAlgError if it is singular."""
         k, d = error.shape
         # N are unknowns of contacts that are open or slip; the right side of others is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))

@@ -31,14 +31,7 @@ from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
 from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, norm
-from contactopt.methods.constants import (
-    COUPLED_FIRST,
-    COUPLED_LOOSEST,
-    COUPLED_TIGHTEST,
-    GIVEN_BALANCE,
-    SCHUR_MARGIN,
-    SCHUR_STEP,
-)
+from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
     admissible,
     coulomb_equations,
@@ -79,9 +72,7 @@ class Coupled:
 
     @cached_property
     def weights(self) -> Stacked:
-        """Weights of the residuals of X, r and the balance: in units of the root of an energy,
-        whatever the mesh.
-        """
+        """Weights of the residuals of X, r and the balance, in units of the root of an energy."""
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
         return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
@@ -91,9 +82,7 @@ class Coupled:
         return np.asarray(u.reshape(at.r.shape) + self.equations.q)
 
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
-        """The right side of Newton's step there, in parts for X, r and the balance, and its contact
-        equations.
-        """
+        """The right side of Newton's step in parts for X, r, the balance; its contact equations."""
         equations = self.equations
         P, D = equations.project(at.r - equations.rho[:, None] * self.moved(at))
         balance = equations.V.T @ at.r.ravel() + equations.s
@@ -118,7 +107,7 @@ class Coupled:
 
         def precondition(x: Stacked) -> Stacked:
             forces, error, balance = _parted(x)
-            r, multipliers = linearised.solve(model, inverse, error, -balance, SCHUR_STEP)
+            r, multipliers = linearised.solve(model, inverse, error, -balance, constants.SCHUR_STEP)
             return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
         product = partial(self.product, linearised)
@@ -133,12 +122,10 @@ class Coupled:
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces r + error, at the solution equal to r and within the bounds to the last digit,
-        with what Q makes of them.
+        """The forces r + error, at the solution equal to r, with what Q makes of them.
 
-        One V-cycle improves the displacements. The accuracy stated is that before it, by the
-        criterion with which conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f
-        over that of the displacements.
+        One V-cycle improves the displacements. The accuracy stated is that before it: the energy
+        (f'Bf)^1/2 of the missing forces f over that of the displacements.
         """
         form, r = self.form, at.r + error
         missing = form.unbalanced(at.X, r.ravel())
@@ -151,19 +138,14 @@ class Coupled:
 
 
 def coupled_steps(
-    problem: InterfaceProblem,
-    form: CoupledForm,
-    preconditioner: str | None,
-    start: Iterate | None,
+    problem: InterfaceProblem, form: CoupledForm, preconditioner: str | None, start: Iterate | None
 ) -> Iterator[tuple[Known, float]]:
-    """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
+    """Iterates of Newton's method on contacts and bodies, each with the residual before its step.
 
     `form` is the dimensionless problem's Q before condensation; `start` None stands for the bonded
-    solution. Yields an iterate, and the residual of the equations that its step began with.
-
-    Where the residual does not fall for more than IDLE steps, a rough start has led the sorting of
-    the contacts into a circle, and the iteration begins anew, once, from an accurate bonded
-    solution. It ends where a step fails.
+    solution. Where the residual does not fall for more than IDLE steps, a rough start has led the
+    sorting of the contacts into a circle, and the iteration begins anew, once, from an accurate
+    bonded solution. It ends where a step fails.
     """
     with one_blas_thread():
         several = len(problem.pairs) > 1
@@ -172,13 +154,13 @@ def coupled_steps(
         coupled = Coupled(equations, form, P if several else fitted(P, form, problem.V))
         before = spent()
         at = (
-            _bonded(problem, coupled, COUPLED_FIRST)
+            _bonded(problem, coupled, constants.COUPLED_FIRST)
             if start is None
-            else State(in_equilibrium(form, start[0], GIVEN_BALANCE), *start)
+            else State(in_equilibrium(form, start[0], constants.GIVEN_BALANCE), *start)
         )
         if start is None:
             expect(slower=(spent() - before) / (USUAL * form.size))
-    first, last, best, idle = COUPLED_FIRST, np.inf, np.inf, 0
+    first, last, best, idle = constants.COUPLED_FIRST, np.inf, np.inf, 0
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
@@ -192,20 +174,18 @@ def coupled_steps(
             known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
         yield known, residual
         best, idle = min(best, residual), 0 if residual < best else idle + 1
-        if idle > IDLE and first > COUPLED_TIGHTEST:
-            first, last, idle = COUPLED_TIGHTEST, np.inf, 0
+        if idle > IDLE and first > constants.COUPLED_TIGHTEST:
+            first, last, idle = constants.COUPLED_TIGHTEST, np.inf, 0
             with one_blas_thread():
                 at = _bonded(problem, coupled, first)
             continue
-        rtol = forcing(residual, last, first, COUPLED_LOOSEST, COUPLED_TIGHTEST)
+        rtol = forcing(residual, last, first, constants.COUPLED_LOOSEST, constants.COUPLED_TIGHTEST)
         with one_blas_thread():
             at, last = coupled.step(at, right, linearised, rtol), residual
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled, rtol: float) -> State | None:
-    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to a relative
-    accuracy, or no force at all.
-    """
+    """The bonded solution of `cold_start` to a relative accuracy, or no force at all."""
     none = np.zeros(problem.q.shape)
     zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
     glued = glued_contacts(problem)
@@ -220,24 +200,14 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled, rtol: float) -> State |
 
 
 def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditioner:
-    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a
-    random balanced force does most of its work.
+    """Scale a preconditioner P and its model so that the eigenvalues of P Q lie about 1 /
+    SCHUR_MARGIN where a random balanced force does most of its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur
     complement that is rather too large than too small. Forces that are not in balance tell nothing:
     a body that no support holds is held at a few nodes meanwhile, where they are taken up, and the
-    V-cycle knows the large motion that follows to a few digits only. So x has V'x = 0, and of Q x
-    counts what no motion V lambda can undo.
-
-    Parameters
-    ----------
-    P : The preconditioner, with its model of Q if it has one.
-    form : Q before condensation.
-    V : (n, p) the motions of the contacts that the multipliers stand for.
-
-    Returns
-    -------
-    P and its model, scaled.
+    V-cycle knows the large motion that follows to a few digits only. So x has V'x = 0 for the
+    motions V (n, p) of the multipliers, and of Q x counts what no motion V lambda can undo.
     """
     # The mean eigenvalue of P Q, weighted with the work of the force: (Qx)' P (Qx) over x' Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])
@@ -245,16 +215,13 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
     Qx = form.moved(form.approximate(form.pulled(x)), x)
     PV = np.stack([P @ v for v in V.T], axis=1) if V.shape[1] else V
     Qx = Qx - V @ (np.linalg.pinv(V.T @ PV) @ (PV.T @ Qx))
-    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / constants.SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
 def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
-    """Compute displacements X of the bodies close to A^-1 T' r for contact forces r (k, dim), by
-    conjugate gradients with one V-cycle B as preconditioner, to a relative accuracy in the energy
-    norm; `size` is the energy residual' B residual.
-    """
+    """X close to A^-1 T' r for forces r (k, dim), by CG with one V-cycle, to rtol in energy."""
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X

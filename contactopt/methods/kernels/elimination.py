@@ -14,31 +14,15 @@ from itertools import islice
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from contactopt.methods import find_method
-from contactopt.methods.constants import (
-    AROUND,
-    FEW_OF_ALL,
-    LOCAL_ENOUGH,
-    LOCAL_SHARE,
-    LOCAL_TRIES,
-    MOST_LOCAL,
-)
+from contactopt.methods import constants, find_method
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.problem import InterfaceProblem
 
 
 def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evaluation]:
-    """Solve the contacts that make most of the residual by themselves, where they are few.
-
-    Parameters
-    ----------
-    level, point, at : The problem on one grid, a point, and its errors.
-
-    Returns
-    -------
-    The point with other forces on these contacts, and its errors; the same point where the errors
-    are spread over many contacts, or do not fall.
+    """Solve the contacts that make most of the residual by themselves, and return the point with
+    these forces and its errors; the same point where the errors are spread widely or do not fall.
     """
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
@@ -55,21 +39,19 @@ def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evalu
 
 
 def _worst(level: Level, at: Evaluation) -> np.ndarray:
-    """Numbers of the contacts with most of the error and of those around them; none where these are
-    many.
-    """
+    """The contacts with most of the error and those around; none if these are many."""
     size = np.sum(at.error**2, axis=0)
-    most = min(MOST_LOCAL, int(FEW_OF_ALL * len(at.closed)))
+    most = min(constants.MOST_LOCAL, int(constants.FEW_OF_ALL * len(at.closed)))
     if not most:
         return np.zeros(0, dtype=int)
     largest = np.argpartition(-size, most - 1)[:most]
     largest = largest[np.argsort(-size[largest])]
-    count = int(np.searchsorted(np.cumsum(size[largest]), LOCAL_SHARE * size.sum())) + 1
+    count = int(np.searchsorted(np.cumsum(size[largest]), constants.LOCAL_SHARE * size.sum())) + 1
     if count > most:
         return largest[:0]
     marked = np.zeros(len(size), dtype=bool)
     marked[largest[:count]] = True
-    wide = binary_dilation(marked.reshape(level.kernel.grid), iterations=AROUND).ravel()
+    wide = binary_dilation(marked.reshape(level.kernel.grid), iterations=constants.AROUND).ravel()
     return np.flatnonzero(wide if np.count_nonzero(wide) <= most else marked)
 
 
@@ -78,10 +60,10 @@ def _solution(problem: InterfaceProblem, begin: np.ndarray) -> np.ndarray:
     evaluate = coulomb_equations(problem).evaluate
     best, none = begin, np.zeros(0)
     least = first = evaluate(best, none)[0]
-    for r, *_ in islice(find_method("auto").iterate(problem, (begin, none)), LOCAL_TRIES):
+    for r, *_ in islice(find_method("auto").iterate(problem, (begin, none)), constants.LOCAL_TRIES):
         residual = evaluate(r, none)[0]
         if residual < least:
             best, least = r, residual
-        if least <= LOCAL_ENOUGH * first:
+        if least <= constants.LOCAL_ENOUGH * first:
             break
     return best

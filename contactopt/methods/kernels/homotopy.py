@@ -116,9 +116,7 @@ class Along:
         return _inner(a, b) / np.sqrt(_inner(a, a) * _inner(b, b))
 
     def sign(self) -> float:
-        """Of the determinant of the equations by x, z and lambda, but for a constant factor: 1
-        where t falls going forward, -1 where it rises.
-        """
+        """1 where t falls going forward, -1 where it rises: the sign of the determinant."""
         V, solve = self.system.cones.V, self.system.solve
         plates = np.sign(np.linalg.det(V.T @ solve(V))) if V.shape[1] else 1.0
         return solve.sign() * float(plates)
@@ -134,9 +132,7 @@ def _slip(z: np.ndarray) -> np.ndarray:
 
 
 class Homotopy:
-    """The equations of the path through a first point (x, z, 0, 1) with x o z = m e; sizes (k,) of
-    its x.
-    """
+    """The path through a first point (x, z, 0, 1) with x o z = m e; sizes (k,) of its x."""
 
     def __init__(self, problem: InterfaceProblem, matrix: Blocks, sizes: np.ndarray):
         self.cones, self.m = Lorentz(problem, matrix), START**2
@@ -178,10 +174,8 @@ def homotopy_iterates(
     problem: InterfaceProblem, matrix: Blocks, steps: int, random: np.random.Generator | None = None
 ) -> Iterator[tuple[Iterate, float]]:
     """Points (r (k, dim), lambda (p,)) of a dimensionless problem and how far each is from a
-    solution: one at each new half of t.
-
-    It ends near a solution, where the path cannot be followed further, or after that many
-    factorisations. `random` draws another first point, of another path.
+    solution: one at each new half of t, until the path ends or so many `steps` are factorised.
+    `random` draws another first point, of another path.
     """
     spread = np.zeros(problem.contacts) if random is None else random.normal(size=problem.contacts)
     path = Homotopy(problem, matrix, START * np.exp(spread))
@@ -218,9 +212,7 @@ def homotopy_iterates(
 
 
 def _inside(here: Along, way: Point, length: float) -> tuple[float, Point]:
-    """The longest step of at most that length along the way that stays inside the cones, and its
-    end.
-    """
+    """The longest step up to `length` along the way that stays inside the cones, and its end."""
     while True:
         ahead = here.point.plus(here.back).plus(way.times(length))
         if (ahead.inside and ahead.t > LEAST * here.point.t) or length < SHORTEST:
@@ -229,9 +221,7 @@ def _inside(here: Along, way: Point, length: float) -> tuple[float, Point]:
 
 
 def _corrected(path: Homotopy, point: Point, left: int) -> tuple[Along | None, int, float]:
-    """Newton's steps back to the path: where they end, None if they do not converge; their number,
-    the size of the first.
-    """
+    """Newton's steps back to the path: the end or None, their number, the size of the first."""
     last, first = np.inf, 0.0
     for used in range(1, min(MOST, left) + 1):
         check_time()

@@ -80,9 +80,7 @@ class Lorentz:
         self.square = self.scale[:, :, None] * self.scale[:, None, :]
 
     def gap(self, x: np.ndarray, z: np.ndarray, lam: np.ndarray, slip: np.ndarray) -> np.ndarray:
-        """By how much z misses u (k, d) of the forces x and the multipliers, with slip (k,) added
-        where there is friction.
-        """
+        """By how much z misses u of x and lam (k, d), plus slip (k,) where there is friction."""
         r = (self.scale * x).ravel()
         u = self.problem.q + (self.matrix.Q @ r + self.problem.V @ lam).reshape(x.shape)
         gap = self.scale * u - z
@@ -96,9 +94,7 @@ class Lorentz:
     def answer(
         self, x: np.ndarray, z: np.ndarray, lam: np.ndarray, gap: np.ndarray
     ) -> tuple[Iterate, float]:
-        """Forces in the cone and multipliers, and how far they are from a solution: the largest of
-        the mean complementarity, the error of the law and that of the balance.
-        """
+        """Forces in the cone, multipliers, and their error (`interior_iterates`)."""
         error = max(
             float(np.vdot(x, z)) / len(x),
             sqrt(np.vdot(gap, gap) / len(x)),
@@ -107,9 +103,7 @@ class Lorentz:
         return (coulomb_cone(self.scale * x, self.problem.mu), lam), error
 
     def linearised(self, x: np.ndarray, z: np.ndarray, slopes: np.ndarray) -> System | None:
-        """The factorised linear system at a point, where the slip falls with z by slopes (k, d);
-        None if it is singular.
-        """
+        """The factorised system at a point, with slopes (k, d) of the slip by z, or None."""
         scaling = Scaling(x, z)
         # The scaling gives dz = target - F dx, and z - slip n changes by S dz, S = I - n slopes'.
         # Put into the linearised z the system for dr is (Q + S F / scale^2) dr + V dlambda = right,
@@ -124,9 +118,7 @@ class Lorentz:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The linear system of one point: its scaling, the derivative `slopes` (k, d) of the slip by
-    z, and the factors.
-    """
+    """The linear system of one point: its scaling, slopes (k, d) of the slip by z, and factors."""
 
     cones: Lorentz
     scaling: Scaling
@@ -136,9 +128,7 @@ class System:
     def direction(
         self, gap: np.ndarray, unbalanced: np.ndarray, target: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None
-        if there are none.
-        """
+        """dx, dz (k, d), dlambda (p,) with F dx + dz = target; None if there are none."""
         scale, kept, V = self.cones.scale, self.cones.kept, self.cones.V
         right = target - gap
         right[:, 0] -= np.vecdot(self.slopes, target)
@@ -209,9 +199,7 @@ def _centred_step(
 
 
 def _way(scaling: Scaling, dx: np.ndarray, dz: np.ndarray, boundary: float) -> float:
-    """The length of a step: that share of the way to the boundary of the cones, shortened until no
-    contact comes near it long before the others.
-    """
+    """That share of the way to the boundary of the cones, less if a contact comes near it early."""
     x, z, k = scaling.x, scaling.z, len(scaling.x)
     mean = float(np.vdot(x, z)) / k
     length = min(1.0, boundary * scaling.longest(dx, dz))
@@ -226,9 +214,7 @@ def _way(scaling: Scaling, dx: np.ndarray, dz: np.ndarray, boundary: float) -> f
 
 
 class Scaling:
-    """Nesterov and Todd's scaling of points x, z (k, d) inside Lorentz's cones: F = M M with M x =
-    M^-1 z.
-    """
+    """Nesterov and Todd's scaling F = M M of points inside Lorentz's cones, M x = M^-1 z (k, d)."""
 
     def __init__(self, x: np.ndarray, z: np.ndarray):
         d = x.shape[1]

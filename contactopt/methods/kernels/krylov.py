@@ -48,24 +48,12 @@ FLAT = 1e-8  # eigenvalues of D below this are zero
 def model_of(
     problem: InterfaceProblem, name: str | None = None, deflate: bool = True
 ) -> Preconditioner:
-    """Make the preconditioner of a problem, with the smooth motions deflated if asked for.
+    """The preconditioner of a problem by its name in PRECONDITIONERS, or 'none' for the identity.
 
-    Parameters
-    ----------
-    problem : The interface problem.
-    name : A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the
-        contacts lie on a grid, `laplacian` on other surfaces whose cells are known, else the
-        identity, with a note that says why.
-    deflate : Whether the smooth motions of the bodies are solved for exactly, which costs a few
-        products with Q.
-
-    Returns
-    -------
-    An approximate inverse of Q, on arrays (k dim,).
-
-    Raises
-    ------
-    InputError : If the preconditioner that was named is unknown or does not fit the contacts.
+    By default it is `neumann` where the contacts lie on a grid, `laplacian` on other surfaces whose
+    cells are known, else the identity, with a note that says why. With `deflate` the smooth motions
+    of the bodies are solved for exactly, which costs a few products with Q. InputError if the
+    preconditioner that was named is unknown or does not fit the contacts.
     """
     missing: list[str] = []
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
@@ -96,11 +84,8 @@ def krylov_step(
     D: np.ndarray,
     rtol: float,
 ) -> Iterate | None:
-    """Solve for a Newton step dr (k, d) and dlambda (p,) from products with Q alone, to a relative
-    accuracy; None if the iteration does not get anywhere.
-
-    The right sides are error (k, d) of the contact equations and -balance (p,); D (k, d, d) are the
-    derivatives of the law's map.
+    """A Newton step dr (k, d), dlambda (p,) as of `Equations.step`, from products with Q alone, to
+    a relative accuracy; None if the iteration does not get anywhere.
     """
     if np.array_equal(D, D.transpose(0, 2, 1)):
         dr, multipliers = _symmetric_step(equations, P, error, balance, D, rtol)
@@ -167,9 +152,7 @@ def _symmetric_step(
 
 
 def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
-    """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho
-    (m,) of each.
-    """
+    """Eigenvectors U (k d, m) of all D, their eigenvalues delta > 0 (m,), and rho (m,) of each."""
     k, d = D.shape[:2]
     # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact
     # only.

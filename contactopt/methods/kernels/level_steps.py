@@ -1,10 +1,9 @@
 """Newton's steps on one grid of contacts, whose Q is a convolution
 (contactopt.methods.kernels.levels).
 
-A step solves  (I - D) dr + D rho (Q dr + V dlambda) = error,  V' dr = -balance  on the contacts
-               with D != 0; all others have dr = error.
-Products with Q are taken in single precision, which is enough for a correction. Where every closed
-contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES. Both are
+A step solves (I - D) dr + D rho (Q dr + V dlambda) = error, V' dr = -balance on the contacts with D
+!= 0; all others have dr = error. Products with Q are taken in single precision. Where every closed
+contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES, both
 preconditioned by the inverse of the symbol of Q on the grid without padding, restricted to the
 contacts that are closed and to the directions that are held.
 """
@@ -27,9 +26,7 @@ Act = Callable[[np.ndarray], np.ndarray]
 
 
 def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
-    """Solve for a Newton step dr (c, k), dlambda (p,) to a relative accuracy, and count the
-    iterations that it takes.
-    """
+    """A Newton step dr (c, k), dlambda (p,) to a relative accuracy, and its iterations."""
     known = at.error.copy()
     known[:, at.closed] = 0.0
     balance = -at.balance - np.einsum("ckp,ck->p", level.V, known)
@@ -41,9 +38,7 @@ def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
 
 
 def _act(level: Level, at: Evaluation) -> Callable[..., np.ndarray]:
-    """Products with Q on the closed contacts, (c, m) -> (c, m), in single precision, where all
-    others have no force or a given one.
-    """
+    """Products (c, m) with Q on the closed contacts, in single precision."""
 
     def act(x: np.ndarray, others: np.ndarray | None = None) -> np.ndarray:
         full = np.zeros(at.error.shape, np.float32) if others is None else others.astype(np.float32)
@@ -58,9 +53,7 @@ def _act(level: Level, at: Evaluation) -> Callable[..., np.ndarray]:
 def _symmetric(
     level: Level, at: Evaluation, known: np.ndarray, balance: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by
-    projected PCG.
-    """
+    """Q dr + V dlambda = error / rho - Q known, V' dr = balance on closed contacts, by PCG."""
     (c, m), act = (len(known), len(at.closed)), _act(level, at)
     # W holds the columns of the balance; N is the rough inverse, normal and tangential components
     # by themselves.
@@ -187,11 +180,8 @@ def _rough_inverse(level: Level, at: Evaluation) -> Act:
 
 
 def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of
-    them.
-
-    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift
-    sum to less than one.
+    """Shifts from 0 to beyond `largest`, and the share (k, j) of each sigma (k, j) in each of them:
+    hat functions of log(FIRST_SHIFT + sigma), which sum to less than one beyond the last shift.
     """
     count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
     place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)

@@ -1,9 +1,6 @@
-"""Contact problems whose Q is a convolution, on a grid and on coarser ones.
-
-A Level holds a problem component by component, r (c, k), for the components that its law makes
-matter: the normal one alone where there is no friction. A coarse level lumps pairs or squares of
-contacts; its kernel follows from the finer one. Newton's steps are in
-contactopt.methods.kernels.level_steps.
+"""Contact problems whose Q is a convolution, on a grid and on coarser ones, which lump pairs or
+squares of contacts. A Level holds the components, r (c, k), that its law makes matter: the normal
+one alone where there is no friction.
 """
 
 from __future__ import annotations
@@ -139,9 +136,7 @@ class Level:
 
     @cached_property
     def inverse(self) -> Symbols:
-        """Symbols of an approximate inverse of Q, without the coupling of normal and tangential
-        components.
-        """
+        """Symbols of an approximate inverse of Q without normal-tangential coupling."""
         return self.inverse_symbols(self.components[:1]) | self.inverse_symbols(self.components[1:])
 
     @cached_property
@@ -181,9 +176,7 @@ class Level:
     def rough_solve(
         self, x: np.ndarray, closed: np.ndarray, components: tuple[int, ...], inverse: Symbols
     ) -> np.ndarray:
-        """An approximate inverse of given symbols on the closed contacts, x (components, m) ->
-        (components, m).
-        """
+        """An approximate inverse by its symbols, on closed contacts, (components, m)."""
         grid = self.kernel.grid
         padded = grid if self.periodic else tuple(m // 2 for m in self.kernel.padded)
         spectra = []
@@ -204,9 +197,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Errors at a point: error (c, k), balance (p,), the m contacts with a derivative D (m, c, c)
-    that is not zero.
-    """
+    """Errors at a point: error (c, k), balance (p,), m contacts with a derivative D (m, c, c)."""
 
     error: np.ndarray
     balance: np.ndarray

@@ -27,11 +27,8 @@ Act = Callable[[np.ndarray], np.ndarray]
 
 
 class Border:
-    """The balance V' x of a bordered system [[A, B], [V', 0]], given an approximate inverse N of A
-    on arrays (n,).
-
-    Y = N B, and K is the inverse of the Schur complement V' Y; motions that no contact feels stay
-    out of it.
+    """The balance V' x of a bordered system [[A, B], [V', 0]], given an approximate inverse N of A:
+    Y = N B, and K is the inverse of V' Y without motions that no contact feels.
     """
 
     def __init__(self, near: Act, B: np.ndarray, V: np.ndarray, unfelt: float = 1e-15):
@@ -44,9 +41,7 @@ class Border:
         return np.asarray(x - self.Y @ (self.K @ (self.V.T @ x)))
 
     def solve(self, x: np.ndarray) -> np.ndarray:
-        """The inverse of the system: first without multipliers, then the multipliers that restore
-        the balance, then their share of dr.
-        """
+        """The inverse of the system: without multipliers, then those that restore the balance."""
         n = len(self.V)
         y = self.near(x[:n])
         multipliers = self.K @ (self.V.T @ y - x[n:])
@@ -66,9 +61,7 @@ class Linearised:
         return np.flatnonzero(np.repeat(np.any(self.D != 0, axis=(1, 2)), self.D.shape[1]))
 
     def rows(self, dr: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """dr - D (dr - rho (moved + weight dr)) (k d,): the left sides of all contacts that move by
-        `moved` under dr.
-        """
+        """dr - D (dr - rho (moved + weight dr)) (k d,): the left sides of all contacts."""
         k, d = self.D.shape[:2]
         shift = moved + self.equations.weight * dr
         inner = dr.reshape(k, d) - self.equations.rho[:, None] * shift.reshape(k, d)
@@ -94,9 +87,7 @@ class Linearised:
         return known, x[n:]
 
     def operator(self, product: Act) -> LinearOperator:
-        """The left sides (n + p,) of closed contacts and balance, for the products with Q or its
-        model.
-        """
+        """The left sides (n + p,) of closed contacts and balance, by products."""
         n, V = len(self.closed), self.equations.V
 
         def act(x: np.ndarray) -> np.ndarray:
@@ -108,9 +99,7 @@ class Linearised:
         return LinearOperator((size, size), matvec=act, dtype=float)
 
     def inverse(self, P: Preconditioner, rtol: float) -> LinearOperator:
-        """The inverse of the system with Q replaced by the model of P, to that accuracy; `rough`
-        without a model.
-        """
+        """The inverse of the system with the model of P for Q, to rtol; `rough` without a model."""
         rough = self.rough(P)
         if P.model is None:
             return rough
@@ -120,9 +109,7 @@ class Linearised:
         )
 
     def rough(self, P: Preconditioner) -> LinearOperator:
-        """P where a component is held by contact, the identity where it slips, bordered by the
-        balance.
-        """
+        """P where a component is held, else the identity, bordered by the balance."""
         closed, d = self.closed, self.D.shape[1]
         rho, V = np.repeat(self.equations.rho, d)[closed], self.equations.V[closed]
         n, p = V.shape

@@ -48,9 +48,7 @@ class BoxResult:
 
 
 def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
-    """Estimate the largest eigenvalue of a symmetric positive semidefinite P, an array or sparse,
-    from below, by power steps; 0 for an empty or a zero matrix.
-    """
+    """The largest eigenvalue of a semidefinite P, estimated from below by power steps."""
     n = P.shape[0]
     v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(P.dtype)
     value = 0.0
@@ -106,9 +104,7 @@ def descend(
     limit: int,
     largest: float,
 ) -> tuple[np.ndarray, int, bool]:
-    """MPRGP from the feasible x, given an upper bound of P's largest eigenvalue: the last x, the
-    steps taken, whether |projected gradient| <= target.
-    """
+    """MPRGP from a feasible x: the last x, the steps, whether |projected gradient| <= target."""
     length = LENGTH / largest
     g = P @ x + c
     p = None  # direction of the conjugate gradients; None: start afresh from the free gradient

@@ -1,11 +1,9 @@
-"""Semismooth Newton steps on r = P(r - rho u), u = Q r + V lambda + q, V' r + s = 0, for any
-projection P.
+"""Semismooth Newton steps on r = P(r - rho u), u = Q r + V lambda + q, V' r + s = 0.
 
 With P the projection onto half-lines, intervals or discs this is the primal-dual active set method
-of one convex subproblem, and a few steps of it make a backend's approximate answer exact
-(`crossover`): an interior-point answer is the square root of its accuracy away from the solution
-wherever force and gap vanish together. With P the Coulomb map of contactopt.problem.laws it is
-Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
+of one convex subproblem, and makes a backend's answer exact (`crossover`): an interior-point answer
+is the square root of its accuracy off wherever force and gap vanish together. With P the Coulomb
+map it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
 from __future__ import annotations
@@ -72,9 +70,7 @@ class Equations:
     def evaluate(
         self, r: np.ndarray, lam: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r -
-        rho u.
-        """
+        """Residual, P(y) - r (k, d), V'r + s (p,), derivative of P at y = r - rho u."""
         P, D = self.project(r - self.rho[:, None] * self.displacements(r, lam))
         error, balance = P - r, self.V.T @ r.ravel() + self.s
         return sqrt(np.vdot(error, error) + balance @ balance), error, balance, D
@@ -126,11 +122,8 @@ def crossover(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> Iterate:
-    """Improve an approximate answer r (k, d) of a dimensionless subproblem by at most so many
-    Newton steps, and return the best point on the way.
-
-    c are the displacements without forces; the rest is as in Equations, with rho = 1. The residual
-    of what comes back is never larger than that of the projection of what came in.
+    """Improve an approximate answer r (k, d) of a dimensionless subproblem by Newton steps, and
+    return the best point on the way. c are the displacements without forces; rho is 1 in Equations.
     """
     equations = Equations(Q, c.reshape(r.shape), V, s, project)
     residual, r, multipliers = _improve(equations, r, multipliers, steps)
@@ -142,12 +135,10 @@ def crossover(
 def certified(
     solvers: Iterable[tuple[str, Callable[[], Iterate]]], equations: Equations
 ) -> Iterate:
-    """Ask backends one after the other until Newton steps make an answer exact.
+    """Ask backends (name, solve), one after the other, until Newton steps make an answer exact.
 
-    A backend may call anything optimal, so that every answer is checked by its residual. The next
-    of the pairs (name of a backend, its solve), usually the same backend at tighter settings, is
-    asked only if the answer is not exact. The first exact answer is returned, or else the best one;
-    BackendError if even its relative residual is above WRONG.
+    A backend may call anything optimal, so that every answer is checked by its residual. Without an
+    exact answer the best is returned; BackendError if even its relative residual is above WRONG.
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
     for attempt, (asked, solver) in enumerate(solvers):

@@ -1,11 +1,8 @@
-"""Linear systems of block form: diag(left) Q + diag(added), both block diagonal, with Q an array or
-sparse.
+"""Linear systems diag(left) Q + diag(added), both block diagonal, with Q an array or sparse.
 
-Newton's method and interior-point methods for contact solve many of them that differ in the d x d
-blocks of the contacts only. For a sparse Q the pattern of its blocks, the order of elimination and
-the places of its entries in compressed columns are found once; a system then costs a few array
-operations and one sparse LU factorisation (SuperLU). Memory is linear in the non-zeros of the
-factors.
+Newton's and interior-point methods solve many of them. For a sparse Q the pattern of its blocks,
+the order of elimination and the places of its entries are found once; a system then costs a few
+array operations and one sparse LU factorisation (SuperLU).
 """
 
 from __future__ import annotations
@@ -45,9 +42,7 @@ class Solver:
 def assembled(
     Q: np.ndarray, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray
 ) -> np.ndarray:
-    """Write the rows and columns `kept` (n,), of whole contacts or not, of diag(left) Q +
-    diag(added) as an array of its own; left, added (k, d, d). left None stands for the identity.
-    """
+    """Rows and columns `kept` (n,) of diag(left) Q + diag(added) as an array; left None is I."""
     k, d = added.shape[:2]
     used = kept.reshape(k, d).any(axis=1)
     if not used.all():  # only their contacts, then only their components
@@ -62,10 +57,7 @@ def assembled(
 
 
 def factorised(A: np.ndarray) -> Solver | None:
-    """The solver with an array A (n, n), which is overwritten; None if A is singular.
-
-    The transpose of an array in rows is what LAPACK factorises in place.
-    """
+    """The solver with an array A (n, n), which is overwritten; None if A is singular."""
     if not len(A):
         return Solver(lambda right: right, lambda: 1.0)
     lu, swapped, info = dgetrf(np.ascontiguousarray(A).T, overwrite_a=True)
@@ -86,10 +78,8 @@ class DenseBlocks:
         self.Q, self.d = Q, d
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
-        """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added); left, added (k,
-        d, d); None if singular.
-
-        left None stands for the identity.
+        """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added), whose blocks
+        are (k, d, d); None if singular. left None stands for the identity.
         """
         return factorised(assembled(self.Q, left, added, kept))
 
@@ -119,9 +109,7 @@ class SparseBlocks:
         self.unknown, self.entries = self._arranged()
 
     def _arranged(self) -> tuple[np.ndarray, sp.csc_array]:
-        """The unknowns in an order of elimination of least degree, and the numbers of the entries
-        of all blocks in compressed columns of that order.
-        """
+        """Unknowns in an order of least degree, and its compressed columns."""
         d, n = self.d, self.d * self.k
         # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that
         # nothing is pivoted.
@@ -188,9 +176,7 @@ def _parity(order: np.ndarray) -> int:
 
 
 def block_matrix(Q: Interface, d: int) -> Blocks:
-    """Prepare Q (n, n), in blocks of d components, for block systems: sparse where that is faster
-    than LAPACK on an array.
-    """
+    """Q in blocks of d components for block systems, sparse where that beats LAPACK on an array."""
     if not sp.issparse(Q):
         return DenseBlocks(Q, d)
     n = Q.shape[0]

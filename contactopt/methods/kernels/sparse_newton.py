@@ -1,6 +1,4 @@
-"""Newton steps by the factors of block systems (contactopt.methods.kernels.sparse_blocks), with Q
-sparse or an array, and Newton's method with a line search for the subproblems of the proximal loop.
-"""
+"""Newton steps by factors of block systems, and the damped method for proximal subproblems."""
 
 from __future__ import annotations
 
@@ -23,12 +21,7 @@ def block_step(
     D: np.ndarray,
     ridge: float = 0.0,
 ) -> Iterate | None:
-    """dr (k, d), dlambda (p,) of one Newton step; None if the linear system is singular.
-
-    It solves J dr + D rho V dlambda = error, V' dr = -balance with J = I - D + D rho (Q + (weight +
-    ridge) I), D (k, d, d) the generalised derivative of P. Contacts where D = 0 (open) are known at
-    once and leave the system.
-    """
+    """The same step as `Equations.step`, by the factors of a sparse or dense block system."""
     k, d = error.shape
     scaled = equations.rho[:, None, None] * D
     kept = np.repeat(np.any(D != 0, axis=(1, 2)), d)
@@ -53,9 +46,7 @@ def block_step(
 def solve_subproblem(
     equations: Equations, matrix: Blocks, point: Iterate, most: int | None = None
 ) -> tuple[Iterate, bool, int]:
-    """The last iterate of Newton's method with a line search on the equations of a proximal
-    subproblem, whether it solves the subproblem, and the steps, of which at most so many are taken.
-    """
+    """The last iterate of Newton's method with a line search, whether it solves, and the steps."""
     residual, error, balance, D = equations.evaluate(*point)
     recent, most = [residual], most or constants.SUBPROBLEM_STEPS
     for steps in range(1, most + 1):

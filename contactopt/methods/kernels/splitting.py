@@ -30,18 +30,13 @@ class Components:
         here, there = (blocks[:, :1], blocks[:, 1:]) if normal else (blocks[:, 1:], blocks[:, :1])
         rows, others = here.ravel(), there.ravel()
         self.problem, self.own, self.shape = problem, own, here.shape
-        self.q, self.V_all, self.V_there = (
-            problem.q.ravel()[rows],
-            problem.V[rows],
-            problem.V[others],
-        )
+        self.q, self.V_all = problem.q.ravel()[rows], problem.V[rows]
+        self.V_there = problem.V[others]
         self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
         self.V = self.V_all[:, own]
 
     def given(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The linear term and the resultants of the own motions, given the forces of the other
-        components and the other multipliers.
-        """
+        """The linear term and the resultants, given the other components."""
         c = self.q + self.coupling @ fixed.ravel() + self.V_all[:, ~self.own] @ lam[~self.own]
         return c, (self.problem.s + self.V_there.T @ fixed.ravel())[self.own]
 

@@ -1,10 +1,6 @@
-"""The normal and the tangential problem from products with Q alone: active sets outside,
-preconditioned CG inside.
-
-Both are semismooth Newton methods on r = P(r - rho u), where P projects one kind of component and
-leaves the other as it is given: half-lines for the normal problem (primal-dual active set method),
-intervals or discs of the given friction bounds for the tangential one. Each step is one PCG of
-contactopt.methods.kernels.krylov. Penalty: give them Q with 1 / factor on its diagonal.
+"""The normal and the tangential problem from products with Q alone: semismooth Newton methods on r
+= P(r - rho u), where P projects one kind of component on half-lines, intervals or discs and leaves
+the other as it is given. Each step is one PCG of contactopt.methods.kernels.krylov.
 """
 
 from __future__ import annotations
@@ -28,9 +24,7 @@ USABLE = 1e-5  # and above which there is no answer
 
 
 class KrylovSubproblem:
-    """One kind of components of a dimensionless problem; columns: mask (p,) of the multipliers that
-    belong to it.
-    """
+    """One kind of components of a dimensionless problem, with the mask (p,) of its multipliers."""
 
     def __init__(
         self, problem: InterfaceProblem, P: Preconditioner, columns: np.ndarray, normal: bool
@@ -41,11 +35,9 @@ class KrylovSubproblem:
         self.compliance = compliance[:, 0] if normal else compliance[:, 1:].mean(axis=1)
 
     def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
-        """r (k, dim) with its own components new, and the multipliers (columns,).
-
-        Active sets from r, from the glued solution if r has no such force yet. Where they cycle:
-        the proximal loop (contactopt.methods.proximal), each step a problem whose active sets are
-        easier to find. Raises BackendError if that does not come near a solution either.
+        """r (k, dim) with its own components new, and the multipliers (columns,): active sets from
+        r, or from the glued solution. Where they cycle, the proximal loop
+        (contactopt.methods.proximal); BackendError if that does not come near a solution either.
         """
         equations = self._equations(r, multipliers, 0.0, 0.0)
         point = r, multipliers[self.columns]
@@ -107,9 +99,7 @@ class KrylovSubproblem:
         return (r, lam) if step is None else (r + step[0], lam + step[1])
 
     def _projection(self, given: np.ndarray) -> Projection:
-        """y (k, dim) -> the projection of the own components beside the given others, and its
-        derivative.
-        """
+        """The projection of the own components of y (k, dim) beside the `given`."""
         own, low, radius = self.own, self.problem.law.lowest, self.problem.law.bound(given[:, 0])
 
         def project(y: np.ndarray) -> Iterate:

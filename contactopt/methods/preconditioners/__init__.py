@@ -107,9 +107,7 @@ PRECONDITIONERS = {
 
 
 def find_preconditioner(name: str | None) -> None:
-    """InputError unless there is a preconditioner of that name, or it is None or 'none', which are
-    choices of the methods.
-    """
+    """InputError unless it is the name of a preconditioner, None or 'none'."""
     if name not in (None, "none", *PRECONDITIONERS):
         raise InputError(
             f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}."
@@ -117,12 +115,8 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q, (k dim, k dim), in a block for each pair of
-    surfaces.
-
-    Of Q it uses the mean of the diagonal, and which components cannot move. Raises InputError for
-    an unknown name, and for contacts that the preconditioner does not fit; the caller says what it
-    does instead.
+    """The named approximate inverse of problem.Q in a block for each pair of surfaces, by its mean
+    diagonal; InputError for an unknown name, and for contacts that do not fit.
     """
     find_preconditioner(name)
     if len(problem.pairs) > 1:
@@ -161,12 +155,8 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     """Forces (k dim, j) that are smooth on every pair of surfaces: polynomials of the place, in
-    every component.
-
-    On a pair that is far from all others they are constant and linear. Forces whose waves are
-    longer than the distance to the next pair reach it through the body in between, which no model
-    of one pair knows. A thin slice of a body bends under them as a plate does. Therefore the degree
-    grows with the length of a pair over that distance.
+    every component, of a degree that grows with the length of a pair over the distance to the next
+    pair. Longer waves reach it through the body in between, which no model of one pair knows.
     """
     parts = [
         _smooth_motions(part_of(problem, pair), degree)
@@ -176,10 +166,8 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
 
 def degrees(problem: InterfaceProblem) -> list[int]:
-    """The degree of the smooth motions of each pair of surfaces.
-
-    The distance between two pairs is the median over the contacts of one of them, so that pairs
-    that meet at a corner are not taken for neighbours along all of their length.
+    """The degree of the smooth motions of each pair: the distance between two pairs is the median
+    over the contacts of one, so that pairs that meet at a corner are not taken for neighbours.
     """
     points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
     trees = [KDTree(own) for own in points]
@@ -193,10 +181,8 @@ def degrees(problem: InterfaceProblem) -> list[int]:
 
 
 def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
-    """(k dim, j): polynomials of the place up to a degree, those of Chebyshev, in every component.
-
-    On a closed line, which has no polynomials, cosines and sines take their place. Components that
-    cannot move stay at rest; what is then no motion of its own is left out.
+    """(k dim, j): Chebyshev polynomials of the place, or cosines and sines on a closed line, in
+    every component; zero where it cannot move, and without what is then no motion of its own.
     """
     chart = problem.chart
     if chart.period is not None:
@@ -251,11 +237,8 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend
-    on others, and QZ.
-
-    Forces that move nothing, as those that are constant on a periodic half-space, have no energy
-    and are left out.
+    """Z (n, j) with Z'QZ = I on the same columns, and QZ, without columns that depend on others or
+    move nothing, as constant ones on a periodic half-space.
     """
     energy = np.einsum("ij,ij->j", Z, QZ)
     each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)
@@ -268,9 +251,7 @@ def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np.ndarray:
-    """The factor (n,) of a P of one block, by a random force x without a part in what is exact:
-    x'Qx over (Qx)'P(Qx).
-    """
+    """The factor (n,) of a P of one block: x'Qx over (Qx)'P(Qx) of a random force x."""
     x = np.random.default_rng(0).normal(size=len(Z))
     x -= Z @ (QZ.T @ x)
     Qx = np.asarray(Q @ x)
@@ -278,10 +259,8 @@ def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np
 
 
 def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
-    """The factor (n,) of every block of P, the same for all of its unknowns.
-
-    A random force x = P y of one block does the work y'P y by the model. Its work by Q is x'Q x,
-    less what the exact part does of it, |QZ'x|^2.
+    """The factor (n,) of every block of P: a random force x = P y of a block does the work y'P y by
+    the model, and by Q the work x'Q x less what the exact part does of it, |QZ'x|^2.
     """
     random = np.where(held(Q), 0.0, np.random.default_rng(0).normal(size=len(QZ)))
     made = P @ random
@@ -299,11 +278,8 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
 
 
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
-    """An approximate inverse (m, m) of U'QU + diag(added).
-
-    U (n, m) selects the unknowns of an active set, or directions in which contacts may still move;
-    its columns are orthonormal. With a model G of Q it is (U'GU + diag(added))^-1 by an inner PCG;
-    without one it is U'PU (paper, section 5.2).
+    """An approximate inverse (m, m) of U'QU + diag(added), for orthonormal columns U (n, m) of the
+    directions that are free: by an inner PCG with a model G of Q, else U'PU (paper, section 5.2).
     """
     m = U.shape[1]
     rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
@@ -316,9 +292,3 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
     return LinearOperator(
         (m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float
     )
-
-
-def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
-    """The matrix (n, m) whose columns are the unit vectors of some of n unknowns."""
-    m = len(unknowns)
-    return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

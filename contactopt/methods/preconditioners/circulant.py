@@ -14,11 +14,8 @@ INNER = 1e-13
 
 
 def seminorm(m: float) -> np.ndarray:
-    """The first column (2 m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27), for a
-    closed curve of 2 m nodes.
-
-    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the
-    kernel of a seminorm.
+    """The first column (2 m,) of the circulant matrix of the H^1/2 seminorm, eq (27), on a closed
+    curve of 2 m nodes: about log2 m entries, of sum zero where m is a power of two.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
@@ -30,18 +27,14 @@ def seminorm(m: float) -> np.ndarray:
 
 
 def norm(m: float, h: float) -> np.ndarray:
-    """The first column (2 m,) of the circulant matrix of the H^1 norm, eq (28), for a closed curve
-    of 2 m nodes at the distance h.
-    """
+    """First column (2 m,) of the circulant matrix of the H^1 norm, eq (28), at node distance h."""
     column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
     return column
 
 
 def extended(grid: Grid) -> tuple[GridMap, None]:
-    """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq
-    (29). The inverse is not cheap.
-    """
+    """P21 = E' Q_c E of eq (25) on a line, or the sum P31 of eq (29); the inverse is dear."""
     if grid.closed:
         symbol, smallest = _closed_symbol(*grid.shape)
         return _circular(np.maximum(symbol, smallest / 2)), None
@@ -85,12 +78,8 @@ p22 = OnGrid(inverse_of_extended)
 
 
 def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
-    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that
-    is not zero.
-
-    A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is
-    no power of two, the column of eq (27) does not sum to zero, and its sum is subtracted from
-    every eigenvalue.
+    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the least positive one.
+    The sum of the column of eq (27), not zero where k is no power of two, is subtracted from all.
     """
     symbol = fft(seminorm(k / 2)).real
     symbol = symbol - symbol[0]
@@ -108,9 +97,7 @@ def closed_curve(k: int) -> int:
 
 
 def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
-    """The product E' C E along one axis of k nodes of arrays on the grid, for the extension E by
-    zero and the circulant matrix C of size 2 m that has the real eigenvalues `symbol` (m + 1,).
-    """
+    """E' C E along one axis of k nodes, for a circulant C of size 2 m with eigenvalues `symbol`."""
     n = 2 * (len(symbol) - 1)
 
     def product(X: np.ndarray) -> np.ndarray:

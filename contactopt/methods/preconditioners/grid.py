@@ -48,10 +48,8 @@ class Grid:
 
 
 def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
-    """The line, closed curve or rectangular grid on which the contacts lie, and the contacts (k,)
-    in its order.
-
-    The search takes place in the chart, where a rectangular grid may be turned by any angle.
+    """The line, closed curve or rectangular grid, turned by any angle in the chart, on which the
+    contacts lie, and the contacts (k,) in its order.
     """
     if problem.dim == 2:
         return _line(problem, held)
@@ -88,9 +86,8 @@ def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndar
 
 @dataclass(frozen=True)
 class OnGrid:
-    """A preconditioner of contacts on a grid, made from a function of the grid that gives products
-    with P on arrays (*shape, dim) and, where it is cheap, with P^-1. It has that function's
-    docstring.
+    """A preconditioner made from a function of the grid, whose docstring it has, that gives
+    products with P and, where it is cheap, P^-1 on arrays (*shape, dim).
     """
 
     make: Callable[[Grid], GridMaps]
@@ -99,20 +96,8 @@ class OnGrid:
         object.__setattr__(self, "__doc__", self.make.__doc__)
 
     def __call__(self, problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-        """The same products on arrays (k, dim).
-
-        Parameters
-        ----------
-        problem : Of k contacts on a line, a closed curve or a rectangular grid of its chart.
-        held : (k, dim) mask of the components that cannot move.
-
-        Returns
-        -------
-        Products with P and with P^-1, or None in its place.
-
-        Raises
-        ------
-        InputError : If the contacts lie on no grid, or on one of fewer than 3 contacts a side.
+        """Products with P and P^-1, or None, on arrays (k, dim); InputError without a grid of 3 a
+        side.
         """
         grid, order = _grid_of(problem, held)
 
@@ -146,12 +131,8 @@ def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray
 
 
 def _turn(places: np.ndarray) -> np.ndarray:
-    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k) along the
-    axes.
-
-    On a rectangular grid these are the directions of its sides. Their angle is known up to quarter
-    turns only, and the smallest of the possible angles is taken. A grid that lies along the axes
-    already gives the identity to the last digit.
+    """Rotation (2, 2) that lays the directions to nearest neighbours of places (2, k) along the
+    axes, by the smallest angle, and exactly 1 where they lie there.
     """
     points = places.T
     if len(points) < 4:
@@ -166,8 +147,6 @@ def _turn(places: np.ndarray) -> np.ndarray:
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
-    """How much of a line belongs to each of its ascending ticks: half-way to either neighbour, and
-    beyond an end as far as before it.
-    """
+    """Lengths of the ascending ticks' cells, half-way to either neighbour, symmetric at an end."""
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

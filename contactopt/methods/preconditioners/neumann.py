@@ -47,9 +47,7 @@ class Direction:
 
 
 def _closed_line(k: int) -> Direction:
-    """The Laplacian around a closed line of k evenly spaced nodes, by the Hartley transform, which
-    is its own inverse.
-    """
+    """The Laplacian around a closed line of k even nodes, by the Hartley transform."""
 
     def hartley(x: np.ndarray, axis: int) -> np.ndarray:
         spectrum = fft(x, axis=axis, norm="ortho")
@@ -60,9 +58,7 @@ def _closed_line(k: int) -> Direction:
 
 
 def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
-    """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were evenly
-    spaced.
-    """
+    """The Laplacian along `ticks`, odd at the ends that are held; a line counts as even."""
     to, back, kind, shift = TRANSFORMS[bool(held[0]), bool(held[1])]
     k, steps = len(ticks), np.diff(ticks)
     waves = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
@@ -87,10 +83,8 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
 
 
 def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
-    """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
-
-    The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue
-    of the root stands in its place.
+    """Square root of the weighted Laplacian of the contacts, and its inverse; half the least other
+    eigenvalue of the root stands in the place of zero, for constants.
     """
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)

@@ -171,18 +171,14 @@ def divergences(points: np.ndarray, places: np.ndarray, cells: np.ndarray) -> sp
 
 
 def _cut(cells: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Corners of lines or triangles, and the weight with which they count: quadrilaterals are cut
-    both ways, half each.
-    """
+    """Corners of lines or triangles with weights; quadrilaterals are cut both ways, half each."""
     if len(cells) < 4:
         return [(cells, 1.0)]
     return [(cells[list(corners)], 0.5) for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
 
 
 def _angle(x: np.ndarray) -> np.ndarray:
-    """Share (c,) of a full turn at the first corner of lines or triangles x (d, v, c); a line is
-    half of what meets there.
-    """
+    """Share (c,) of a full turn at the first corner of x (d, v, c); a half for a line."""
     if x.shape[1] == 2:
         return np.full(x.shape[2], 0.5)
     a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
@@ -191,9 +187,7 @@ def _angle(x: np.ndarray) -> np.ndarray:
 
 
 def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Gradients (d, c) of the linear functions of each corner, and the lengths or areas (c,), of
-    lines or triangles.
-    """
+    """Gradients (d, c) of each corner's linear function, and lengths or areas (c,)."""
     x = points[:, corners]  # (d, v, c)
     if len(corners) == 2:
         chord = x[:, 1] - x[:, 0]
@@ -239,9 +233,7 @@ def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray
 def inverse_root(
     low: float, high: float, accuracy: float = ACCURACY
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients c (j,) and shifts s (j,) > 0 of a sum of c / (x + s) that is x^-1/2 to this
-    accuracy for x between the bounds.
-    """
+    """c (j,) and s (j,) > 0: sum of c / (x + s) is x^-1/2 to this accuracy between the bounds."""
     m = low / high
     inner, outer = float(ellipk(m)), float(ellipkm1(m))  # K(m) and K(1 - m)
     count = int(np.ceil(-np.log(accuracy / 4) * outer / (2 * np.pi * inner)))

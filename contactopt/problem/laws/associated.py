@@ -1,6 +1,4 @@
-"""Friction with an associated flow rule: forces and displacements are normal to each other's cones,
-so slip dilates.
-"""
+"""Friction with an associated flow rule: slip dilates."""
 
 from __future__ import annotations
 
@@ -28,10 +26,6 @@ class Associated(Law):
     proportional = True
     dilatant = True
 
-    @property
-    def coefficient(self) -> np.ndarray:
-        return self.mu
-
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.asarray(self.mu * np.maximum(r_n, 0.0))
 
@@ -42,9 +36,7 @@ class Associated(Law):
         return coulomb_cone_derivative(y, self.mu)
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """Between the cone and its polar the nearest point is h (1, mu unit), h = (y_n + mu |y_t|)
-        / (1 + mu^2).
-        """
+        """Between the cone and its polar P is h (1, mu unit), h = (y_n + mu |y_t|) / (1 + mu^2)."""
         n, t = split(y)
         size, mu = np.linalg.norm(t, axis=1), self.mu
         beside = (mu * size > -n) & (size > mu * n)
@@ -55,9 +47,7 @@ class Associated(Law):
         )
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
-        """The edge of the polar cone, where contacts open, and that of the cone itself, where they
-        begin to slip.
-        """
+        """The edges of the polar cone, where contacts open, and of the cone."""
         n, t = split(y)
         size = np.linalg.norm(t, axis=1)
         normal = np.abs(n + self.mu * size) <= distance

@@ -1,6 +1,4 @@
-"""Contact without separation: the gap stays zero, the normal force may pull, and friction counts
-its size.
-"""
+"""Contact without separation: the normal force may pull, and friction counts its size."""
 
 from __future__ import annotations
 
@@ -21,10 +19,6 @@ class Bilateral(Law):
 
     mu: np.ndarray
     proportional = True
-
-    @property
-    def coefficient(self) -> np.ndarray:
-        return self.mu
 
     @property
     def lowest(self) -> np.ndarray:

@@ -1,6 +1,4 @@
-"""Coulomb friction at contacts that may open: the law of contactopt.problem.interface_problem, eqs
-(15) to (17).
-"""
+"""Coulomb friction at contacts that may open, eqs (15) to (17) of the paper."""
 
 from __future__ import annotations
 
@@ -31,10 +29,6 @@ class Coulomb(Law):
     mu: np.ndarray
     proportional = True
 
-    @property
-    def coefficient(self) -> np.ndarray:
-        return self.mu
-
     def idle(self, y: np.ndarray) -> np.ndarray:
         return np.asarray(y[:, 0] <= 0)
 
@@ -48,11 +42,8 @@ class Coulomb(Law):
         return coulomb_cone_derivative(y, self.mu)
 
     def project(self, y: np.ndarray) -> Projected:
-        """Alart and Curnier's map: max(y_n, 0), and y_t projected on the disc of radius mu max(y_n,
-        0).
-
-        It is no projection on a convex set, but r = P(r - rho u) exactly at the solutions of
-        Coulomb's law.
+        """max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0) (Alart, Curnier). It
+        is no projection on a convex set, but r = P(r - rho u) exactly at the solutions.
         """
         n, t = split(y)
         closed = n > 0

@@ -88,8 +88,8 @@ class Law:
 
     @property
     def coefficient(self) -> np.ndarray:
-        """(k,) friction coefficients, the largest of all directions; 0 where the law has none."""
-        return np.zeros(self.contacts)
+        """(k,) friction coefficients, of the largest direction: `mu`, or 0 without any."""
+        return getattr(self, "mu", np.zeros(self.contacts))
 
     @property
     def rough(self) -> np.ndarray:

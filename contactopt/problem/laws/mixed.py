@@ -13,9 +13,7 @@ from contactopt.problem.laws.law import Kinks, Law, Projected
 
 @dataclass(frozen=True, eq=False)
 class Mixed(Law):
-    """parts: laws of disjoint contacts; members: for each part the contacts (k_i,) that it rules,
-    together 0 ... k - 1.
-    """
+    """Laws, `parts`, of disjoint contacts, `members` (k_i,), which together are 0 ... k - 1."""
 
     parts: tuple[Law, ...]
     members: tuple[np.ndarray, ...]

@@ -71,9 +71,7 @@ class Orthotropic(Law):
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Orthotropic:
-        """From one coefficient for both axes, or from two, (2,) or (2, k), along the direction that
-        the scene gives and across it.
-        """
+        """From one coefficient, or two, (2,) or (2, k), along the scene's direction and across."""
         k = len(place.areas)
         if values.shape not in ((), (2,), (2, k)):
             raise InputError(
@@ -146,9 +144,7 @@ class Orthotropic(Law):
         return replace(self, mu_1=mu_1, mu_2=mu_2)
 
     def _axes(self, dim: int) -> tuple[np.ndarray, np.ndarray]:
-        """Radii (k, d) of the sets of tangential forces for r_n = 1, and their axes (k, d, d) as
-        rows, d = dim - 1.
-        """
+        """Radii (k, d) of the tangential forces for r_n = 1, their axes (k, d, d) as rows."""
         cosine, sine = np.cos(self.angle), np.sin(self.angle)
         if dim == 2:
             across = np.hypot(self.mu_1 * cosine, self.mu_2 * sine)

@@ -1,6 +1,4 @@
-"""Tresca friction at contacts that may open: the friction bound is given and does not ask for the
-normal force.
-"""
+"""Tresca friction at contacts that may open: the friction bound is given."""
 
 from __future__ import annotations
 
