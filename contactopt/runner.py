@@ -159,7 +159,15 @@ def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
     """The scene that a name or a scene file stands for, with changes as for run(); of a load path
     its last state.
     """
-    return _states(scene, _scene_file(scene), changes)[-1]
+    return states_of(scene, **changes)[0][-1]
+
+
+def states_of(
+    scene: str | Path | Scene, **changes: Any
+) -> tuple[tuple[Scene, ...], dict[str, Any]]:
+    """As scene_of(), all states of a load path, and the options of a run that the file gives."""
+    file = _scene_file(scene)
+    return _states(scene, file, changes), {} if file is None else file.solve
 
 
 def _scene_file(scene: Any) -> SceneFile | None:

@@ -177,6 +177,26 @@ def simplify(options: argparse.Namespace) -> int:
     return 0
 
 
+def check(options: argparse.Namespace) -> int:
+    """Say what is known of a scene before it is solved, and write it as a page."""
+    import webbrowser
+
+    from contactopt.figures.check_page import write_check_page
+    from contactopt.figures.scene_check import check_scene
+    from contactopt.runner import states_of
+
+    states, solve = states_of(options.scene, **_arguments_of(options.set))
+    found = check_scene(states, solve)
+    print(found.text)
+    if options.no_page:
+        return 0
+    page = write_check_page(found, options.out or f"out/{Path(options.scene).stem}-check.html")
+    if not options.no_open:
+        webbrowser.open(page.resolve().as_uri())
+    print(f"{page} shows bodies, boundaries, loads and pairs; open it in a browser")
+    return 0
+
+
 def export(options: argparse.Namespace) -> int:
     """Write a scene for another code: a deck of CalculiX, or its interface problem for FCLib."""
     from contactopt.files.writing import whole_file
@@ -310,6 +330,7 @@ COMMANDS: dict[str, Command] = {
     "run": run,
     "view": view,
     "show": show,
+    "check": check,
     "simplify": simplify,
     "export": export,
     "new": new,
