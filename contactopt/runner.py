@@ -127,7 +127,7 @@ def run(
     InputError : with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    file = _scene_file(scene)
+    file = _scene_file(scene, changes)
     options, changes = choose(changes, {} if file is None else file.solve)
     _check_output(out, options)
     states = _states(scene, file, changes)
@@ -166,17 +166,20 @@ def states_of(
     scene: str | Path | Scene, **changes: Any
 ) -> tuple[tuple[Scene, ...], dict[str, Any]]:
     """As scene_of(), all states of a load path, and the options of a run that the file gives."""
-    file = _scene_file(scene)
+    file = _scene_file(scene, changes)
     return _states(scene, file, changes), {} if file is None else file.solve
 
 
-def _scene_file(scene: Any) -> SceneFile | None:
-    """The scene file that the name of a scene stands for; None for all other scenes."""
+def _scene_file(scene: Any, changes: dict[str, Any]) -> SceneFile | None:
+    """The scene file that the name of a scene stands for, with changes of its entries; None for all
+    other scenes.
+    """
     if isinstance(scene, Scene) or not str(scene).endswith(".toml"):
         return None
     from contactopt.scenes.scene_files import read_scene_file
 
-    return read_scene_file(scene)
+    own = {name: value for name, value in changes.items() if name not in OPTIONS}
+    return read_scene_file(scene, {key: value for key, value in own.items() if value is not None})
 
 
 def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tuple[Scene, ...]:
@@ -184,7 +187,7 @@ def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tupl
     if changes.get("elements", 0) is None:
         changes = {name: value for name, value in changes.items() if name != "elements"}
     if file is not None:
-        return file.changed(changes)
+        return file.states
     if isinstance(scene, str):
         return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)
     known = [field.name for field in fields(scene)]

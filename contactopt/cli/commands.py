@@ -24,8 +24,9 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for text in texts:
         name, sign, value = text.partition("=")
-        name = name.strip().replace("-", "_")
-        if not sign or not name.isidentifier():
+        name = name.strip()
+        name = name if "." in name else name.replace("-", "_")
+        if not sign or not name:
             raise InputError(f"--set needs NAME=VALUE, as in --set width=30; got {text!r}.")
         try:
             found[name] = tomllib.loads(f"value = {value}")["value"]
@@ -232,6 +233,14 @@ def new(options: argparse.Namespace) -> int:
     return 0
 
 
+def schema(options: argparse.Namespace) -> int:
+    """Print the JSON schema of scene files."""
+    from contactopt.cli.scene_schema import schema
+
+    print(json.dumps(schema(), indent=1))
+    return 0
+
+
 def bench(options: argparse.Namespace) -> int:
     """Execute the runs of an experiment file and write their report."""
     from contactopt.benchmark.campaign import run_campaign
@@ -334,6 +343,7 @@ COMMANDS: dict[str, Command] = {
     "simplify": simplify,
     "export": export,
     "new": new,
+    "schema": schema,
     "bench": bench,
     "report": report,
     "problems": problems,

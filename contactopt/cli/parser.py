@@ -39,6 +39,7 @@ COMMANDS = {
     "export": "write a scene for another code: a deck of CalculiX with its contacts, or its"
     " interface problem for FCLib",
     "new": "write an example of a scene file, to start from",
+    "schema": "print the JSON schema of scene files, with which editors complete and check them",
     "bench": "compare methods: make all runs that an experiment"
     " file describes, and a report about them",
     "report": "make the reports of comparisons again from their tables, without solving anything",

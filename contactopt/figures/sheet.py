@@ -31,7 +31,7 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file
 
-        states = read_scene_file(name).states
+        states = read_scene_file(name, changes).states
         head, arguments = [name], []
     else:
         states = make_path(name, **changes) if name in PATHS else (make_scene(name, **changes),)

@@ -69,7 +69,8 @@ def follow(
         state, bodies = state_of(solved, states[-1] if states else None, bodies)
         states.append(state)
         steps = count(state.solution.iterations, "iteration")
-        options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
+        step = scene.state and f" ({scene.state})"
+        options.note(f"state {len(states)}{total}{step}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
     if solved is None:
