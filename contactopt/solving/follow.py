@@ -55,7 +55,13 @@ def follow(
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     method, tol = settings.pop("method", None), settings.pop("tol", TOL)
-    options = Options(Q, solver, method, tol, settings, note)
+    return follow_path(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
+
+
+def follow_path(
+    scenes: Iterable[Scene], elements: int | None, zone: float | None, options: Options
+) -> PathResult:
+    """As follow(), with options for all states."""
     total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
@@ -73,6 +79,8 @@ def follow(
         options.note(f"state {len(states)}{total}{step}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
+        if options.restart is not None:
+            options.restart.finished(state.solution)
     if solved is None:
         raise InputError("the path has no states; give at least one scene.")
     return PathResult(tuple(states), solved.reduction)
