@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.errors import InputError
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import grid_of, scale_of
 from contactopt.scenes.expressions import Expression
@@ -173,8 +172,9 @@ def _between(
         made = linear(*np.meshgrid(*ticks, indexing="ij"))
     if np.any(np.isnan(made)):
         ranges = [f"{low:g} to {high:g}" for low, high in zip(values.min(0), values.max(0))]
-        raise InputError(
+        raise table.fail(
             f"{int(np.isnan(made).sum())} points of the half-space lie outside of the measured"
-            f" places, which reach over {' and '.join(ranges[:-1])}."
+            f" places, which reach over {' and '.join(ranges[:-1])}.",
+            "file",
         )
     return np.asarray(made)

@@ -169,10 +169,10 @@ class Restart:
     def watching(self, progress: Callable[[int, float], None]) -> Callable[[int, float], None]:
         """The `progress` of contactopt.solve, which also keeps the iterates."""
         told: Any = lambda iteration, residual: progress(iteration, residual)  # noqa: E731
-        told.keep = self.keep
+        told.watch = self.reached
         return told  # type: ignore[no-any-return]
 
-    def keep(self, reactions: np.ndarray, multipliers: np.ndarray) -> None:
+    def reached(self, reactions: np.ndarray, multipliers: np.ndarray) -> None:
         """Keep an iterate of the present state."""
         self.now = reactions, multipliers
         begin = time.perf_counter()
