@@ -301,10 +301,14 @@ def listing(options: argparse.Namespace) -> int:
     from contactopt.methods.preconditioners import PRECONDITIONERS
     from contactopt.problem.laws import LAWS
     from contactopt.scenes import PATHS, SCENES
+    from contactopt.scenes.material_library import library
 
     print("scenes")
     for name, (_, _, what, *_) in SCENES.items():
         print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
+    print("materials of scene files")
+    for name, made in library().items():
+        print(f"  {name:20} E = {made.E:g} {made.stress}, nu = {made.nu:g}: {made.source}")
     _print_table("laws of contact", LAWS)
     _print_table("methods", METHODS)
     print("forms of the interface operator Q: " + ", ".join(FORMS))
