@@ -7,6 +7,7 @@ it asks each table for.
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ def schema() -> dict[str, Any]:
     for kind in COMPONENTS:
         for scene in _scenes(kind):
             with suppress(InputError):  # files that are not there
-                read_scenes(lambda scene=scene: Table("", {}, scene, (), asked), Path("scene.toml"))
+                read_scenes(partial(Table, "", {}, scene, (), asked), Path("scene.toml"))
     found: dict[tuple[str, ...], list[Asked]] = {}
     for place, entries in asked.items():
         found.setdefault(_general(place), []).extend(entries)

@@ -136,14 +136,14 @@ def _boundaries(scene: Scene, part: Part, mesh: Any) -> Iterator[dict[str, Any]]
             "role": role,
             "vector": vector,
         }
-    for load in part.loads:
-        if isinstance(load, BodyForce):
+    for force in part.loads:
+        if isinstance(force, BodyForce):
             yield {
                 "name": f"{part.name}: force per volume",
                 "places": _spatial(mesh.p.mean(axis=1, keepdims=True)),
                 "cells": faces[:0],
                 "role": 2,
-                "vector": np.pad(np.array([load.value]), ((0, 0), (0, 3 - scene.dim))),
+                "vector": np.pad(np.array([force.value]), ((0, 0), (0, 3 - scene.dim))),
             }
 
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.motions import kernel, whole_motions
 from contactopt.bodies.solvers import solvers_there
@@ -88,7 +87,9 @@ def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) ->
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
-        lines += part_lines(scene, part, body.body.basis.mesh if _elastic(body) else None)
+        lines += part_lines(
+            scene, part, body.body.basis.mesh if isinstance(body, AssembledElastic) else None
+        )
         lines.append(f"  {count(body.unknowns, 'unknown')}; {_held(part, body.name, free)}")
     for pair, own in zip(scene.pairs, made.couplings):
         lines += _pair_lines(scene, pair, own)
@@ -100,10 +101,6 @@ def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) ->
     lines += _cost_lines(costs, memory, len(states))
     lines += [f"note: {note}" for note in notes]
     return SceneCheck(scene, made, free, costs, memory, tuple(notes), "\n".join(lines))
-
-
-def _elastic(body: AssembledBody) -> bool:
-    return isinstance(body, AssembledElastic)
 
 
 def _free_problem(scene: Scene, made: Posed) -> InterfaceProblem:
@@ -175,6 +172,8 @@ def _posed_again(state: Scene, made: Posed) -> Posed:
     from contactopt.bodies.body import reload_body
 
     bodies: list[Any] = []
+    body: Any
+    part: Any
     for body, part in zip(made.bodies, state.parts):
         if isinstance(body, AssembledElastic):
             bodies.append(AssembledElastic(reload_body(body.body, state, part), part))

@@ -136,7 +136,7 @@ class Table:
                 check_number(key, self.data[key], **limits)
         if among and value not in among:
             known = f"there is no {key} {short(value)}; choose from {', '.join(among)}"
-            raise self.fail(known + meant(value, among), key)
+            raise self.fail(known + meant(str(value), among), key)
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:

@@ -198,7 +198,8 @@ def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:
         values = components_of(way, reading, whole=True)
         given["direction"] = tuple(values.get(c, 0.0) for c in reading.components)
     with table.about():
-        made = Contact(*(table.take(side, str, needed=True) for side in SIDES), mu, **given)
+        upper, lower = (table.take(side, str, needed=True) for side in SIDES)
+        made = Contact(upper, lower, mu, **given)
     table.close()
     return made
 

@@ -170,7 +170,7 @@ class Restart:
         """The `progress` of contactopt.solve, which also keeps the iterates."""
         told: Any = lambda iteration, residual: progress(iteration, residual)  # noqa: E731
         told.watch = self.reached
-        return told  # type: ignore[no-any-return]
+        return told
 
     def reached(self, reactions: np.ndarray, multipliers: np.ndarray) -> None:
         """Keep an iterate of the present state."""
