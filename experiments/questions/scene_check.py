@@ -50,19 +50,15 @@ def main() -> None:
         told = json.dumps([name, elements, changes])
         command = [sys.executable, "-c", RUN, told]
         spent, peak = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
-        way = (
-            min(found.costs, key=lambda own: found.costs[own])
-            if found.costs
-            else ("products", "FFT")
-        )
-        seconds = found.costs.get(way)
+        costs: dict[tuple[str, str], Any] = found.costs or {("products", "FFT"): "-"}
+        way = min(costs, key=lambda own: costs[own])
         rows.append(
             {
                 "scene": name,
                 "elements": elements,
                 "unknowns": sum(body.unknowns for body in found.posed.bodies),
                 "way": " by ".join(way),
-                "estimated s": seconds if seconds is not None else "-",
+                "estimated s": costs[way],
                 "CPU s": spent,
                 "estimated GB": found.memory / 1e9,
                 "peak GB": peak / 1e9,
@@ -71,15 +67,17 @@ def main() -> None:
         print(rows[-1], flush=True)
     ratios = [row["estimated GB"] / row["peak GB"] for row in rows]
     times = [row["estimated s"] / row["CPU s"] for row in rows if row["estimated s"] != "-"]
-    text = f"""`contactopt check` estimates time and memory before anything is solved. How good are these numbers?
+    text = f"""`contactopt check` estimates time and memory before anything is solved. How good are
+these numbers?
 
 - The memory is estimated at {min(ratios):.2g} to {max(ratios):.2g} times the peak of the process.
-- The time is estimated at {min(times):.2g} to {max(times):.2g} times the CPU time of assembly, solution and certificate. The costs were
-  fitted to other meshes on another machine ([the ways](../ways/report.md)).
+- The time is estimated at {min(times):.2g} to {max(times):.2g} times the CPU time of assembly,
+  solution and certificate. The costs were fitted to other meshes ([the ways](../ways/report.md)).
 
 {{estimates}}
 
-Each run is a process of its own; the peak is its largest resident memory, with Python and its packages.
+Each run is a process of its own; the peak is its largest resident memory, with Python and its
+packages.
 """
     write("scene_check", "What a run will cost, told before it", text, {"estimates": rows}, {})
 
