@@ -19,9 +19,10 @@ from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, write
 from contactopt.figures.style import FORMATS
-from contactopt.files.writing import check_folder, replace_file, whole_folder
+from contactopt.files.writing import check_folder, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
+from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.quantities import approach
@@ -34,7 +35,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
 from contactopt.solving.limits import Limits
 from contactopt.solving.progress import resident_memory
-from contactopt.solving.restart import FILE, Restart, read_known
+from contactopt.solving.restart import FILE, Restart, make_restart
 from contactopt.solving.solve_scene import Options, Solved
 
 if TYPE_CHECKING:
@@ -137,12 +138,9 @@ def run(
     name = options.method or default_method(options.settings)
     method = find_method(name, **options.settings)
     method.backends(states[-1].dim)  # refused before any work if one of them cannot be used
-    restart = _restart(out, options, len(states) > 1, note)
+    restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
     limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
-    form = options.Q if options.preconditioner is None else "implicit"
-    until = start + (np.inf if options.time_limit is None else options.time_limit)
-    until = until if options.accuracy is None else np.inf
-    how = Options(form, options.solver, method, options.tol, {}, note, restart, until)
+    how = _how(options, method, start, restart, note)
     prepared = time.perf_counter() - start
     try:
         solved, estimate = None, None
@@ -156,10 +154,10 @@ def run(
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note, restart)
     except MemoryError as error:
-        _kept(restart, note)
+        restart.stopped(note)
         raise InputError(_too_large(states[-1], str(error))) from error
     except KeyboardInterrupt:
-        _kept(restart, note)
+        restart.stopped(note)
         raise
     except InputError as error:
         raise error if file is None else file.located(error) from error
@@ -210,27 +208,14 @@ def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tupl
     return (replace(scene, **changes),)
 
 
-def _restart(out: str | Path | None, options: RunOptions, path: bool, note: Note) -> Restart:
-    """What keeps the states of a run in its folder, with those that it goes on or starts from."""
-    file = None if out is None else Path(out) / FILE
-    if not options.resume:
-        return Restart(file, None if options.start is None else read_known(options.start), path)
-    if out is None:
-        raise InputError("to resume a run, give the folder that it was written into, out=...")
-    if not Path(out, FILE).exists():
-        note(f"nothing was kept in '{out}' yet; the run starts anew")
-        return Restart(file, None, path)
-    known = read_known(out)
-    if known.complete:
-        raise InputError(f"the run in '{out}' is complete; to start another from it, take start.")
-    return Restart(file, known, path)
-
-
-def _kept(restart: Restart, note: Note) -> None:
-    """Write what a run has found before it was stopped."""
-    if restart.file is not None and (restart.done or restart.now):
-        replace_file(restart.file, restart.save)
-        note(f"{restart.file} keeps what was found; go on with --resume")
+def _how(
+    options: RunOptions, method: Method, begin: float, restart: Restart, note: Note
+) -> Options:
+    """How each state is solved, of a run that began at a time [s]."""
+    form = options.Q if options.preconditioner is None else "implicit"
+    limit = options.time_limit if options.accuracy is None else None
+    until = np.inf if limit is None else begin + limit
+    return Options(form, options.solver, method, options.tol, {}, note, restart, until)
 
 
 def _check_output(out: str | Path | None, options: RunOptions) -> None:

@@ -20,6 +20,7 @@ from contactopt.figures.page_data import MOST_INSIDE, body_arrays, box_of, whole
 from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
+from contactopt.readings.resultants import mirrors
 from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
 
 ROLES = ("no use", "support", "load", "plate", "contact")
@@ -38,22 +39,11 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
     ]
     items = [item for both in zip(parts, meshes) for item in _boundaries(scene, *both)]
     items.sort(key=lambda item: item["role"] == 0)
-    mirrors = [
-        [int(axis), float(plane.offset / plane.inward[axis]) + 0.0]
-        for plane in check.posed.planes
-        if abs(plane.inward[axis := int(np.argmax(np.abs(plane.inward)))]) > 1 - 1e-9
-    ]
-    inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes) <= MOST_INSIDE
-    bodies = []
-    for number, (part, mesh) in enumerate(zip(parts, meshes)):
-        kind, elements = elements_of(mesh)
-        block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
-        count = mesh.doflocs.shape[1]
-        values = {"move": np.zeros((1, count, scene.dim)), "body": np.full((1, count), number)}
-        drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
-        bodies.append({"name": part.name} | body_arrays(drawn, values, mirrors, inside))
+    posed: Any = SimpleNamespace(scene=scene, planes=check.posed.planes)
+    planes = [[scene.components.index(own["axis"]), own["place"]] for own in mirrors(posed)]
+    bodies = _bodies(scene, parts, meshes, planes)
     places = [item["places"] for item in (*items, *pairs)]
-    box = whole_box(box_of([*places, *(_spatial(mesh.p) for mesh in meshes)]), mirrors)
+    box = whole_box(box_of([*places, *(_spatial(mesh.p) for mesh in meshes)]), planes)
     near = box_of([item["places"] for item in pairs])
     wide = 0.2 * float(np.ptp(near, axis=0).max())
     data = {
@@ -61,7 +51,7 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
         "dim": scene.dim,
         "axes": list(scene.components),
         "ring": scene.kind == "axisymmetric",
-        "mirrors": mirrors,
+        "mirrors": planes,
         "box": box.tolist(),
         "near": box.tolist(),
         "contact": [(near[0] - wide).tolist(), (near[1] + wide).tolist()],
@@ -90,6 +80,22 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
     return write_html(
         file, f"contactopt: {scene.name}", body, data, ["painter.js", "view.js"], plotly=False
     )
+
+
+def _bodies(
+    scene: Scene, parts: list[Part], meshes: list[Any], planes: list[Any]
+) -> list[dict[str, Any]]:
+    """The bodies with meshes, each coloured by its number."""
+    inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes) <= MOST_INSIDE
+    made = []
+    for number, (part, mesh) in enumerate(zip(parts, meshes)):
+        kind, elements = elements_of(mesh)
+        block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
+        count = mesh.doflocs.shape[1]
+        values = {"move": np.zeros((1, count, scene.dim)), "body": np.full((1, count), number)}
+        drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
+        made.append({"name": part.name} | body_arrays(drawn, values, planes, inside))
+    return made
 
 
 def _spatial(points: np.ndarray) -> np.ndarray:

@@ -186,6 +186,12 @@ class Restart:
         self.done.append((solution.reactions, solution.multipliers))
         self.now = None
 
+    def stopped(self, note: Callable[[str], None]) -> None:
+        """Write what a run has found before it was stopped."""
+        if self.file is not None and (self.done or self.now):
+            replace_file(self.file, self.save)
+            note(f"{self.file} keeps what was found; go on with --resume")
+
     def save(self, file: Path, complete: bool = False) -> None:
         """Write what has been found so far, if there is anything."""
         if self.reduction is None or not (
@@ -207,3 +213,38 @@ class Restart:
             zone=self.zone,
             complete=complete,
         )
+
+
+def make_restart(
+    out: str | Path | None,
+    resume: bool,
+    start: str | Path | None,
+    path: bool,
+    note: Callable[[str], None],
+) -> Restart:
+    """Make what keeps the states of a run in its folder, with those that it goes on or starts from.
+
+    Parameters
+    ----------
+    out : the folder of the run; None: nothing is kept
+    resume, start : whether to go on with the run in this folder, or the folder of the run to start
+        from
+    path : whether the run has a load path
+    note : receives a sentence where there is nothing to resume
+
+    Returns
+    -------
+    Restart : for contactopt.solving.solve_scene.Options
+    """
+    file = None if out is None else Path(out) / FILE
+    if not resume:
+        return Restart(file, None if start is None else read_known(start), path)
+    if file is None:
+        raise InputError("to resume a run, give the folder that it was written into, out=...")
+    if not file.exists():
+        note(f"nothing was kept in '{out}' yet; the run starts anew")
+        return Restart(file, None, path)
+    known = read_known(file.parent)
+    if known.complete:
+        raise InputError(f"the run in '{out}' is complete; to start another from it, take start.")
+    return Restart(file, known, path)
