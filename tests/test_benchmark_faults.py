@@ -16,14 +16,15 @@ import numpy as np
 import psutil
 import pytest
 
-from contactopt import InputError, benchmark
-from contactopt.benchmark import pool, problems, process, store
+from contactopt import InputError, benchmark, solve
+from contactopt.benchmark import pool, problems, process, store, worker
 from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.reports import read_layout
 from contactopt.benchmark.runs import MethodSpec, Run
 from contactopt.benchmark.store import lines
 from contactopt.cli import main
+from contactopt.linear.convolution import Convolution
 from contactopt.methods.backends import child
 from tests.test_benchmark import SMALL, bench, count, run, written
 
@@ -505,7 +506,7 @@ def test_folders_that_cannot_be_written(tmp_path, capsys):
 def test_killed_processes_cost_their_own_run_only(tmp_path):
     """SIGKILL to the processes that run methods, then to the whole campaign, at random moments."""
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 30")), tmp_path / "out"
-    expected = {r.key for r in read_experiment(path).runs()}
+    expected = read_experiment(path).runs()
     rng = np.random.default_rng(5)
     command = bench(path, out, "--resume")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -526,13 +527,53 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
         assert process.wait(120) == (0 if rounds == 2 else -signal.SIGKILL)
     rows = list(lines(out / "rows.jsonl"))
     keys = [row["key"] for row in rows]
-    assert len(keys) == len(set(keys)) and set(keys) == expected
+    slow = pool.History(rows)  # runs that a busy machine made so long that they are not repeated
+    least = {r.key for r in expected if not slow.repeated(r)}
+    assert len(keys) == len(set(keys)) and least <= set(keys) <= {r.key for r in expected}
     failed = [row for row in rows if not row["success"]]
     assert (
         len(failed) <= killed
         and {row["status"] for row in failed} <= {"out_of_memory"}
         and killed >= 2
     )
+
+
+GROWN = []
+
+
+def grow(size: int) -> int:
+    """Keep so many bytes for ever; the number of the process."""
+    GROWN.append(np.ones(size // 8))
+    time.sleep(0.4)
+    return os.getpid()
+
+
+def test_a_process_that_grows_goes_on():
+    """The library of processes would recycle one that grew by 300 MB in more than a second, and a
+    call at that moment was told as a crash, or waited for ever.
+    """
+    grown = process.Process()
+    try:
+        numbers = {grown.ask(60, "grow", grow, 150 * 10**6) for _ in range(6)}
+    finally:
+        grown.kill()
+    assert len(numbers) == 1
+
+
+def test_a_half_space_goes_to_other_processes_by_its_kernel():
+    """No array is made of its Q, so that its size is no limit."""
+    (spec,) = problems.named(
+        "family", "by_products", {"of": "hertz-half-space", "elements": 16}, Path(".")
+    )
+    builder = process.Process()
+    try:
+        made, facts = builder.ask(60, "build", worker.build, spec, (), False, 4.0)
+    finally:
+        builder.kill()
+    assert facts["contacts"] == made.contacts and made.q.size > worker.MOST_ROWS
+    assert isinstance(made.Q, Convolution) and solve(made).solved
+    x = np.random.default_rng(0).normal(size=made.q.size)
+    assert np.array_equal(made.Q @ x, spec.build({}).Q @ x)
 
 
 def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch):

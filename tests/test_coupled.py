@@ -6,10 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from skfem import MeshHex
 
-from contactopt import InputError, natural_map_residual, reduce, reduce_bodies, scenes, solve
+from contactopt import (
+    InputError,
+    Material,
+    Part,
+    Scene,
+    Support,
+    Traction,
+    natural_map_residual,
+    reduce,
+    reduce_bodies,
+    scenes,
+    solve,
+)
 from contactopt.bodies.solvers.multigrid import MultigridSolver, conjugate_gradients
+from contactopt.coupling import costs
 from contactopt.linear.flexible_gmres import flexible_gmres
+from contactopt.linear.operators import InterfaceOperator
 from contactopt.linear.stacked import Stacked, norm
 from contactopt.methods.kernels.coupled_newton import Coupled, State, in_equilibrium
 from contactopt.problem.certificate import Moved
@@ -173,3 +188,57 @@ def test_long_solves_say_what_they_reached(monkeypatch):
 def test_time_left_goes_on_as_the_last_step():
     assert progress.remaining([(0.0, 1.0), (10.0, 1e-2), (12.0, 1e-4)], 1e-8) == ", about 4 s left"
     assert progress.remaining([(0.0, 1e-3), (1.0, 1e-2)], 1e-8) == ""
+
+
+def _block(name, low, high, nu, **more):
+    """Ten by ten by five bricks of 1 x 1 x `high - low`."""
+    flat = np.linspace(0, 1, 11)
+    mesh = MeshHex.init_tensor(flat, flat, np.linspace(low, high, 6)).with_boundaries(
+        {"low": lambda x: np.isclose(x[2], low), "high": lambda x: np.isclose(x[2], high)}
+    )
+    return Part(name, mesh, Material(5.0, nu), **more)
+
+
+def _blocks(thickness, nu):
+    pushed = Traction("high", (0.02, 0.0, -0.1))
+    upper = _block("upper", 0, thickness, nu, loads=(pushed,), contact="low")
+    lower = _block("lower", -thickness, 0, nu, supports=(Support("low"),), contact="high")
+    return Scene("two blocks", upper, lower, 0.3, kind="solid")
+
+
+@pytest.fixture
+def coupled_by_a_little(monkeypatch):
+    """Prices that make the coupled way a little cheaper than a dense Q, and all others dear."""
+    for way in costs.COSTS:
+        price = {"coupled": 0.9, "dense": 1.0}.get(way[0], 9.0)
+        monkeypatch.setitem(costs.COSTS, way, (price, *[0.0] * (len(costs.COSTS[way]) - 1)))
+
+
+@pytest.mark.parametrize(("thickness", "nu"), [(0.05, 0.3), (0.5, 0.4999)])
+def test_a_coupled_way_that_turns_out_dear_is_left(coupled_by_a_little, thickness, nu):
+    """Multigrid takes many V-cycles for flat bricks and for a nearly incompressible material."""
+    scene = _blocks(thickness, nu)
+    solved = solve_scene(scene)
+    solution, notes = solved.solution, " ".join(solved.solution.notes)
+    assert solution.solved and not isinstance(solved.reduction.problem.Q, InterfaceOperator)
+    assert "takes more V-cycles" in notes and "takes its place" in notes
+    assert solution.seconds["given up"] > 0
+    expected = solve_scene(scene, options=Options(solver="superlu")).solution
+    assert np.array_equal(solution.reactions, expected.reactions)
+    again = solve_scene(scene, start=solved)  # which does not try it once more
+    assert again.solution.solved and "given up" not in again.solution.seconds
+
+
+def test_a_coupled_way_that_keeps_its_promise_is_kept(coupled_by_a_little):
+    scene = _blocks(0.5, 0.3)
+    solved = solve_scene(scene)
+    assert solved.solution.solved and not solved.solution.notes
+    assert solved.reduction.problem.Q.coupled is not None
+
+
+def test_who_asked_for_multigrid_gets_it(coupled_by_a_little):
+    scene = _blocks(0.5, 0.49)
+    asked = solve_scene(scene, options=Options(solver="multigrid"))
+    assert asked.reduction.problem.Q.coupled is not None and asked.turned is None
+    problem = reduce(scene)  # nobody is there who could turn to another way
+    assert problem.Q.coupled is not None and solve(problem).solved

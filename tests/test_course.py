@@ -50,7 +50,7 @@ def test_a_chapter_and_its_solutions(name, tmp_path, monkeypatch, capsys):
 
 def test_there_are_twenty_exercises_and_some_need_pen_and_paper_only():
     text = "".join(path.read_text() for path in CHAPTERS.values())
-    assert len(CHAPTERS) == 6 and len(exercises(text)) >= 20
+    assert len(CHAPTERS) == 7 and len(exercises(text)) >= 20
     assert text.count("(Pen and paper.)") >= 8
     assert text.count('tags=["exercise"]') == len(exercises(text))
 

@@ -24,6 +24,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.errors import InputError
+from contactopt.linear.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem, Status, dimensionless
 
 FIND_LIMIT = 60.0  # s for a Python to import the solver
@@ -124,7 +125,7 @@ class Peer:
 
         Parameters
         ----------
-        problem : With Q as a matrix, without plates; InputError on one with plates.
+        problem : Without plates; InputError on one with plates.
         tol, time_limit : The solver's own tolerance [-], and the most that it may take [s].
         settings : What `prepare` gets besides.
 
@@ -134,6 +135,8 @@ class Peer:
         """
         if len(problem.s):
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")
+        if isinstance(problem.Q, InterfaceOperator):
+            problem = problem.explicit()
         p, scales = dimensionless(problem)
         p = _in_space(p)
         Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(3, 3))

@@ -164,7 +164,13 @@ class Process:
 def prepare(noise: str, parent: int) -> None:
     """Make the new process ready: it ends with the process of the number `parent`, leaves Ctrl-C to
     it, and prints into the file `noise`.
+
+    loky would end a process that has grown by 300 MB, as large problems let it grow. A call that
+    comes at that moment gets no answer. Limits of memory are the campaign's own.
     """
+    from loky import process_executor
+
+    process_executor._MAX_MEMORY_LEAK_SIZE = float("inf")
     if sys.platform == "linux":
         import ctypes
 

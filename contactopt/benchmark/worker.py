@@ -22,6 +22,7 @@ from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
 from contactopt.errors import InputError
+from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution
@@ -60,10 +61,10 @@ def build(
         seconds = time.perf_counter() - begin
         if isinstance(problem.Q, InterfaceOperator) and problem.q.size <= MOST_ROWS:
             problem = problem.explicit()
-        if isinstance(problem.Q, InterfaceOperator):
+        if isinstance(problem.Q, InterfaceOperator) and not isinstance(problem.Q, Convolution):
             raise InputError(
-                f"problem '{spec.label}' must have Q as a"
-                f" matrix above {MOST_ROWS} components; a benchmark hands it to other processes."
+                f"problem '{spec.label}' must have Q as a matrix or as a convolution above"
+                f" {MOST_ROWS} components; a benchmark hands it to other processes."
             )
         facts = {
             "fingerprint": problem.fingerprint,

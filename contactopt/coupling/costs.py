@@ -9,7 +9,8 @@ gigabyte, and a coupled way that takes less than half the time of factors.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +27,8 @@ COSTS: dict[tuple[str, str], tuple[float, ...]] = {
     ("products", "pardiso"): (1.15e-01, 5.45e-07, 0.0, 8.84e-08, 8.31e-04, 1.06e-06),
     ("coupled", "multigrid"): (1.58e-01, 1.72e-06, 9.96e-04, 3.40e-07),
 }
+CYCLES = 125  # V-cycles of all bodies by the coupled way, in the mean of the scenes of the fit
+MOST_DEARER = 10.0  # times the cost of the coupled way, up to which another way may replace it
 FORM_OF = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
 
 
@@ -87,3 +90,41 @@ def estimates(
             cost = float(np.dot(prices, terms(way, works, unknowns, dim)))
             found[way, solver] = cost * (AGAIN if way == "coupled" and not once else 1.0)
     return found
+
+
+@dataclass(frozen=True)
+class NextBest:
+    """The way to take where the coupled way turns out dearer than it promised.
+
+    Q, solver : The form of Q and the solver of the bodies.
+    cycles : V-cycles of the coupled way that cost as much as both ways were estimated to cost. Who
+        gives up after them has spent at most twice what the better of the two would have taken.
+    """
+
+    Q: str
+    solver: str
+    cycles: float
+
+
+def next_best(costs: Mapping[tuple[str, str], float], once: bool) -> NextBest | None:
+    """The best of the ways without multigrid, where the coupled way is the cheapest of all.
+
+    None where another way is the cheapest, or where all others cost too much to fall back on.
+
+    Parameters
+    ----------
+    costs, once : As from `estimates`.
+
+    Returns
+    -------
+    The way, and when to take it.
+    """
+    others = [way for way in costs if way[0] != "coupled"]
+    taken = min(costs, key=lambda way: costs[way])
+    if taken[0] != "coupled" or not others:
+        return None
+    best = min(others, key=lambda way: costs[way])
+    ratio = costs[best] / costs[taken] * (1.0 if once else AGAIN)
+    if ratio > MOST_DEARER:
+        return None
+    return NextBest(FORM_OF[best[0]], best[1], CYCLES * (1.0 + ratio))

@@ -33,13 +33,14 @@ from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import card, count, line
 from contactopt.coupling.compliance import compliance, filling, operator
-from contactopt.coupling.costs import FORM_OF, estimates
+from contactopt.coupling.costs import CYCLES, FORM_OF, estimates, next_best
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.coupling.posed import posed
 from contactopt.coupling.problem_of_bodies import problem_of
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
+from contactopt.linear.budget import fill
 from contactopt.linear.concurrency import each, give_back, one_blas_thread
 from contactopt.linear.operators import (
     NOISE,
@@ -284,6 +285,10 @@ def reduce_bodies(
     Returns
     -------
     The interface problem with the bodies, the coupling and the seconds that each phase took.
+
+    Raises
+    ------
+    TooDear : Where a budget of V-cycles is open (contactopt.linear.budget) and too low.
     """
     start = time.perf_counter()
     assembled, couplings, maps, planes = posed(scene, elements, zone, Q, coupling)
@@ -320,7 +325,7 @@ def _way(
     once: bool,
 ) -> tuple[str, str]:
     """The form of Q and the solver of the bodies that were asked for; for `auto`, those of
-    the cheapest way.
+    the cheapest way. Where that is the coupled one, the budget that is open gets its limit.
     """
     Q, solver = asked
     if any(body.iterates(solver) for body in assembled if not body.work.stiffness):
@@ -334,6 +339,10 @@ def _way(
     way, solver = min(costs, key=lambda own: costs[own])
     told = ", ".join(f"{name} {by} {cost:.2g} s" for (name, by), cost in costs.items())
     log.info("scene '%s': the way is %s by %s, of %s", scene.name, way, solver, told)
+    other = next_best(costs, once)
+    if other is not None:
+        size = sum(body.unknowns for body in assembled)
+        fill(CYCLES * size, other.cycles * size, other)
     return FORM_OF[way], solver
 
 

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from contextvars import copy_context
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -77,7 +78,11 @@ def each(
     if sum(marked) < 2:
         return tuple(act(item) for item in listed)
     with ThreadPoolExecutor(sum(marked)) as pool:
-        running = [pool.submit(act, item) if mark else None for item, mark in zip(listed, marked)]
+        # limits of time and work hold in the threads, too
+        running = [
+            pool.submit(copy_context().run, act, item) if mark else None
+            for item, mark in zip(listed, marked)
+        ]
         here = [act(item) if future is None else None for item, future in zip(listed, running)]
         for place, future in enumerate(running):
             if future is not None:

@@ -314,6 +314,10 @@ class Convolution(InterfaceOperator):
         diagonal = np.tile(kernel.diagonal, int(np.prod(kernel.grid)))
         super().__init__(self._product, diagonal, kernel.entries, accuracy, counter=counter)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes: the kernel is all there is to it."""
+        return Convolution, (self.kernel, self.accuracy)
+
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))
         single = accuracy is not None and accuracy >= SINGLE

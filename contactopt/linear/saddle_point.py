@@ -144,6 +144,11 @@ class CoupledForm:
     counter: Counter = field(default_factory=Counter)
 
     @property
+    def size(self) -> int:
+        """Number of the unknowns X."""
+        return sum(term.size for term in self.terms)
+
+    @property
     def cycles(self) -> int:
         """Number of applications of B so far."""
         return self.counter.total

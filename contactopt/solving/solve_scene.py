@@ -15,8 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.coupling.costs import NextBest
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.errors import InputError
+from contactopt.linear.budget import TooDear, open_budget
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods.driver import TOL, solve
@@ -78,18 +80,22 @@ class Solved:
     `solution.seconds` holds the wall time [s] of each phase, summed over all that led to this
     solution: `assemble`, `factorise` and `compliance` of the bodies, `load` of further states of a
     path, `checks` of the interface problem, `solve` of it by the method, `certificate` of the
-    answer, and `coarse` for everything that was done on coarser meshes.
+    answer, `coarse` for everything that was done on coarser meshes, and `given up` for a way that
+    was left because it took more work than expected.
 
     zones  half-widths of the contact zone [length]: for which the first mesh was made, and read
            from each solution; none if the scene has no zone
     path   all states of a load path, of which this is the last one; None where there is one state
            only
+    turned the way that was taken in place of the coupled one, which turned out to be too dear; None
+           where the first choice was kept
     """
 
     reduction: Reduction
     solution: Solution
     zones: tuple[float, ...] = ()
     path: PathResult | None = None
+    turned: NextBest | None = None
 
 
 def solve_scene(
@@ -117,8 +123,37 @@ def solve_scene(
     if not isinstance(scene, Scene):
         raise InputError(f"a scene must be a Scene; got {type(scene).__name__}.")
     elements = scene.elements if elements is None else elements
-    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     once = once and options.method in STEPS
+    if start is not None and start.turned is not None:
+        options = replace(options, Q=start.turned.Q, solver=start.turned.solver)
+        return replace(_one_way(scene, elements, zone, options, start, once), turned=start.turned)
+    begin = time.perf_counter()
+    try:
+        with open_budget():
+            return _one_way(scene, elements, zone, options, start, once)
+    except TooDear as too_dear:
+        gone, other = time.perf_counter() - begin, too_dear.instead
+    note = f"multigrid takes more V-cycles here than expected; {other.solver} takes its place"
+    options.note(note)
+    options = replace(options, Q=other.Q, solver=other.solver)
+    solved = _one_way(scene, elements, zone, options, start, once)
+    solution = solved.solution
+    seconds, notes = solution.seconds | {"given up": gone}, (*solution.notes, note)
+    return replace(solved, solution=replace(solution, seconds=seconds, notes=notes), turned=other)
+
+
+def _one_way(
+    scene: Scene,
+    elements: int,
+    zone: float | None,
+    options: Options,
+    start: Solved | None,
+    once: bool,
+) -> Solved:
+    """The scene solved by the way that the options name, or the cheapest one; TooDear where that
+    is the coupled one and its V-cycles cost more than they promised.
+    """
+    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver, once=once)
     coarse: dict[str, float] = {}
     Q = reduction.problem.Q

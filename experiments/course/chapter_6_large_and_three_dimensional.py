@@ -404,7 +404,7 @@ check("6.4", answer, lambda angle: abs(angle - 45) < 1)
 # - K. L. Johnson, *Contact Mechanics*, Cambridge University Press 1985,
 #   [doi:10.1017/CBO9781139171731](https://doi.org/10.1017/CBO9781139171731).
 #
-# This is the end of the course. The tutorials go on from here. Each of them has one subject.
+# Next: [duality](chapter_7_duality.py).
 
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

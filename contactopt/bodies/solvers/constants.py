@@ -23,6 +23,9 @@ COARSEST = 60  # nodes or aggregates that multigrid does not coarsen further
 NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggregated
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one
 
+# V-cycles for a decimal digit of a solve, as `python -m experiments.questions.ways` has them
+USUAL = 1.7
+
 # Limits, not fitted.
 # entries of a matrix from which threads share its products; a product takes about a millisecond
 # then

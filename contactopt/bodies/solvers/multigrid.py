@@ -27,11 +27,12 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from contactopt.bodies.motions import rigid_fields
-from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL
+from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL, USUAL
 from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
 from contactopt.bodies.solvers.system import Block, BodySolver, Iteration, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
+from contactopt.linear.budget import expect, spend
 from contactopt.linear.concurrency import Crew, give_back
 
 SINGLE = np.float32
@@ -67,7 +68,8 @@ class MultigridSolver(BodySolver):
         check_number("rtol", rtol, low=0.0, high=1.0)
         out = np.zeros(load.shape)
         for b, x in zip(load.reshape(self.n, -1).T, out.reshape(self.n, -1).T):
-            x[:] = conjugate_gradients(self.A, self.cycle, b, rtol).x
+            x[:], cycles = conjugate_gradients(self.A, self.cycle, b, rtol)
+            expect(slower=cycles / (USUAL * -np.log10(rtol)))
         return out
 
 
@@ -152,6 +154,7 @@ class VCycle:
         size = float(np.abs(r).max(initial=0.0))
         if size == 0.0:
             return np.zeros(len(r))
+        spend(len(r))
         full = np.zeros(self.size, dtype=SINGLE)
         full[self.place] = self.scale * r / size
         return self.scale * size * self._correct(full, 0)[self.place]
@@ -189,6 +192,7 @@ def conjugate_gradients(
 
     It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`; BackendError if it does
     not get there within MOST_ITERATIONS iterations, or if r' B r is negative or not a number.
+    TooDear instead, where a budget is open.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -199,6 +203,7 @@ def conjugate_gradients(
         if 0 <= size <= goal:
             return Answer(x, step)
         if not 0 < size < np.inf:
+            expect(slower=np.inf)
             raise BackendError(
                 "multigrid: the V-cycle is not positive definite here; take a solver with factors."
             )
@@ -207,6 +212,7 @@ def conjugate_gradients(
         alpha = size / _dot(p, Ap)
         x += alpha * p
         r -= alpha * Ap
+    expect(slower=np.inf)
     raise BackendError(
         f"multigrid: the error was not reduced by {rtol:g} within {MOST_ITERATIONS} iterations."
     )

@@ -25,6 +25,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from contactopt.linear.budget import expect, spent
 from contactopt.linear.concurrency import one_blas_thread
 from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
@@ -55,6 +56,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
 MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
+USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
 IDLE = 3  # steps without progress after which it begins anew
 
 
@@ -168,11 +170,14 @@ def coupled_steps(
         P = model_of(problem, preconditioner, deflate=several)
         equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
         coupled = Coupled(equations, form, P if several else fitted(P, form, problem.V))
+        before = spent()
         at = (
             _bonded(problem, coupled, COUPLED_FIRST)
             if start is None
             else State(in_equilibrium(form, start[0], GIVEN_BALANCE), *start)
         )
+        if start is None:
+            expect(slower=(spent() - before) / (USUAL * form.size))
     first, last, best, idle = COUPLED_FIRST, np.inf, np.inf, 0
     while at is not None:
         with one_blas_thread():
