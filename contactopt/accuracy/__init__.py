@@ -38,6 +38,7 @@ be larger by as much; these are refined too.
 The estimated error is also at least what the last refinement changed. What is not estimated: the
 linearisation of a J that is not linear, what recovery does not see where the solution is not
 smooth, and that straight edges are chords of a curved boundary. So the estimate is not a bound.
+A guaranteed bound is made at the end, where there is one (contactopt.accuracy.bound).
 
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for

@@ -9,13 +9,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
 from contactopt.accuracy.estimate import Estimate, Judged, Level
 from contactopt.accuracy.everywhere import Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.checks import check_number
+from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
+from contactopt.methods.driver import TOL
 from contactopt.readings.peaks import Peak, Reading
 from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.resolution import coarse
@@ -30,6 +33,7 @@ MOST_LEVELS = 60
 WATCHED = 1.5
 SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
+TENTH = 0.1  # of the accuracy may be the solver's (experiments.questions.bounds)
 ROUNDING = 1e-15  # least relative error: no reading is exact
 
 
@@ -81,13 +85,24 @@ def refine(
         raise InputError(
             f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
         )
-    options = options or Options()
+    options = _in_time(options or Options(), accuracy)
     search: Everywhere | Locally
     if adaptive or scene.given:
         search = Locally(tuple(states), asked, options, not adaptive)
     else:
         search = Everywhere(tuple(states), quantity, options)
     return _Loop(asked, accuracy, options, limits or Limits(), search).run()
+
+
+def _in_time(options: Options, accuracy: float) -> Options:
+    """Options with which solvers stop once their residual is a tenth of the accuracy, and small
+    enough for derivatives, unless another tolerance is asked for.
+
+    The residual is part of the estimated error of each mesh.
+    """
+    if options.tol != TOL:
+        return options
+    return replace(options, tol=max(TOL, min(CERTIFIED, TENTH * accuracy)))
 
 
 @dataclass(eq=False)
@@ -275,6 +290,7 @@ class _Loop:
             judged.grading / scale if signed else None,
             geometry / scale if np.isfinite(geometry) else 1.0,
             judged.order,
+            bounded(self.solved, self.quantity, value),
             reached,
             message,
             tuple(self.levels),

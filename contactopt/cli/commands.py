@@ -141,7 +141,7 @@ def _print_estimate(estimate: Any) -> None:
         f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for"
         f" {estimate.target:g}:"
     )
-    print(f"  {estimate.message}")
+    print(f"  {estimate.message}\n  {estimate.guarantee.sentence}")
     for level in estimate.levels:
         print(
             f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s"

@@ -1,0 +1,223 @@
+"""Guaranteed bounds hold, are close, and refuse what they do not know."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+
+from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support
+from contactopt.accuracy.bound import Bound, bounded
+from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.loop import refine
+from contactopt.meshes.mesh_refinement import split
+from contactopt.readings.quantities import find_quantity
+from contactopt.scenes import make_scene
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import BodyForce
+from contactopt.solving.solve_scene import Options, solve_scene
+
+MATERIAL = Material(1000.0, 0.3)
+
+
+def block(n, up=1.0, seed=0):
+    """A unit square above or below y = 0 of triangles whose inner vertices are moved at random."""
+    ticks = np.linspace(0, 1, n + 1)
+    mesh = skfem.MeshTri.init_tensor(ticks, up * ticks)
+    p = mesh.p.copy()
+    inner = np.all((np.abs(p) > 1e-9) & (np.abs(p) < 1 - 1e-9), axis=0)
+    p[:, inner] += 0.15 / n * np.random.default_rng(seed).uniform(-1, 1, p[:, inner].shape)
+    named = skfem.MeshTri(p, mesh.t).with_boundaries(
+        {
+            "contact": lambda x: np.abs(x[1]) < 1e-9,
+            "far": lambda x: np.abs(x[1] - up) < 1e-9,
+            "left": lambda x: np.abs(x[0]) < 1e-9,
+        }
+    )
+    return named
+
+
+def on_floor(degree=1, law="frictionless", mu=0.0, plate=True, scale=1.0, n=5):
+    """Pressed on a rounded rigid floor; lengths in units of `scale`."""
+    mesh = block(n)
+    mesh = replace(mesh, doflocs=scale * mesh.p)
+    held = {"x": 0.0, "y": -0.1 * scale}
+    supports = (Support("left", {"x": 0.0}), *(() if plate else (Support("far", held),)))
+    loads = (Plate("far", {"y": -100.0 * scale}),) if plate else ()
+    floor = Rigid("floor", normal=(0.0, 1.0), gap=lambda x: 0.1 * x[0] ** 2 / scale)
+    return Scene("s", Part("b", mesh, MATERIAL, supports, loads), floor, mu, law=law, degree=degree)
+
+
+def two_blocks(degree=1, law="coulomb", mu=0.3, n=5, below=5):
+    top = Part("upper", block(n, 1.0, 1), MATERIAL, (Support("far", {"x": 0.05, "y": -0.1}),))
+    low = Part("lower", block(below, -1.0, 2), Material(3000.0, 0.2), (Support("far"),))
+    return Scene("s", top, low, mu, law=law, degree=degree)
+
+
+def narrower():
+    """A punch on a wider block, whose edge lies within a facet."""
+    mesh = block(6, 1.0, 1)
+    mesh = replace(mesh, doflocs=mesh.p * [[0.63], [1.0]])
+    wall, pushed = Support("left", {"x": 0.0}), Support("far", {"y": -0.1})
+    top = Part("upper", mesh, MATERIAL, (wall, pushed))
+    low = Part("lower", block(5, -1.0, 2), Material(3000.0, 0.2), (wall, Support("far")))
+    contact = Contact("upper", "lower", 0.0, "frictionless", coupling="mortar", carrier="upper")
+    return Scene("s", bodies=(top, low), contacts=(contact,))
+
+
+def fine(scene, times=2):
+    for _ in range(times):
+        scene = scene.with_parts(
+            lambda part: replace(part, mesh=split(part.mesh, {})) if part.elastic else part
+        )
+    return solve_scene(replace(scene, degree=2))
+
+
+@pytest.mark.parametrize("mesh", [skfem.MeshTri().refined(2), skfem.MeshTet().refined(1)])
+def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
+    """With random facets, loads and a stress that balances them exactly, s* = s."""
+    d, random = len(mesh.p), np.random.default_rng(0)
+    p = mesh.p.copy()
+    inner = np.all((p > 1e-9) & (p < 1 - 1e-9), axis=0)
+    p[:, inner] += 0.05 * random.standard_normal(p[:, inner].shape)
+    cells = Simplices(type(mesh)(p, mesh.t))
+    slopes = random.standard_normal((d, d, d))
+    slopes += slopes.swapaxes(0, 1)
+    stress = np.einsum("ijk,kae->eaij", slopes, cells.mesh.p[:, cells.mesh.t])
+    held = np.zeros((mesh.facets.shape[1], d), dtype=bool)
+    held[cells.mesh.f2t[1] < 0] = True
+    load, none = -np.einsum("ijj->i", slopes), np.zeros((*held.shape, d))
+    made, unbalanced = cells.equilibrated(MATERIAL, stress, load, held, none)
+    assert np.allclose(made, cells.data_of(stress), atol=1e-12) and unbalanced < 1e-12
+    data = cells.data_of(stress)
+    E, nu = MATERIAL.E, MATERIAL.nu
+    trace = np.trace(stress, axis1=2, axis2=3)
+    factor = nu * (1 + nu) if d == 2 else nu
+    points = ((1 + nu) * np.sum(stress**2, axis=(2, 3)) - factor * trace**2) / E
+    mean, own = stress.mean(axis=1), np.trace(stress.mean(axis=1), axis1=1, axis2=2)
+    middle = ((1 + nu) * np.sum(mean**2, axis=(1, 2)) - factor * own**2) / E
+    exact = cells.volume * (points.sum(axis=1) + (d + 1) ** 2 * middle) / ((d + 1) * (d + 2))
+    assert np.allclose(cells.products(MATERIAL, data, data), exact)
+
+
+@pytest.mark.parametrize(
+    ("scene", "limit"),
+    [
+        (on_floor(1, plate=False), 0.0),
+        (on_floor(2, plate=False), 0.0),
+        (on_floor(1, "tresca", 8.0, plate=False), 8.0),
+        (two_blocks(1, "tresca", 8.0), 8.0),
+        (two_blocks(2, "tresca", 8.0), 8.0),
+        (two_blocks(1, "tresca", 8.0, below=7), 8.0),
+        (two_blocks(2, "frictionless", 0.0, below=4), 0.0),
+    ],
+    ids=[
+        "linear",
+        "quadratic",
+        "tresca",
+        "matching",
+        "quadratic matching",
+        "mortar",
+        "coarse below",
+    ],
+)
+def test_no_dual_energy_exceeds_a_primal_one(scene, limit):
+    """J of any admissible displacement is at least -J* of any admissible stress: that of each mesh
+    bounds those of the other one, and the gap between them is not much more than their distance.
+    """
+    coarse, best = Bound(solve_scene(scene)), Bound(fine(scene))
+    (low, high), (below, above) = (between(bound, limit) for bound in (coarse, best))
+    assert low <= above <= high and below <= high
+    assert high - low < 12 * (high - above) and above - below < 0.3 * (high - low)
+
+
+def between(bound, limit):
+    """-J* and J of a scene in which displacements are prescribed and nothing else is."""
+    work = sum(
+        limit * np.sum(pair.rule.weights * np.abs(pair.jump(bound.displacement, pair.rule)[1]))
+        for pair in bound.scene.pairs
+    )
+    primal = bound.size(bound.strained) ** 2 / 2 + work
+    gap = bound.mesh**2 + bound.contact**2 + bound.friction**2
+    return primal - gap / 2, primal
+
+
+def test_the_bound_is_the_error_where_the_stress_is_linear():
+    """A column under its own weight: the exact stress is one of those that s* may be."""
+    sides = (Support("left", {"x": 0.0}), Support("right", {"x": 0.0}))
+    mesh = block(6).with_boundaries({"right": lambda x: np.abs(x[0] - 1) < 1e-9})
+    part = Part("b", mesh, MATERIAL, sides, (BodyForce((0.0, -150.0)),))
+    scene = Scene("s", part, Rigid("floor"), 0.0, law="frictionless")
+    solved = solve_scene(scene)
+    bound, cells = Bound(solved), Simplices(mesh)
+    modulus, x = 1000.0 * 0.7 / (1.3 * 0.4), cells.quadratic(mesh.p)
+    exact = np.stack([0 * x[0], 150.0 / modulus * (x[1] ** 2 / 2 - x[1])])
+    found = bound.scene.nodal(solved.reduction.displaced(solved.solution))[0]
+    data = cells.data_of(cells.stress(MATERIAL, exact - found))
+    error = np.sqrt(cells.products(MATERIAL, data, data).sum())
+    assert error <= bound.error <= 1.03 * error
+
+
+@pytest.mark.parametrize(("plate", "name"), [(True, "approach"), (False, "normal_force")])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_interval_of_a_quantity_holds_the_fine_value(degree, plate, name):
+    scene = on_floor(degree, plate=plate)
+    solved, best = solve_scene(scene), fine(scene)
+    for quantity in (find_quantity(name, scene), find_quantity("energy", scene)):
+        middle, width = Bound(solved).of(quantity)
+        close, narrow = Bound(best).of(quantity)
+        value = quantity.read(best.reduction, best.solution).value
+        assert abs(middle - value) <= width and abs(close - value) <= narrow < width / 2
+        assert abs(middle - close) <= width + narrow
+
+
+def test_the_bound_is_the_same_in_other_units():
+    one, other = (Bound(solve_scene(on_floor(scale=scale))) for scale in (1.0, 1e3))
+    assert np.isclose(one.error / one.norm, other.error / other.norm, rtol=1e-6)
+
+
+def test_a_solver_that_stops_early_shows_in_the_bound():
+    """Forces that are wrong by some percent widen contact and solver terms, and stay a bound."""
+    solved = solve_scene(on_floor(plate=False))
+    r = solved.solution.reactions.copy()
+    r[r[:, 0] > 0, 0] *= 1 + 0.05 * np.cos(np.arange(np.sum(r[:, 0] > 0)))
+    worse = replace(solved, solution=replace(solved.solution, reactions=r))
+    good, bad = Bound(solved), Bound(worse)
+    assert bad.solver > 100 * good.solver and bad.error > good.error
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (make_scene("sphere"), "plane strain or space"),
+        (make_scene("punch-2d"), "triangles or tetrahedra"),
+        (replace(on_floor(), mu=0.2, law="associated"), "law 'associated'"),
+    ],
+)
+def test_what_has_no_bound_is_refused(scene, words):
+    with pytest.raises(InputError, match=words):
+        Bound(solve_scene(scene, 4))
+
+
+def test_a_quantity_without_a_bound_is_refused():
+    scene = on_floor(1, "coulomb", 0.3)
+    solved = solve_scene(scene)
+    assert "contactopt diagnose" in bounded(solved, find_quantity("approach", scene), 1.0).missing
+    found = bounded(solved, find_quantity("pressure", scene), 1.0)
+    assert found.bound is None and "no bound of the pressure" in found.missing
+    assert 0 < found.energy["mesh"] < found.energy["error"] < 1
+
+
+def test_a_search_says_bound_or_estimate():
+    scene = on_floor()
+    _, found = refine([scene], "approach", 0.02, adaptive=True)
+    assert found.guarantee.sentence.startswith("bound:") and found.guarantee.bound < 0.1
+    _, found = refine([make_scene("sphere")], "approach", 0.05)
+    assert found.guarantee.sentence.startswith("estimate, no bound: a bound needs plane strain")
+
+
+def test_a_search_stops_its_solvers_in_time_unless_a_tolerance_is_asked_for():
+    """The residual is a tenth of the accuracy at most, and small enough for derivatives."""
+    for tol, most in ((1e-8, 1e-5), (1e-12, 1e-12)):
+        solved, found = refine([on_floor()], "energy", 0.05, Options(tol=tol), adaptive=True)
+        assert found.reached and solved.solution.residual <= most
