@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 FORCES = {
     ("mm", "MPa"): "N",
+    ("mm", "GPa"): "kN",
     ("m", "Pa"): "N",
     ("m", "kPa"): "kN",
     ("m", "MPa"): "MN",

@@ -75,7 +75,10 @@ class RunOptions:
         int, "N", "for the accuracy: no mesh has more displacement unknowns"
     )
     time_limit: float | None = _option(
-        float, "S", "for the accuracy: the search ends after so many seconds"
+        float,
+        "S",
+        "the solution, or the search for the accuracy, ends after so many seconds; what was found"
+        " is written, and `resume` goes on",
     )
     max_memory: float | None = _option(
         float, "GB", "for the accuracy: the search takes no more memory (default: 2)"
@@ -86,6 +89,20 @@ class RunOptions:
         "first leave out all that makes no error, proved by a certificate of the whole;"
         " `contactopt simplify SCENE` says what this is",
         False,
+        in_file=False,
+    )
+    resume: bool = _option(
+        bool,
+        "",
+        "go on where a run into the same folder was stopped by time, memory or a person",
+        False,
+        in_file=False,
+    )
+    start: str | None = _option(
+        str,
+        "DIR",
+        "start from the forces in the folder of another run, of this scene or of one with other"
+        " numbers or meshes",
         in_file=False,
     )
     figures: tuple[str, ...] = _option(
@@ -115,9 +132,11 @@ class RunOptions:
             raise InputError(TOGETHER)
         if self.accuracy is None and self.adaptive:
             raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
-        if self.accuracy is None and self.bounds:
+        if self.resume and self.start is not None:
+            raise InputError("resume and start exclude each other: give one of them.")
+        if self.accuracy is None and set(self.bounds) - {"time_limit"}:
             raise InputError(
-                "bounds on unknowns, time and memory end the search for an accuracy: give an"
+                "bounds on unknowns and memory end the search for an accuracy: give an"
                 " accuracy and a quantity."
             )
 

@@ -10,6 +10,8 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import count
 from contactopt.checks import meant
@@ -20,6 +22,7 @@ from contactopt.figures.style import FORMATS
 from contactopt.files.writing import check_folder, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
+from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.quantities import approach
@@ -32,6 +35,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
 from contactopt.solving.limits import Limits
 from contactopt.solving.progress import resident_memory
+from contactopt.solving.restart import FILE, Restart, make_restart
 from contactopt.solving.solve_scene import Options, Solved
 
 if TYPE_CHECKING:
@@ -127,16 +131,16 @@ def run(
     InputError : with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    file = _scene_file(scene)
+    file = _scene_file(scene, changes)
     options, changes = choose(changes, {} if file is None else file.solve)
     _check_output(out, options)
     states = _states(scene, file, changes)
     name = options.method or default_method(options.settings)
     method = find_method(name, **options.settings)
     method.backends(states[-1].dim)  # refused before any work if one of them cannot be used
+    restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
     limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
-    form = options.Q if options.preconditioner is None else "implicit"
-    how = Options(form, options.solver, method, options.tol, note=note)
+    how = _how(options, method, start, restart, note)
     prepared = time.perf_counter() - start
     try:
         solved, estimate = None, None
@@ -148,9 +152,13 @@ def run(
             solved, estimate = _solved(states, options, limits, how)
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
-        return _written(result, out, options, start, note)
+        return _written(result, out, options, start, note, restart)
     except MemoryError as error:
+        restart.stopped(note)
         raise InputError(_too_large(states[-1], str(error))) from error
+    except KeyboardInterrupt:
+        restart.stopped(note)
+        raise
     except InputError as error:
         raise error if file is None else file.located(error) from error
 
@@ -159,16 +167,27 @@ def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
     """The scene that a name or a scene file stands for, with changes as for run(); of a load path
     its last state.
     """
-    return _states(scene, _scene_file(scene), changes)[-1]
+    return states_of(scene, **changes)[0][-1]
 
 
-def _scene_file(scene: Any) -> SceneFile | None:
-    """The scene file that the name of a scene stands for; None for all other scenes."""
+def states_of(
+    scene: str | Path | Scene, **changes: Any
+) -> tuple[tuple[Scene, ...], dict[str, Any]]:
+    """As scene_of(), all states of a load path, and the options of a run that the file gives."""
+    file = _scene_file(scene, changes)
+    return _states(scene, file, changes), {} if file is None else file.solve
+
+
+def _scene_file(scene: Any, changes: dict[str, Any]) -> SceneFile | None:
+    """The scene file that the name of a scene stands for, with changes of its entries; None for all
+    other scenes.
+    """
     if isinstance(scene, Scene) or not str(scene).endswith(".toml"):
         return None
     from contactopt.scenes.scene_files import read_scene_file
 
-    return read_scene_file(scene)
+    own = {name: value for name, value in changes.items() if name not in OPTIONS}
+    return read_scene_file(scene, {key: value for key, value in own.items() if value is not None})
 
 
 def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tuple[Scene, ...]:
@@ -176,7 +195,7 @@ def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tupl
     if changes.get("elements", 0) is None:
         changes = {name: value for name, value in changes.items() if name != "elements"}
     if file is not None:
-        return file.changed(changes)
+        return file.states
     if isinstance(scene, str):
         return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)
     known = [field.name for field in fields(scene)]
@@ -187,6 +206,16 @@ def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tupl
                 f" {', '.join(known)}{meant(name, [*known, *OPTIONS])}"
             )
     return (replace(scene, **changes),)
+
+
+def _how(
+    options: RunOptions, method: Method, begin: float, restart: Restart, note: Note
+) -> Options:
+    """How each state is solved, of a run that began at a time [s]."""
+    form = options.Q if options.preconditioner is None else "implicit"
+    limit = options.time_limit if options.accuracy is None else None
+    until = np.inf if limit is None else begin + limit
+    return Options(form, options.solver, method, options.tol, {}, note, restart, until)
 
 
 def _check_output(out: str | Path | None, options: RunOptions) -> None:
@@ -315,7 +344,12 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
 
 
 def _written(
-    result: Result, out: str | Path | None, options: RunOptions, start: float, note: Note
+    result: Result,
+    out: str | Path | None,
+    options: RunOptions,
+    start: float,
+    note: Note,
+    restart: Restart,
 ) -> Result:
     """The result with its figures and files in a folder, if any, and the total of seconds."""
     seconds = result.summary["seconds"]
@@ -329,6 +363,9 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder, states=options.html)
+            if result.path is None:
+                restart.finished(result.solution)
+            restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
         if options.html:

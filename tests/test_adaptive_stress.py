@@ -221,7 +221,7 @@ def test_limits_and_history_from_the_command_line_and_scene_files(tmp_path, caps
     result = run(file, figures=())
     assert "time limit of 1e-06 s" in result.estimate.message and "Estimate(energy" in repr(result)
     assert "meshes" in result._repr_html_()
-    with pytest.raises(InputError, match="bounds on unknowns, time and memory"):
+    with pytest.raises(InputError, match="bounds on unknowns and memory"):
         run("press-fit", max_unknowns=100)
 
 

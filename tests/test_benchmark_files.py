@@ -130,7 +130,8 @@ def test_the_end_of_memory_in_a_run_is_one_sentence_with_a_size(
     monkeypatch.setattr(f"contactopt.runner.{place}", full)
     assert main(["run", "punch-2d", "--elements", "4", "-q", "--out", str(tmp_path / "out")]) == 2
     one_line(capsys.readouterr().err, "GB were taken when more was asked for")
-    assert not (tmp_path / "out").exists()
+    left = {"restart.npz"} if place == "recover" else set()  # the solution, to go on with
+    assert {file.name for file in tmp_path.glob("out/*")} == left
 
 
 def test_a_force_beyond_all_numbers_is_one_sentence(tmp_path, capsys):

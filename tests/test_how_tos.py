@@ -18,6 +18,9 @@ from contactopt.cli import main
 
 SITE = Path(__file__).parents[1] / "experiments" / "site"
 PAGES = (
+    "scene_files",
+    "check_before_solving",
+    "stop_and_go_on",
     "explore",
     "certificate",
     "which_method",

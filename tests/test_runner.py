@@ -75,6 +75,7 @@ def test_run_writes_everything(name, tmp_path):
         "deformed.png",
         "pressure.png",
         "interface.npz",
+        "restart.npz",
         "history.csv",
         *(f"{n}.vtu" for n in names),
         *(f"contact-{pair.name}.{e}" for pair in result.problem.pairs for e in ("vtu", "csv")),

@@ -79,15 +79,8 @@ def free_motions(
     """The rigid motions of a body that leave all held unknowns (n,) at rest, with inertia by the
     measure `weight`; where axisymmetric, the one along the axis.
     """
-    unknowns = node_unknowns(basis)
-    x = basis.doflocs[:, unknowns[0]]
-    labels = [f"translation along {component}" for component in components]
-    labels += [f"rotation in the {components[j]}-{components[i]} plane" for i, j in _planes(len(x))]
-    R = np.zeros((basis.N, len(labels)))
-    R[unknowns] = rigid_fields(x)
-    if kind == "axisymmetric":
-        R, labels = R[:, 1:2], labels[1:2]
-    combined, names = _kernel(R[held], tuple(labels))
+    R, labels = whole_motions(kind, components, basis)
+    combined, names = kernel(R[held], labels)
     Z = R @ combined
     Z[held] = 0.0
     if not len(names):
@@ -99,7 +92,21 @@ def free_motions(
     return Motions(Z, names, np.sort(fixing), inertia @ np.linalg.inv(Z.T @ inertia))
 
 
-def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
+def whole_motions(
+    kind: str, components: tuple[str, ...], basis: skfem.CellBasis
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """All rigid motions of a body (n, m) as if nothing held it, and what each of them is."""
+    unknowns = node_unknowns(basis)
+    x = basis.doflocs[:, unknowns[0]]
+    labels = [f"translation along {component}" for component in components]
+    labels += [f"rotation in the {components[j]}-{components[i]} plane" for i, j in _planes(len(x))]
+    R = np.zeros((basis.N, len(labels)))
+    R[unknowns] = rigid_fields(x)
+    one = slice(1, 2) if kind == "axisymmetric" else slice(None)
+    return R[:, one], tuple(labels[one])
+
+
+def kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
     """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, with their
     names; translations and rotations that are free by themselves are columns of their own.
     """

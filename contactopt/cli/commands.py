@@ -24,8 +24,9 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for text in texts:
         name, sign, value = text.partition("=")
-        name = name.strip().replace("-", "_")
-        if not sign or not name.isidentifier():
+        name = name.strip()
+        name = name if "." in name else name.replace("-", "_")
+        if not sign or not name:
             raise InputError(f"--set needs NAME=VALUE, as in --set width=30; got {text!r}.")
         try:
             found[name] = tomllib.loads(f"value = {value}")["value"]
@@ -177,6 +178,26 @@ def simplify(options: argparse.Namespace) -> int:
     return 0
 
 
+def check(options: argparse.Namespace) -> int:
+    """Say what is known of a scene before it is solved, and write it as a page."""
+    import webbrowser
+
+    from contactopt.figures.check_page import write_check_page
+    from contactopt.figures.scene_check import check_scene
+    from contactopt.runner import states_of
+
+    states, solve = states_of(options.scene, **_arguments_of(options.set))
+    found = check_scene(states, solve)
+    print(found.text)
+    if options.no_page:
+        return 0
+    page = write_check_page(found, options.out or f"out/{Path(options.scene).stem}-check.html")
+    if not options.no_open:
+        webbrowser.open(page.resolve().as_uri())
+    print(f"{page} shows bodies, boundaries, loads and pairs; open it in a browser")
+    return 0
+
+
 def export(options: argparse.Namespace) -> int:
     """Write a scene for another code: a deck of CalculiX, or its interface problem for FCLib."""
     from contactopt.files.writing import whole_file
@@ -209,6 +230,14 @@ def new(options: argparse.Namespace) -> int:
 
     write_example(Path(options.file))
     print(f"{options.file} is an example that runs: contactopt run {options.file}")
+    return 0
+
+
+def schema(options: argparse.Namespace) -> int:
+    """Print the JSON schema of scene files."""
+    from contactopt.cli.scene_schema import schema
+
+    print(json.dumps(schema(), indent=1))
     return 0
 
 
@@ -272,10 +301,14 @@ def listing(options: argparse.Namespace) -> int:
     from contactopt.methods.preconditioners import PRECONDITIONERS
     from contactopt.problem.laws import LAWS
     from contactopt.scenes import PATHS, SCENES
+    from contactopt.scenes.material_library import library
 
     print("scenes")
     for name, (_, _, what, *_) in SCENES.items():
         print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
+    print("materials of scene files")
+    for name, made in library().items():
+        print(f"  {name:20} E = {made.E:g} {made.stress}, nu = {made.nu:g}: {made.source}")
     _print_table("laws of contact", LAWS)
     _print_table("methods", METHODS)
     print("forms of the interface operator Q: " + ", ".join(FORMS))
@@ -310,9 +343,11 @@ COMMANDS: dict[str, Command] = {
     "run": run,
     "view": view,
     "show": show,
+    "check": check,
     "simplify": simplify,
     "export": export,
     "new": new,
+    "schema": schema,
     "bench": bench,
     "report": report,
     "problems": problems,

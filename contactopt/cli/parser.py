@@ -32,11 +32,14 @@ COMMANDS = {
     "view": "turn the folder of a run into a page to explore, and open it",
     "show": "describe a scene: a sketch, its sizes, its"
     " arguments, its source, and what is known exactly",
+    "check": "say and draw what a scene is before it is solved: what holds and loads its bodies,"
+    " gaps and normals of its surfaces, and what the run will cost",
     "simplify": "say what may be left out of a scene, why it"
     " may be left out, and which error that makes",
     "export": "write a scene for another code: a deck of CalculiX with its contacts, or its"
     " interface problem for FCLib",
     "new": "write an example of a scene file, to start from",
+    "schema": "print the JSON schema of scene files, with which editors complete and check them",
     "bench": "compare methods: make all runs that an experiment"
     " file describes, and a report about them",
     "report": "make the reports of comparisons again from their tables, without solving anything",
@@ -79,7 +82,7 @@ def make_parser() -> argparse.ArgumentParser:
         description = f"{what[0].upper()}{what[1:]}."
         made[name] = found.add_parser(name, help=what, description=description, parents=[common])
         made[name].set_defaults(command=commands.COMMANDS[name])
-    for name in ("run", "show", "simplify", "export"):
+    for name in ("run", "show", "check", "simplify", "export"):
         _scene(made[name])
     _run(made["run"])
     _bench(made["bench"])
@@ -89,6 +92,12 @@ def make_parser() -> argparse.ArgumentParser:
     view.add_argument("folder", metavar="DIR", help="a folder that `contactopt run` wrote")
     view.add_argument("--out", metavar="FILE", help="name of the page (default: DIR/view.html)")
     _flag(view, "--no-open", help="make the page, but do not open it in the browser")
+    page = made["check"].add_mutually_exclusive_group()
+    page.add_argument(
+        "--out", metavar="FILE", help="name of the page (default: out/SCENE-check.html)"
+    )
+    _flag(page, "--no-page", help="print the words alone")
+    _flag(made["check"], "--no-open", help="make the page, but do not open it in the browser")
     without = "look only for symmetries, without the proof that takes a solution"
     _flag(made["simplify"], "--no-solve", help=without)
     _export(made["export"])

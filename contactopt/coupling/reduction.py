@@ -28,23 +28,21 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import card, count, line
-from contactopt.checks import check_count, check_number
 from contactopt.coupling.compliance import compliance, filling, operator
 from contactopt.coupling.costs import CYCLES, FORM_OF, estimates, next_best
-from contactopt.coupling.coupling import Coupling, couple
-from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
-from contactopt.coupling.problem_of_bodies import problem_of, signed_map
+from contactopt.coupling.coupling import Coupling
+from contactopt.coupling.planes_of_symmetry import SymmetryPlane
+from contactopt.coupling.posed import posed
+from contactopt.coupling.problem_of_bodies import problem_of
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
 from contactopt.linear.budget import fill
 from contactopt.linear.concurrency import each, give_back, one_blas_thread
 from contactopt.linear.operators import (
-    FORMS,
     NOISE,
     Interface,
     InterfaceOperator,
@@ -52,7 +50,7 @@ from contactopt.linear.operators import (
     diagonal,
 )
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.scenes.scene import MOST_ACROSS, Scene
+from contactopt.scenes.scene import Scene
 
 log = logging.getLogger(__name__)
 
@@ -266,19 +264,9 @@ def reduce_bodies(
     ------
     TooDear : Where a budget of V-cycles is open (contactopt.linear.budget) and too low.
     """
-    elements, zone = _checked(scene, elements, zone, Q)
-    times = [time.perf_counter()]
-    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts)
-    named = {body.name: body for body in assembled}
-    sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
-    pairs = zip(scene.pairs, sides)
-    couplings = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in pairs)
-    maps = tuple(signed_map(body, sides, couplings) for body in assembled)
-    planes: tuple[SymmetryPlane, ...] = ()
-    if scene.copies > 1:
-        cutting = [plane for made in couplings for plane in made.planes]
-        planes = mirror_planes(scene, [body.guides() for body in assembled], cutting)
-    times.append(time.perf_counter())
+    start = time.perf_counter()
+    assembled, couplings, maps, planes = posed(scene, elements, zone, Q, coupling)
+    times = [start, time.perf_counter()]
 
     Q, solver = _way(scene, assembled, maps, (Q, solver), once)
     iterate = any(body.iterates(solver) for body in assembled)
@@ -301,24 +289,6 @@ def reduce_bodies(
     times.append(time.perf_counter())
     seconds = dict(zip(("assemble", "factorise", "compliance"), np.diff(times).tolist()))
     return Reduction(scene, problem, bodies, maps, couplings, seconds, planes, on_ground)
-
-
-def _checked(
-    scene: Scene, elements: int | None, zone: float | None, Q: str
-) -> tuple[int, float | None]:
-    """The number of elements and the half-width of the zone, by default those of the scene."""
-    if not isinstance(scene, Scene):
-        raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
-    if not isinstance(Q, str) or Q not in FORMS:
-        raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
-    elements = scene.elements if elements is None else elements
-    zone = scene.zone if zone is None else zone
-    check_count("elements", elements)
-    if elements > MOST_ACROSS:
-        raise InputError(f"elements must be at most {MOST_ACROSS}; got {elements}.")
-    if zone is not None:
-        check_number("the contact zone's half-width", zone, low=0.0)
-    return elements, zone
 
 
 def _way(

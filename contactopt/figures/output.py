@@ -22,6 +22,7 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.contact_fields import ContactFields, contact_fields, on_nodes
 from contactopt.solving.follow import state_of
 from contactopt.solving.paths import PathResult
+from contactopt.solving.restart import FILE
 from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ MOST_NUMBERS = 3_000_000
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz", STATES, SERIES,
+    PAGE, "interface.npz", "history.csv", "path.npz", STATES, SERIES, FILE,
 )  # fmt: skip
 
 

@@ -52,8 +52,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     )
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
     fields = {name: _body_values(name, mesh, len(axes), moving) for name, mesh in bodies.items()}
-    box = _whole(_box([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
-    near = _near_contact(_whole(_box([mesh.points for mesh in pairs.values()]), mirrors), box)
+    box = whole_box(box_of([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
+    near = _near_contact(whole_box(box_of([mesh.points for mesh in pairs.values()]), mirrors), box)
     largest = max((float(np.abs(values["move"]).max()) for values in fields.values()), default=0.0)
     gap = max(float(mesh.point_data["contact_gap"].max()) for mesh in pairs.values())
     reach = float(np.ptp(near, axis=0).max())
@@ -78,7 +78,7 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "most_scale": 2.0 * magnification(reach, largest, 0.0),
         "top": highest_colour(stresses) if stresses else 1.0,
         "bodies": [
-            {"name": name} | _body_arrays(mesh, fields[name], mirrors, inside)
+            {"name": name} | body_arrays(mesh, fields[name], mirrors, inside)
             for name, mesh in bodies.items()
         ],
         "contacts": contacts,
@@ -94,13 +94,13 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
         return dict(np.load(file))
 
 
-def _box(places: list[np.ndarray]) -> np.ndarray:
+def box_of(places: list[np.ndarray]) -> np.ndarray:
     """Least and largest coordinates (2, 3) of points (n, 3)."""
     points = np.concatenate(places)
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def _whole(box: np.ndarray, mirrors: list[list[Any]]) -> np.ndarray:
+def whole_box(box: np.ndarray, mirrors: list[list[Any]]) -> np.ndarray:
     """The box (2, 3) with its mirror images."""
     for axis, place in mirrors:
         image = box.copy()
@@ -146,7 +146,7 @@ def _body_values(
     return values | {key: moving[f"{file}/{name}"] for key, file in MOVING.items()}
 
 
-def _body_arrays(
+def body_arrays(
     mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool
 ) -> dict[str, Any]:
     """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values

@@ -31,7 +31,7 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file
 
-        states = read_scene_file(name).states
+        states = read_scene_file(name, changes).states
         head, arguments = [name], []
     else:
         states = make_path(name, **changes) if name in PATHS else (make_scene(name, **changes),)
@@ -48,7 +48,7 @@ def describe(name: str, changes: dict[str, Any]) -> str:
         legend = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes))
         lines += [*sketch(list(meshes.values())), "", legend + _section(scene), ""]
     for part in scene.parts:
-        lines += _part_lines(scene, part, meshes.get(part.name))
+        lines += part_lines(scene, part, meshes.get(part.name))
     images = f"; {scene.copies} mirror images make the whole" if scene.copies > 1 else ""
     names = ", ".join(pair.name for pair in scene.pairs)
     lines.append(f"{count(len(scene.pairs), 'pair')} of surfaces: {names}{images}")
@@ -95,7 +95,7 @@ def _section(scene: Scene) -> str:
     return "" if scene.copies == 1 else "  (the part that is modelled)"
 
 
-def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
+def part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
     length, stress = scene.units
     lines = [f"body '{part.name}'"]
     material = getattr(part, "material", None)

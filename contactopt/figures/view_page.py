@@ -109,6 +109,9 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         remarks="".join(f"<p><strong>{text}</strong></p>" for text in remarks),
         move="move" if data["dim"] == 2 else "turn",
         followers=followers,
+        arrows="forces on the upper body",
+        convention="Sign convention: the pressure is positive in compression; tractions are those"
+        " on the upper body.",
         cells="".join(
             f'<tr><th scope="row">{name}</th><td>{value}</td></tr>' for name, value in rows.items()
         ),

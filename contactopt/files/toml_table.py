@@ -4,13 +4,14 @@ line.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from contactopt.checks import check_number, meant, short
 from contactopt.errors import InputError
@@ -36,15 +37,35 @@ KINDS: dict[type, tuple[tuple[type, ...], str]] = {
 Place = tuple[str | int, ...]
 
 
+class Asked(NamedTuple):
+    """What a reader asked a table for: an entry of a type of KINDS, or of any of several."""
+
+    key: str
+    kind: type
+    needed: bool
+    default: Any
+    what: str
+    among: tuple[str, ...]
+    low: float
+
+
 class Table:
     """A table of the file, whose entries are taken by name and type; close() refuses the others.
 
     file   name of the file, for messages
-    lines  place of every entry -> line
+    lines  place of every entry -> line, or the change that was made there
+    asked  place of every table -> what was asked of it; None: nobody notes it
     """
 
-    def __init__(self, file: str, lines: dict[Place, int], data: dict[str, Any], place: Place = ()):
-        self.file, self.lines, self.data, self.place = file, lines, data, place
+    def __init__(
+        self,
+        file: str,
+        lines: Mapping[Place, int | str],
+        data: dict[str, Any],
+        place: Place = (),
+        asked: dict[Place, list[Asked]] | None = None,
+    ):
+        self.file, self.lines, self.data, self.place, self.asked = file, lines, data, place, asked
         self.known: list[str] = []
 
     def fail(self, message: str, *below: str | int) -> InputError:
@@ -54,8 +75,11 @@ class Table:
         place: Place = (*self.place, *below)
         while place and place not in self.lines:
             place = place[:-1]
-        line = f", line {self.lines[place]}" if place else ""
-        return InputError(f"{self.file}{line}: {message}")
+        where = self.lines[place] if place else ""
+        return InputError(f"{self.file}{self._at(where)}: {message}")
+
+    def _at(self, where: int | str) -> str:
+        return f", line {where}" if isinstance(where, int) else f", {where}" if where else ""
 
     @contextmanager
     def about(self, *below: str | int) -> Iterator[None]:
@@ -63,14 +87,22 @@ class Table:
         try:
             yield
         except InputError as error:
-            if str(error).startswith(f"{self.file}, line"):
+            if str(error).startswith((f"{self.file}, line", f"{self.file}, --set")):
                 raise
             raise self.fail(str(error), *below) from error
 
-    def has(self, key: str) -> bool:
-        """Say whether an entry is there, which close() takes as known from now on."""
+    def has(self, key: str, *kinds: type) -> bool:
+        """Say whether an entry is there, which close() takes as known from now on; it may be of any
+        of these types of KINDS.
+        """
         self.known.append(key)
+        for kind in kinds:
+            self._note(key, kind, False, None, "", (), -math.inf)
         return key in self.data
+
+    def _note(self, key: str, *more: Any) -> None:
+        if self.asked is not None:
+            self.asked.setdefault(self.place, []).append(Asked(key, *more))
 
     def take(
         self,
@@ -79,16 +111,20 @@ class Table:
         default: Any = None,
         needed: bool = False,
         what: str = "",
+        among: Collection[str] = (),
         **limits: Any,
     ) -> Any:
-        """Take an entry, which must be of a type of KINDS.
+        """Take an entry, which must be of a type of KINDS, and, if they are given, one of the names
+        `among` which it is chosen.
 
         Where there is none, `default` is returned, or that is an error if it is `needed`. A message
         calls the type `what`. The limits of a number are those of contactopt.checks.check_number.
         """
         types, usual = KINDS[kind]
+        self._note(key, kind, needed, default, what, tuple(among), limits.get("low", -math.inf))
         what = what or usual
-        if not self.has(key):
+        self.known.append(key)
+        if key not in self.data:
             if needed:
                 raise self.fail(f"{key!r} is missing{self._here()}; it is {what}.")
             return default
@@ -98,6 +134,9 @@ class Table:
         if kind is float:
             with self.about(key):
                 check_number(key, self.data[key], **limits)
+        if among and value not in among:
+            known = f"there is no {key} {short(value)}; choose from {', '.join(among)}"
+            raise self.fail(known + meant(str(value), among), key)
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:
@@ -115,7 +154,10 @@ class Table:
     def table(self, key: str) -> Any:
         """Take the table below an entry; None if there is no such entry."""
         data = self.take(key, dict)
-        return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
+        return None if data is None else self._below(data, key)
+
+    def _below(self, data: dict[str, Any], *place: str | int) -> Table:
+        return Table(self.file, self.lines, data, (*self.place, *place), self.asked)
 
     def tables(self, key: str) -> list[Table]:
         """Take an array of tables, none if it is not there."""
@@ -124,14 +166,13 @@ class Table:
             if not isinstance(data, dict):
                 must = f"every entry of {key!r} must be {KINDS[dict][1]}"
                 raise self.fail(f"{must}; got {short(data)}.", key, i)
-        place = (*self.place, key)
-        return [Table(self.file, self.lines, data, (*place, i)) for i, data in enumerate(found)]
+        return [self._below(data, key, i) for i, data in enumerate(found)]
 
-    def close(self) -> None:
-        """Refuse entries that nothing has asked for."""
+    def close(self, others: Collection[str] = ()) -> None:
+        """Refuse entries that nothing has asked for; one of `others` may be meant by them, too."""
         for key in self.data:
             if key not in self.known:
-                valid = ", ".join(dict.fromkeys(self.known)) + meant(key, self.known)
+                valid = ", ".join(dict.fromkeys(self.known)) + meant(key, [*self.known, *others])
                 raise self.fail(f"there is no {key!r}{self._here()}; valid names are {valid}", key)
 
     def _here(self) -> str:
@@ -166,6 +207,65 @@ def read_table(path: Path, what: str = "scene file") -> Table:
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
         raise InputError(f"{what} '{path}' cannot be read: {type(error).__name__}.") from error
+
+
+def change(table: Table, changes: Mapping[str, Any]) -> Table:
+    """The whole table of a file with other values of entries, by names such as
+    'bodies.block.plates.1.force.y': the names of tables with dots between them, and the numbers of
+    entries of arrays, from 1 on. InputError for a name that leads nowhere.
+    """
+    lines: dict[Place, int | str] = dict(table.lines)
+    for name, value in changes.items():
+        told = f"--set {name}={value}"
+        at: Any = table.data
+        *parents, last = place = _path(table, name)
+        for depth, key in enumerate(parents):
+            if key not in (range(len(at)) if isinstance(at, list) else at):
+                raise _lost(table, told, parents[:depth], key, at)
+            at = at[key]
+            if not isinstance(at, (dict, list)):
+                raise table.fail(f"{told}: {key!r} holds {short(at)}, and nothing in it.")
+        if isinstance(at, list) and last not in range(len(at)):
+            raise _lost(table, told, parents, last, at)
+        at[last] = value
+        lines[tuple(place)] = told
+    return Table(table.file, lines, table.data, table.place, table.asked)
+
+
+def _path(table: Table, name: str) -> list[str | int]:
+    """The keys of a dotted name, written as in TOML, those of arrays as numbers from 0 on."""
+    try:
+        data, keys = tomllib.loads(f"{name} = 0"), []
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            f"{name!r} is no name of an entry; quote keys with other signs."
+        ) from error
+    while isinstance(data, dict):
+        ((key, data),) = data.items()
+        keys.append(key)
+    found: list[str | int] = []
+    at: Any = table.data
+    for key in keys:
+        number = isinstance(at, list) and key.isdigit() and int(key) > 0
+        found.append(int(key) - 1 if number else key)
+        at = (
+            at.get(key)
+            if isinstance(at, dict)
+            else at[found[-1]]
+            if number and int(key) <= len(at)
+            else None
+        )
+    return found
+
+
+def _lost(table: Table, told: str, parents: Any, key: str | int, at: Any) -> InputError:
+    """What to raise where a key leads nowhere."""
+    where = ".".join(str(part + 1) if isinstance(part, int) else part for part in parents)
+    if isinstance(at, list):
+        shown = key + 1 if isinstance(key, int) else key
+        return table.fail(f"{told}: {where} has the entries 1 to {len(at)}; got {shown}.")
+    holds = f"it holds {', '.join(at)}{meant(str(key), at)}"
+    return table.fail(f"{told}: there is no {key!r}{where and f' in {where}'}; {holds}")
 
 
 def lines_of(text: str) -> dict[Place, int]:

@@ -75,7 +75,8 @@ def solve(
         used. If it is met first, the iteration ends with status `settled` unless the certificate
         agrees
     start : a solution of a problem of the same size, to start from instead of cold
-    progress : called with (iteration, residual) after each outer iteration
+    progress : called with (iteration, residual) after each outer iteration; its attribute `watch`,
+        if it has one, with the reactions and multipliers
     settings : of a method that is given by its name
 
     Returns
@@ -327,6 +328,8 @@ class _Recorder:
         self.history.append(row | counts)
         if limits.progress is not None:
             limits.progress(len(self.history), self.residual)
+            if watch := getattr(limits.progress, "watch", None):
+                watch(self.reactions, self.multipliers)
         if self.residual <= limits.tol:
             return Status.SOLVED
         if limits.change_tol is not None and len(self.history) > 1 and change <= limits.change_tol:

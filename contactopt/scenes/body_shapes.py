@@ -34,11 +34,12 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         return None
     if len(shapes) != 1:
         raise body.fail(
-            "a body needs exactly one of mesh, block, ring, disc and rigid; this one has"
+            "a body needs exactly one of mesh, block, ring, disc, half_space and rigid; this one"
+            " has"
             f" {' and '.join(shapes) or 'none'}."
         )
     if shapes[0] == "mesh":
-        mesh = _from_file(body, folder, group, _scale(body, unit, length))
+        mesh = _from_file(body, folder, group, scale_of(body, unit, length))
     elif group or unit:
         raise body.fail("'group' and 'unit' belong to a mesh file.", "group" if group else "unit")
     else:
@@ -59,7 +60,7 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
     return mesh if places is None else _named(mesh, places, components)
 
 
-def _scale(body: Table, unit: str | None, length: str) -> float:
+def scale_of(body: Table, unit: str | None, length: str) -> float:
     """The unit of the file in that of the scene."""
     if unit is None:
         return 1.0
@@ -84,7 +85,8 @@ def _from_file(body: Table, folder: Path, group: str | None, scale: float) -> An
         return load_mesh(folder / name, group, scale)
 
 
-def _grid(table: Table, key: str, what: str) -> tuple[float, float]:
+def grid_of(table: Table, key: str, what: str) -> tuple[float, float]:
+    """Two ascending numbers, which must be there; a message calls them `what`."""
     low, high = table.numbers(key, 2, what)
     if low >= high:
         raise table.fail(f"{key!r} must ascend; got {low:g} to {high:g}.", key)
@@ -108,7 +110,7 @@ def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
 def _block(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.meshes.structured import tensor_mesh
 
-    sides = [_grid(table, c, f"two coordinates, [least {c}, largest {c}]") for c in components]
+    sides = [grid_of(table, c, f"two coordinates, [least {c}, largest {c}]") for c in components]
     counts = _counts(table, tuple(f"along {c}" for c in components))
     mesh = tensor_mesh(*(np.linspace(*side, count + 1) for side, count in zip(sides, counts)))
     own = {f"{new}{sign}": f"{old}{sign}" for new, old in zip(components, "xyz") for sign in "-+"}
@@ -119,10 +121,10 @@ def _block(table: Table, components: tuple[str, ...]) -> Any:
 def _ring(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.meshes.polar import ring
 
-    radii = _grid(table, "radii", "two radii, [inner, outer]")
+    radii = grid_of(table, "radii", "two radii, [inner, outer]")
     first, last = 0.0, 360.0
-    if table.has("angles"):
-        first, last = _grid(table, "angles", "two angles in degrees, [first, last]")
+    if table.has("angles", list):
+        first, last = grid_of(table, "angles", "two angles in degrees, [first, last]")
     if radii[0] <= 0 or last - first > 360:
         raise table.fail(
             "the inner radius must be positive, and the angles at most 360 degrees apart."
@@ -156,9 +158,10 @@ def _named(mesh: Any, places: Table, components: tuple[str, ...]) -> Any:
         place = places.table(name)
         limits = {}
         for axis, c in enumerate(components):
+            there = place.has(c, float, list)
             if isinstance(place.data.get(c), list):
-                limits[axis] = _grid(place, c, f"one {c}, or two, [least, largest]")
-            elif place.has(c):
+                limits[axis] = grid_of(place, c, f"one {c}, or two, [least, largest]")
+            elif there:
                 value = place.take(c, float)
                 limits[axis] = (value, value)
         place.close()

@@ -61,6 +61,7 @@ class Scene:
     mirror     axes across whose planes of symmetry the bodies are halved, as in "x" or "xy";
                `copies` is then 2 for each unless it is given. None: where copies > 1, the planes
                are those on which supports hold the normal alone
+    state      name of the step of a load path to which this state belongs
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly
                incompressible bodies, where linear elements lock.
     elements   default number of elements across the contact half-width, for parts whose mesh is a
@@ -87,6 +88,7 @@ class Scene:
     bodies: tuple[Body, ...] = ()
     contacts: tuple[Contact, ...] = ()
     mirror: str | None = None
+    state: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):

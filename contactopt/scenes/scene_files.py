@@ -7,31 +7,21 @@ path, one after the other. Every mistake is named with its line.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from contactopt.checks import meant
 from contactopt.errors import InputError
-from contactopt.files.toml_table import Table, read_table
-from contactopt.material import Material
+from contactopt.files.toml_table import Table, change, read_table
+from contactopt.problem.laws import LAWS
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
-from contactopt.scenes.body_shapes import make_mesh
-from contactopt.scenes.contact import Contact
-from contactopt.scenes.expressions import Expression
-from contactopt.scenes.scene import (
-    COMPONENTS,
-    BodyForce,
-    Part,
-    Plate,
-    Rigid,
-    Scene,
-    Support,
-    Traction,
-)
+from contactopt.scenes.contact import SIDES, Contact
+from contactopt.scenes.file_bodies import Reading, components_of, function_of, read_body
+from contactopt.scenes.material_library import Named, library, read_materials
+from contactopt.scenes.scene import COMPONENTS, Scene
+
+MOST_STATES = 10_000  # of a step of a load path
 
 
 @dataclass(frozen=True)
@@ -56,98 +46,86 @@ class SceneFile:
                 return InputError(f"{self.name}, line {line}: {error}")
         return InputError(f"{self.name}: {error}")
 
-    def changed(self, changes: dict[str, Any]) -> tuple[Scene, ...]:
-        """Give the states another degree of the displacement, {'degree': 1 or 2}. InputError for
-        any other change: a scene file says everything itself.
-        """
-        for key in changes:
-            if key != "degree":
-                raise InputError(
-                    f"a scene file says everything itself; change {key!r} there, or give the"
-                    f" degree alone{meant(key, OPTIONS)}"
-                )
-        return tuple(replace(state, **changes) for state in self.states)
 
-
-@dataclass
-class _Reading:
-    """What readers of the parts of a file share.
-
-    state    of the load path whose numbers are taken
-    lengths  of the arrays of such numbers that were found, with the place of each
-    meshes   by the name of the body: read once for all states
-    """
-
-    folder: Path
-    kind: str
-    length: str
-    state: int = 0
-    lengths: list[tuple[int, Table, str]] = field(default_factory=list)
-    meshes: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        return COMPONENTS[self.kind]
-
-
-def read_scene_file(path: str | Path) -> SceneFile:
+def read_scene_file(path: str | Path, changes: Mapping[str, Any] | None = None) -> SceneFile:
     """Read a scene file in TOML: the states of the scene, one unless it is a load path, and how
     they are solved. Names of mesh files in it are relative to its folder. InputError with the line
     of the first mistake and what to write instead.
+
+    `changes` are other values of entries by their names, as in contactopt.files.toml_table.change;
+    `mu` alone is that of all contacts.
     """
     path = Path(path)
-    table = read_table(path)
-    first, solve, reading = _scene(path, table, None)
-    count = max((length for length, _, _ in reading.lengths), default=1)
+
+    def table() -> Table:
+        read, all_changes = read_table(path), dict(changes or {})
+        if "mu" in all_changes and isinstance(read.data.get("contacts"), list):
+            mu = all_changes.pop("mu")
+            numbers = range(1, len(read.data["contacts"]) + 1)
+            all_changes = {f"contacts.{i}.mu": mu for i in numbers} | all_changes
+        return change(read, all_changes)
+
+    states, solve, lines = read_scenes(table, path)
+    return SceneFile(states, solve, path.name, lines)
+
+
+def read_scenes(
+    table: Callable[[], Table], path: Path
+) -> tuple[tuple[Scene, ...], dict[str, Any], dict[str, Any]]:
+    """As read_scene_file(), from a function that makes the table anew: states, options, lines."""
+    top = table()
+    first, solve, reading = _scene(path, top, None)
+    longest = max((length for length, _, _ in reading.lengths), default=1)
+    wanted = len(reading.steps) or longest
     for length, at, key in reading.lengths:
-        if length not in (1, count):
-            raise at.fail(
-                f"{key!r} has values for {length} states of"
-                f" the load path, other numbers for {count}.",
-                key,
-            )
+        if length not in (1, wanted):
+            what = "states of the load path, other numbers for"
+            what = "steps, but there are" if reading.steps else what
+            raise at.fail(f"{key!r} has values for {length} {what} {wanted}.", key)
+    count = sum(states for _, states in reading.steps) or longest
     states = [first]
     for state in range(1, count):
         reading.state = state
-        states.append(_scene(path, read_table(path), reading)[0])
+        states.append(_scene(path, table(), reading)[0])
     if count > 1 and "accuracy" in solve:
-        raise table.fail(
+        raise top.fail(
             "an accuracy can be asked for only without a load path.", "solve", "accuracy"
         )
-    lines = {pair.name: table.lines["contacts", i] for i, pair in enumerate(first.contacts)}
-    lines |= {part.name: table.lines["bodies", part.name] for part in first.bodies}
-    return SceneFile(tuple(states), solve, path.name, lines)
+    lines = {pair.name: top.lines["contacts", i] for i, pair in enumerate(first.contacts)}
+    lines |= {part.name: top.lines["bodies", part.name] for part in first.bodies}
+    return tuple(states), solve, lines
 
 
 def _scene(
-    path: Path, top: Table, reading: _Reading | None
-) -> tuple[Scene, dict[str, Any], _Reading]:
-    kind = top.take("kind", str, "plane-strain")
-    if kind not in COMPONENTS:
-        raise top.fail(f"there is no kind {kind!r}; choose from {', '.join(COMPONENTS)}.", "kind")
+    path: Path, top: Table, reading: Reading | None
+) -> tuple[Scene, dict[str, Any], Reading]:
+    kind = top.take("kind", str, "plane-strain", among=COMPONENTS)
     units = top.table("units")
     length, stress = "length", "stress"
     if units:
         length, stress = (units.take(key, str, needed=True) for key in ("length", "stress"))
         units.close()
-    reading = reading or _Reading(path.parent, kind, length)
+    materials, steps = _materials(top, path.parent), _steps(top)
+    reading = reading or Reading(path.parent, kind, length, stress, steps=steps)
+    reading.materials = materials
     bodies = top.table("bodies")
     if bodies is None or not bodies.data:
         raise top.fail("there are no bodies; add a table [bodies.NAME] for each.")
-    parts = [_body(bodies, name, reading) for name in bodies.data]
+    parts = [read_body(bodies, name, reading) for name in bodies.data]
     pairs = top.tables("contacts")
     if not pairs:
         raise top.fail(
             "there are no contacts; add a table [[contacts]]"
             " for each pair of surfaces that may touch."
         )
-    meshes = reading.meshes.values()
+    meshes = [mesh for mesh in reading.meshes.values() if hasattr(mesh, "nvertices")]
     curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
     changes = {
         "contacts": tuple(_contact(pair, parts, reading) for pair in pairs),
         "thickness": top.take("thickness", float, 1.0, low=0.0),
         "name": top.take("name", str, path.stem),
         "mirror": top.take("mirror", str, "") or None,
+        "state": reading.step if steps else "",
     }
     for key, usual, most, valid in (
         ("copies", 1, 1000, "at least 1"),
@@ -157,155 +135,43 @@ def _scene(
         if not 1 <= changes[key] <= most:
             raise top.fail(f"{key} must be {valid}; got {changes[key]}.", key)
     solve = _solve(top.table("solve"))
-    top.close()
+    top.close(OPTIONS)
     with top.about():
         scene = Scene(kind=kind, units=(length, stress), bodies=tuple(parts), **changes)
     return scene, solve, reading
 
 
-def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
-    body = bodies.table(name)
-    rigid = body.table("rigid")
-    if rigid is not None:
-        body.close()
-        with rigid.about():
-            return _rigid(name, rigid, reading)
-    folder = None if name in reading.meshes else reading.folder
-    made_mesh = make_mesh(body, folder, reading.components, reading.length)
-    mesh = reading.meshes.setdefault(name, made_mesh)
-    material = body.table("material")
-    if material is None:
-        raise body.fail(f"body '{name}' has no material; add material = {{ E = ..., nu = ... }}.")
-    with material.about():
-        made = Material(*(material.take(key, float, needed=True) for key in ("E", "nu")))
-    material.close()
-    supports = tuple(_support(table, mesh, reading) for table in body.tables("supports"))
-    loads: list[Any] = [_traction(table, mesh, reading) for table in body.tables("tractions")]
-    loads += [_plate(table, mesh, reading) for table in body.tables("plates")]
-    force = body.table("body_force")
-    if force is not None:
-        loads.append(BodyForce(_vector(_components(force, reading, whole=True), reading)))
-    contact = body.take("contact", str, "contact")
-    if body.has("contact"):
-        _boundary(body, "contact", mesh)
-    curve = _curve(body.table("curve"), reading)
-    body.close()
-    with body.about():
-        return Part(name, mesh, made, supports, tuple(loads), contact, curve)
+def _materials(top: Table, folder: Path) -> dict[str, Named]:
+    """The library, and the materials of a file or of a table of the scene file."""
+    own: Table | None
+    if isinstance(top.data.get("materials"), str):
+        name = top.take("materials", str)
+        with top.about("materials"):
+            own = read_table(folder / name, "material file")
+    else:
+        own = top.table("materials")
+    return library() | ({} if own is None else read_materials(own))
 
 
-def _rigid(name: str, table: Table, reading: _Reading) -> Rigid:
-    normal, force = table.table("normal"), table.table("force")
-    values = None if normal is None else _components(normal, reading, whole=True)
-    if values is not None and not any(values.values()):
-        raise table.fail(
-            "the normal is zero; give the direction that points out of the rigid body.", "normal"
-        )
-    gap = _function(table, "gap", reading)
-    table.close()
-    return Rigid(
-        name,
-        None if values is None else _vector(values, reading),
-        (lambda x: np.full(x.shape[1], gap)) if isinstance(gap, (int, float)) else gap,
-        None if force is None else _components(force, reading, whole=True),
-    )
+def _steps(top: Table) -> tuple[tuple[str, int], ...]:
+    """Names and numbers of states of the steps of a load path."""
+    if all(isinstance(name, str) for name in top.data.get("steps", ())):
+        found = [(name, 1) for name in top.take("steps", list, [])]
+    else:
+        found = []
+        for step in top.tables("steps"):
+            found.append((step.take("name", str, needed=True), step.take("states", int, 1)))
+            step.close()
+    for i, (name, states) in enumerate(found):
+        if not 1 <= states <= MOST_STATES:
+            valid = f"from 1 to {MOST_STATES}"
+            raise top.fail(
+                f"the states of step '{name}' must be {valid}; got {states}.", "steps", i
+            )
+    return tuple(found)
 
 
-def _support(table: Table, mesh: Any, reading: _Reading) -> Support:
-    boundary, values = _boundary(table, "boundary", mesh), _components(table, reading)
-    table.close()
-    return Support(boundary, values or None)
-
-
-def _traction(table: Table, mesh: Any, reading: _Reading) -> Traction:
-    boundary, values = _boundary(table, "boundary", mesh), _components(table, reading)
-    if not values:
-        raise table.fail(
-            f"a traction needs a value for at least one of {', '.join(reading.components)}."
-        )
-    table.close()
-    return Traction(boundary, _vector(values, reading))
-
-
-def _plate(table: Table, mesh: Any, reading: _Reading) -> Plate:
-    boundary, force = _boundary(table, "boundary", mesh), table.table("force")
-    if force is None:
-        raise table.fail(
-            f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the"
-            " whole body."
-        )
-    glued = table.take("glued", bool, True)
-    table.close()
-    return Plate(boundary, _components(force, reading, whole=True), glued)
-
-
-def _vector(values: dict[str, float], reading: _Reading) -> tuple[float, ...]:
-    return tuple(values.get(c, 0.0) for c in reading.components)
-
-
-def _components(table: Table, reading: _Reading, whole: bool = False) -> dict[str, float]:
-    """The numbers of components in a table, of the present state; `whole`: it holds no others."""
-    found = {}
-    for key in reading.components:
-        if isinstance(table.data.get(key), list):
-            what = "a number, or an array of the numbers in the states of a load path"
-            values = table.numbers(key, None, what)
-            if not values:
-                raise table.fail(
-                    f"{key!r} is an empty array; give a number for every state of the load path.",
-                    key,
-                )
-            if reading.state == 0:
-                reading.lengths.append((len(values), table, key))
-            found[key] = values[min(reading.state, len(values) - 1)]
-        elif table.has(key):
-            found[key] = table.take(key, float)
-    if whole:
-        table.close()
-    return found
-
-
-def _boundary(table: Table, key: str, mesh: Any) -> str:
-    name = table.take(key, str, needed=True)
-    known = mesh.boundaries or {}
-    if name not in known:
-        raise table.fail(
-            f"the body has no boundary {name!r}; it has {', '.join(sorted(known)) or 'none'}.", key
-        )
-    return str(name)
-
-
-def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Projection on the circle or sphere around a centre; with fewer components, on a cylinder."""
-    if table is None:
-        return None
-    radius, place = table.take("radius", float, needed=True, low=0.0), table.table("centre")
-    centre = dict.fromkeys(reading.components, 0.0)
-    if place is not None:
-        centre = _components(place, reading, whole=True)
-    table.close()
-    axes = [reading.components.index(c) for c in centre]
-    middle = np.array(list(centre.values()))[:, None]
-
-    def project(x: np.ndarray) -> np.ndarray:
-        out = np.array(x, dtype=float)
-        away = out[axes] - middle
-        out[axes] = middle + radius * away / np.linalg.norm(away, axis=0)
-        return out
-
-    return project
-
-
-def _function(table: Table, key: str, reading: _Reading, needed: bool = False) -> Any:
-    """A number, or a function of the place from an expression; None if there is none."""
-    what = 'a number, or a text like "0.3 + 0.1 * x"'
-    if isinstance(table.data.get(key), str):
-        with table.about(key):
-            return Expression(table.take(key, str), reading.components)
-    return table.take(key, float, needed=needed, what=what)
-
-
-def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Contact:
+def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:
     named = {part.name: part for part in parts}
     for side in ("upper", "lower"):
         body, _, surface = table.take(side, str, needed=True).partition(":")
@@ -323,15 +189,17 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
     if isinstance(table.data.get("mu"), list):
         mu: Any = tuple(table.numbers("mu", 2, "a number, or two: along and across a direction"))
     else:
-        mu = _function(table, "mu", reading, needed=True)
-    texts = {key: table.take(key, str) for key in ("law", "coupling", "carrier")}
+        mu = function_of(table, "mu", reading, needed=True)
+    names: dict[str, Any] = {"law": LAWS, "coupling": (), "carrier": SIDES}
+    texts = {key: table.take(key, str, among=known) for key, known in names.items()}
     given: dict[str, Any] = {key: value for key, value in texts.items() if value is not None}
     way = table.table("direction")
     if way is not None:
-        values = _components(way, reading, whole=True)
+        values = components_of(way, reading, whole=True)
         given["direction"] = tuple(values.get(c, 0.0) for c in reading.components)
     with table.about():
-        made = Contact(table.take("upper", str), table.take("lower", str), mu, **given)
+        upper, lower = (table.take(side, str, needed=True) for side in SIDES)
+        made = Contact(upper, lower, mu, **given)
     table.close()
     return made
 
@@ -344,7 +212,7 @@ def _solve(table: Table | None) -> dict[str, Any]:
     for key in IN_FILES:
         kind = OPTIONS[key].metadata["kind"]
         limits: dict[str, Any] = {"low": 0.0} if kind is float else {}
-        if table.has(key):
+        if table.has(key, kind):
             found[key] = table.take(key, kind, **limits)
     table.close()
     if ("accuracy" in found) != ("quantity" in found):  # the other options may stand alone here

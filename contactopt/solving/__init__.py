@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from contactopt.scenes.scene import Scene
-from contactopt.solving.follow import follow
+from contactopt.solving.follow import follow_path
 from contactopt.solving.solve_scene import Options, Solved
 from contactopt.solving.zone import solve_zone
 
@@ -39,5 +39,5 @@ def solve_states(
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)
     own = options or Options()
-    path = follow(states, elements, None, own.note, own.Q, own.solver, **own.of_solve)
+    path = follow_path(states, elements, None, own)
     return Solved(path.reduction, path.solution, path=path)

@@ -55,7 +55,23 @@ def follow(
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     method, tol = settings.pop("method", None), settings.pop("tol", TOL)
-    options = Options(Q, solver, method, tol, settings, note)
+    return follow_path(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
+
+
+def follow_path(
+    scenes: Iterable[Scene], elements: int | None, zone: float | None, options: Options
+) -> PathResult:
+    """Solve a load path with options for all states.
+
+    Parameters
+    ----------
+    scenes, elements, zone : as for follow(), and so are the errors
+    options : how each state is solved
+
+    Returns
+    -------
+    PathResult : the states with their solutions, in their order
+    """
     total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
@@ -69,9 +85,12 @@ def follow(
         state, bodies = state_of(solved, states[-1] if states else None, bodies)
         states.append(state)
         steps = count(state.solution.iterations, "iteration")
-        options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
+        step = scene.state and f" ({scene.state})"
+        options.note(f"state {len(states)}{total}{step}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
+        if options.restart is not None:
+            options.restart.finished(state.solution)
     if solved is None:
         raise InputError("the path has no states; give at least one scene.")
     return PathResult(tuple(states), solved.reduction)

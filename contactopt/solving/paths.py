@@ -27,6 +27,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -160,7 +161,8 @@ class PathResult:
         return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
 
     def write_history(self, file: Path) -> None:
-        """Write the history as comma-separated values, one row per state.
+        """Write the history as comma-separated values, one row per state, with the names of the
+        steps of the path in its last column.
 
         Parameters
         ----------
@@ -168,8 +170,11 @@ class PathResult:
         """
         with open(file, "w", newline="") as opened:
             rows = csv.writer(opened)
-            rows.writerow(self.history)
-            rows.writerows(zip(*self.history.values()))
+            history: dict[str, Any] = dict(self.history)
+            if any(names := [state.scene.state for state in self.states]):
+                history["step"] = names
+            rows.writerow(history)
+            rows.writerows(zip(*history.values()))
 
     def at(self, step: int) -> tuple[Reduction, Solution]:
         """Find the problem and the solution of a state.

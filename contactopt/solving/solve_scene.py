@@ -30,6 +30,7 @@ from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 from contactopt.solving.progress import progress_lines
+from contactopt.solving.restart import Restart, certified
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
@@ -50,6 +51,8 @@ class Options:
         by its name
     note : receives one short sentence before every step that takes time, and in long solves one
         after each iteration
+    restart : keeps what is found on the way, and may give a start
+    until : when solves end that are not done yet, on the clock time.perf_counter() [s]
     """
 
     Q: str = "auto"
@@ -58,11 +61,16 @@ class Options:
     tol: float = TOL
     settings: Mapping[str, Any] = field(default_factory=dict)
     note: Note = lambda text: None
+    restart: Restart | None = None
+    until: float = np.inf
 
     @property
     def of_solve(self) -> dict[str, Any]:
         """The arguments of contactopt.solve."""
-        return {"method": self.method, "tol": self.tol} | dict(self.settings)
+        limit = {}
+        if self.until < np.inf:
+            limit["time_limit"] = max(0.0, self.until - time.perf_counter())
+        return {"method": self.method, "tol": self.tol} | limit | dict(self.settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,12 +160,12 @@ def _one_way(
     # half-spaces have coarse grids of their own
     products = isinstance(Q, InterfaceOperator) and not isinstance(Q, Convolution) and not Q.coupled
     coarser = elements // FACTOR[scene.dim]
-    if start is None and products and not scene.given and coarser >= COARSEST:
+    first = options.restart.start(reduction) if options.restart and start is None else None
+    if start is None and first is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         coarse = {"coarse": time.perf_counter() - begin}
     options.note(f"solving {reduction.problem.contacts} contacts")
-    first = None
     if start is not None:
         first = transfer(start.reduction.problem, start.solution, reduction.problem)
     solved = _solved(reduction, first, options, coarse)
@@ -177,7 +185,8 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
     q = reduction.problem.q.copy()
     q[:, 1:] -= slipped
     step = replace(reduction, problem=replace(reduction.problem, q=q))
-    return _solved(step, before.solution, options, {})
+    known = options.restart.start(step) if options.restart else None
+    return _solved(step, known or before.solution, options, {})
 
 
 def _solved(
@@ -187,9 +196,13 @@ def _solved(
     came earlier.
     """
     lines = progress_lines(options.note, reduction.problem, options.tol)
+    if options.restart is not None:
+        options.restart.begin(reduction)
+        lines = options.restart.watching(lines)
 
     def answer(problem: InterfaceProblem, start: Solution | None) -> Solution:
-        return solve(problem, start=start, **({"progress": lines} | options.of_solve))
+        found = certified(problem, start, options.tol)
+        return found or solve(problem, start=start, **({"progress": lines} | options.of_solve))
 
     seconds = Counter(reduction.seconds)
     seconds.update(earlier)

@@ -47,7 +47,9 @@ def solve_zone(
     elements = scene.elements if elements is None else elements
     if scene.zone is None or len(scene.pairs) > 1:
         return solve_scene(scene, elements, scene.zone, options, start)
-    zones = [start.zones[-1] if start is not None and start.zones else scene.zone]
+    restart = None if options is None else options.restart
+    known = restart.known.zone if restart is not None and restart.known is not None else 0.0
+    zones = [start.zones[-1] if start is not None and start.zones else known or scene.zone]
     seconds: Counter[str] = Counter()
     while True:
         start = solve_scene(scene, elements, zones[-1], options, start)
@@ -58,6 +60,8 @@ def solve_zone(
                 f"scene '{scene.name}': fewer than two nodes are in contact; take more elements."
             )
         zones.append(contact_edge(scene, problem, solution.reactions))
+        if restart is not None:
+            restart.zone = zones[-1]
         agreed = abs(zones[-1] - zones[-2]) <= AGREE * zones[-2] / elements
         if agreed or solution.status not in (Status.SOLVED, Status.SETTLED) or len(zones) > LOOPS:
             return Solved(start.reduction, replace(solution, seconds=dict(seconds)), tuple(zones))

@@ -95,6 +95,7 @@ class Painter {
     const {width, height, depth, pixels, owner} = this, size = radius * this.dense;
     for (let i = 0; i < px.length; i++) {
       if (!Number.isFinite(px[i] + py[i])) continue;
+      if (!Number.isFinite(values[i])) continue;
       const n = 3 * Math.max(0, Math.min(255, Math.round(((values[i] - low) * 255) / (high - low)))), z = pz[i] + towards;
       for (let y = Math.max(0, Math.ceil(py[i] - size)); y <= Math.min(height - 1, py[i] + size); y++) for (let x = Math.max(0, Math.ceil(px[i] - size)); x <= Math.min(width - 1, px[i] + size); x++) {
         const k = y * width + x;

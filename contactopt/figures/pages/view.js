@@ -3,17 +3,18 @@ const [LENGTH, STRESS, FORCE] = data.units;
 const flat = data.dim === 2;
 const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value.type ? unpack(value) : value]));
 const bodies = data.bodies.map((body) => ({...opened(body), values: opened(body.values), shown: true, corners: body.inside.shape[1]}));
-const contacts = data.contacts.map((pair) => ({...opened(pair), states: opened(pair.states), shown: true, corners: 4, inside: [], cut_cells: []}));
-const CONTACT = {
+const contacts = data.contacts.map((pair) => ({...opened(pair), states: opened(pair.states), shown: !pair.hidden, corners: 4, inside: [], cut_cells: []}));
+const CONTACT = data.words ?? {  // those of a scene that nobody has solved yet, or of a result
   pressure: ["pressure", STRESS], traction: ["size of the tangential traction", STRESS], status: ["stick, slip, open", ""],
   gap: ["gap", LENGTH], slip: ["size of the slip", LENGTH],
 };
 const STATUS = ["open", "stick", "slip"];
-const now = {field: "von_mises", scale: data.scale, contact: "pressure", state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38};
+const now = {field: data.words ? "body" : "von_mises", scale: data.scale, contact: Object.keys(CONTACT)[0], state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38};
 const view = document.getElementById("view"), config = {responsive: true, displaylogo: false};
 const control = (name) => document.getElementById(name);
 
 function label(name) {
+  if (name === "body") return name;
   if (name === "von_mises") return `von Mises stress [${STRESS}]`;
   if (name.startsWith("stress_")) return `stress ${name.slice(7)} [${STRESS}]`;
   return (name === "size" ? "size of the displacement" : `displacement ${name.slice(5)}`) + ` [${LENGTH}]`;
@@ -26,7 +27,7 @@ function at(values, length) {  // those of the state shown, of all that there ar
 }
 
 const state = (pair, name) => at(pair.states[name], count(pair) * (name === "vector" ? 3 : 1));
-const bodyNames = bodies.length ? ["von_mises", "size", ...data.axes.map((axis) => `move_${axis}`), ...Object.keys(bodies[0].values).filter((name) => name.startsWith("stress_"))] : [];
+const bodyNames = data.words ? ["body"] : bodies.length ? ["von_mises", "size", ...data.axes.map((axis) => `move_${axis}`), ...Object.keys(bodies[0].values).filter((name) => name.startsWith("stress_"))] : [];
 
 function values(body, name, every = false) {  // at the nodes of a body, in the state shown or in every state
   if (body.values[name]) return every ? body.values[name] : at(body.values[name], count(body));
@@ -132,18 +133,20 @@ function span(arrays) {
   return low < high ? [low, high] : [low - 0.5, high + 0.5];
 }
 
-const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true)};
+const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette(["999999", "0072B2", "009E73", "CC79A7", "D55E00"], true)};
 const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
 const BIN = 16;  // pixels, the side of a square of the picture that shows at most one arrow
 const painter = new Painter(view);
 let owners = [];  // [first number, item, node behind the corners of its triangles or its dots]
 
 function bodyColours() {
+  if (data.words) return {table: TABLES.body, low: -0.5, high: bodies.length - 0.5, names: bodies.map((body) => body.name)};
   const shown = bodies.filter((body) => body.shown), [low, high] = shown.length ? span(shown.map((body) => values(body, now.field, true))) : [0, 1], mises = now.field === "von_mises";
   return {table: TABLES.bodies, low: mises ? 0 : low, high: mises ? Math.min(high, data.top) : high};
 }
 
 function contactColours() {
+  if (now.contact === "role") return {table: TABLES.role, low: -0.5, high: data.roles.length - 0.5, names: data.roles};
   if (now.contact === "status") return {table: TABLES.status, low: -0.5, high: 2.5, names: STATUS};
   const [low, high] = span(contacts.filter((pair) => pair.shown).map((pair) => pair.states[now.contact]));
   return {table: TABLES.contact, low, high};
@@ -231,10 +234,10 @@ function draw() {
   rulers();
   if (now.arrows) pairs.forEach(arrows);
   const [name, unit] = CONTACT[now.contact];
-  if (pairs.length) painter.bar(`contact: ${name}` + (unit ? ` [${unit}]` : ""), contact, 20);
+  if (pairs.length) painter.bar((data.words ? name : `contact: ${name}`) + (unit ? ` [${unit}]` : ""), contact, 20);
   if (bodies.length) {
     painter.bar(label(now.field) + (data.moving && now.field.startsWith("stress_") ? ", last state" : ""), body, view.clientHeight - 32);
-    painter.text(now.scale === 1 ? "displacements to scale" : `displacements drawn x ${number(now.scale)}`, view.clientWidth - 8, room()[2] - 8, "right");
+    if (!data.words) painter.text(now.scale === 1 ? "displacements to scale" : `displacements drawn x ${number(now.scale)}`, view.clientWidth - 8, room()[2] - 8, "right");
   }
   if (now.probe) {
     const item = now.probe.body === undefined ? contacts[now.probe.contact] : bodies[now.probe.body], xyz = placed(item), [x, y] = painter.place(...xyz.map((own) => own[now.probe.node])).map((value) => value / painter.dense);
@@ -258,7 +261,7 @@ function probe(place) {
   add(place.body === undefined ? "contact" : "node", `${i} of ${item.name}`, "");
   data.axes.forEach((name, c) => add(name, item.points[3 * i + c], LENGTH));
   if (place.body === undefined) {
-    for (const [name, [words, unit]] of Object.entries(CONTACT)) add(words, name === "status" ? STATUS[state(item, name)[i]] : unit === LENGTH ? rounded(state(item, name)[i]) : state(item, name)[i], unit);
+    for (const [name, [words, unit]] of Object.entries(CONTACT)) add(words, name === "status" ? STATUS[state(item, name)[i]] : name === "role" ? data.roles[state(item, name)[i]] : unit === LENGTH ? rounded(state(item, name)[i]) : state(item, name)[i], unit);
   } else {
     for (const name of bodyNames) {
       const words = label(name), end = words.lastIndexOf(" [");
@@ -393,7 +396,7 @@ choices("contact", Object.entries(CONTACT).map(([name, [words]]) => [name, words
 choices("pair", contacts.map((pair, i) => [i, pair.name]), 0, () => {});
 for (const [id, list] of [["bodies", bodies], ["pairs", contacts]]) for (const item of list) {
   const box = element("input", "", {type: "checkbox"}), line = element("label");
-  box.checked = true;
+  box.checked = item.shown;
   box.addEventListener("change", () => { item.shown = box.checked; draw(); });
   line.append(box, ` ${item.name}`);
   control(id).append(line);
@@ -450,6 +453,8 @@ stateWords();
 show(now.box);
 performance.mark("drawn");
 new ResizeObserver(requestDraw).observe(view);
+for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
+if (data.words) return;
 await new Promise((then) => setTimeout(then, 30));  // the picture is on the screen before the charts are made
 await plotly();
 drawContact();

@@ -1,0 +1,181 @@
+"""A scene before it is solved, as a page to explore: bodies, boundaries and what they are for,
+loads, pairs of surfaces with their normals and initial gaps. The program is that of the page of a
+result.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from contactopt.bodies.assembled_elastic import AssembledElastic
+from contactopt.cards import force_unit
+from contactopt.figures.html import filled, packed, write_html
+from contactopt.figures.page_data import MOST_INSIDE, body_arrays, box_of, whole_box
+from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
+from contactopt.figures.scene_check import SceneCheck
+from contactopt.meshes.cells import elements_of, facet_nodes
+from contactopt.readings.resultants import mirrors
+from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
+
+ROLES = ("no use", "support", "load", "plate", "contact")
+
+
+def write_check_page(check: SceneCheck, file: str | Path) -> Path:
+    """Write what is known of a scene before it is solved as a page, to a file that ends in .html.
+    InputError if the file cannot be written.
+    """
+    scene = check.scene
+    units = [*scene.units, force_unit(scene.units)]
+    pairs = [_pair(*both) for both in zip(scene.pairs, check.posed.couplings)]
+    parts = [body.part for body in check.posed.bodies if isinstance(body, AssembledElastic)]
+    meshes = [
+        body.body.basis.mesh for body in check.posed.bodies if isinstance(body, AssembledElastic)
+    ]
+    items = [item for both in zip(parts, meshes) for item in _boundaries(scene, *both)]
+    items.sort(key=lambda item: item["role"] == 0)
+    posed: Any = SimpleNamespace(scene=scene, planes=check.posed.planes)
+    planes = [[scene.components.index(own["axis"]), own["place"]] for own in mirrors(posed)]
+    bodies = _bodies(scene, parts, meshes, planes)
+    places = [item["places"] for item in (*items, *pairs)]
+    box = whole_box(box_of([*places, *(_spatial(mesh.p) for mesh in meshes)]), planes)
+    near = box_of([item["places"] for item in pairs])
+    wide = 0.2 * float(np.ptp(near, axis=0).max())
+    data = {
+        "units": units,
+        "dim": scene.dim,
+        "axes": list(scene.components),
+        "ring": scene.kind == "axisymmetric",
+        "mirrors": planes,
+        "box": box.tolist(),
+        "near": box.tolist(),
+        "contact": [(near[0] - wide).tolist(), (near[1] + wide).tolist()],
+        "scale": 1.0,
+        "most_scale": 1.0,
+        "words": {"role": ["what it is for", ""], "gap": ["initial gap", scene.units[0]]},
+        "roles": ROLES,
+        "bodies": bodies,
+        "contacts": [_packed(item, scene.dim) for item in (*pairs, *items)],
+        "states": 1,
+        "moving": False,
+        "history": None,
+    }
+    lines = "".join(f"<br>{html.escape(text)}" for text in check.text.splitlines()[1:])
+    body = filled(
+        "view.html",
+        scene=html.escape(scene.name),
+        certificate="Nothing has been solved yet. This is what will be solved.",
+        remarks="".join(f"<p><strong>{html.escape(note)}</strong></p>" for note in check.notes),
+        move="move" if scene.dim == 2 else "turn",
+        followers="",
+        arrows="loads, and normals from the lower to the upper body,",
+        convention="A negative gap is an overlap. The arrow of a plate is its total force.",
+        cells=f"<tr><td>{lines.removeprefix('<br>')}</td></tr>",
+    )
+    return write_html(
+        file, f"contactopt: {scene.name}", body, data, ["painter.js", "view.js"], plotly=False
+    )
+
+
+def _bodies(
+    scene: Scene, parts: list[Part], meshes: list[Any], planes: list[Any]
+) -> list[dict[str, Any]]:
+    """The bodies with meshes, each coloured by its number."""
+    inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes) <= MOST_INSIDE
+    made = []
+    for number, (part, mesh) in enumerate(zip(parts, meshes)):
+        kind, elements = elements_of(mesh)
+        block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
+        count = mesh.doflocs.shape[1]
+        values = {"move": np.zeros((1, count, scene.dim)), "body": np.full((1, count), number)}
+        drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
+        made.append({"name": part.name} | body_arrays(drawn, values, planes, inside))
+    return made
+
+
+def _spatial(points: np.ndarray) -> np.ndarray:
+    """Points (dim, n) as (n, 3)."""
+    return np.pad(points, ((0, 3 - len(points)), (0, 0))).T
+
+
+def _pair(pair: Any, made: Any) -> dict[str, Any]:
+    """The contacts of a pair with their gaps and normals."""
+    return {
+        "name": pair.name,
+        "places": _spatial(made.positions),
+        "cells": made.cells.T,
+        "role": len(ROLES) - 1,
+        "gap": made.gap,
+        "vector": _spatial(made.frames[:, 0].T),
+    }
+
+
+def _boundaries(scene: Scene, part: Part, mesh: Any) -> Iterator[dict[str, Any]]:
+    """The named boundaries of a body, and what its loads are."""
+    kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
+    held = {support.boundary for support in part.supports}
+    loads = {load.boundary: load for load in part.loads if not isinstance(load, BodyForce)}
+    for name, facets in (mesh.boundaries or {}).items():
+        load, nodes = loads.get(name), facet_nodes(mesh, np.asarray(facets))
+        role = 3 if isinstance(load, Plate) else 2 if load else 1 if name in held else 0
+        if role == 0 and name in scene.surfaces_of(part):
+            continue  # the pairs show it
+        vector = np.zeros((len(nodes), 3))
+        if isinstance(load, Traction):
+            vector[:, : scene.dim] = load.value
+        elif isinstance(load, Plate):
+            middle = mesh.doflocs[:, nodes].mean(axis=1, keepdims=True)
+            nearest = np.argmin(np.linalg.norm(mesh.doflocs[:, nodes] - middle, axis=0))
+            vector[nearest, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
+        own = _faces_on(mesh, np.asarray(facets), kind, faces) if scene.dim == 3 else faces[:0]
+        place = np.zeros(mesh.doflocs.shape[1], dtype=int)
+        place[nodes] = np.arange(len(nodes))
+        yield {
+            "name": f"{part.name}: {name} ({ROLES[role]})",
+            "places": _spatial(mesh.doflocs[:, nodes]),
+            "cells": place[triangles(pieces(kind, own))] if len(own) else own,
+            "role": role,
+            "vector": vector,
+        }
+    for force in part.loads:
+        if isinstance(force, BodyForce):
+            yield {
+                "name": f"{part.name}: force per volume",
+                "places": _spatial(mesh.p.mean(axis=1, keepdims=True)),
+                "cells": faces[:0],
+                "role": 2,
+                "vector": np.pad(np.array([force.value]), ((0, 0), (0, 3 - scene.dim))),
+            }
+
+
+def _faces_on(mesh: Any, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
+    """The faces of the surface of a solid (m, v) that are among some facets of its mesh."""
+    shown, corners = np.sort(faces[:, : CORNERS[kind]], axis=1), mesh.facets[:, facets]
+    wanted = np.sort(corners.T, axis=1)
+    number = np.unique(np.concatenate([shown, wanted]), axis=0, return_inverse=True)[1].ravel()
+    return faces[np.isin(number[: len(shown)], number[len(shown) :])]
+
+
+def _packed(item: dict[str, Any], dim: int) -> dict[str, Any]:
+    """An item for the program of the page; a line of contacts in the plane is drawn as dots."""
+    k, cells = len(item["places"]), np.asarray(item["cells"])
+    flat = cells if dim == 3 and len(cells) else np.zeros((0, 3), dtype=int)
+    states = {
+        "role": np.full(k, item["role"]),
+        "gap": item.get("gap", np.full(k, np.nan)),
+        "status": np.ones(k),
+        "vector": item["vector"],
+    }
+    return {
+        "name": item["name"],
+        "hidden": item["role"] == 0,
+        "points": packed(item["places"]),
+        "move": packed(np.zeros((1, k, dim))),
+        "cells": packed(triangles(flat)),
+        "states": {name: packed(values) for name, values in states.items()},
+    }

@@ -1,0 +1,237 @@
+"""The bodies of a scene file: what each is made of, what holds and loads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.files.toml_table import Table
+from contactopt.scenes.body_shapes import make_mesh
+from contactopt.scenes.expressions import Expression
+from contactopt.scenes.file_surfaces import half_space_shape
+from contactopt.scenes.material_library import Named, material_of
+from contactopt.scenes.scene import (
+    COMPONENTS,
+    BodyForce,
+    HalfSpace,
+    Part,
+    Plate,
+    Rigid,
+    Support,
+    Traction,
+)
+
+
+@dataclass
+class Reading:
+    """What readers of the parts of a file share.
+
+    stress     name of the unit of stress
+    state      of the load path whose numbers are taken
+    lengths    of the arrays of such numbers that were found, with the place of each
+    meshes     by the name of the body, and points of half-spaces: read once for all states
+    steps      of the load path by name, with the number of states of each; none: every number of an
+               array is that of a state
+    materials  by name
+    """
+
+    folder: Path
+    kind: str
+    length: str
+    stress: str
+    state: int = 0
+    lengths: list[tuple[int, Table, str]] = field(default_factory=list)
+    meshes: dict[str, Any] = field(default_factory=dict)
+    steps: tuple[tuple[str, int], ...] = ()
+    materials: dict[str, Named] = field(default_factory=dict)
+
+    def at_state(self, values: list[float]) -> float:
+        """The number of the present state: within a step it grows from that at the end of the step
+        before, at first from zero.
+        """
+        if not self.steps or len(values) == 1:
+            return values[min(self.state, len(values) - 1)]
+        left = self.state
+        for before, value, (_, states) in zip([0.0, *values], values, self.steps):
+            if left < states:
+                return before + (value - before) * (left + 1) / states
+            left -= states
+        return values[-1]
+
+    @property
+    def step(self) -> str:
+        """The name of the step of the present state."""
+        return [name for name, states in self.steps for _ in range(states)][self.state]
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        return COMPONENTS[self.kind]
+
+
+def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | HalfSpace:
+    """The body of a name in the table of bodies, in the present state."""
+    body = bodies.table(name)
+    rigid = body.table("rigid")
+    if rigid is not None:
+        body.close()
+        with rigid.about():
+            return _rigid(name, rigid, reading)
+    if body.has("half_space", dict):
+        return _half_space(name, body, reading)
+    folder = None if name in reading.meshes else reading.folder
+    made_mesh = make_mesh(body, folder, reading.components, reading.length)
+    mesh = reading.meshes.setdefault(name, made_mesh)
+    made = material_of(body, reading.materials, reading.stress)
+    supports = tuple(_support(table, mesh, reading) for table in body.tables("supports"))
+    loads: list[Any] = [_traction(table, mesh, reading) for table in body.tables("tractions")]
+    loads += [_plate(table, mesh, reading) for table in body.tables("plates")]
+    force = body.table("body_force")
+    if force is not None:
+        loads.append(BodyForce(vector_of(components_of(force, reading, whole=True), reading)))
+    contact = body.take("contact", str, "contact")
+    if body.has("contact"):
+        _boundary(body, "contact", mesh)
+    curve = _curve(body.table("curve"), reading)
+    body.close()
+    with body.about():
+        return Part(name, mesh, made, supports, tuple(loads), contact, curve)
+
+
+def _half_space(name: str, body: Table, reading: Reading) -> HalfSpace:
+    made = material_of(body, reading.materials, reading.stress)
+    table = body.table("half_space")
+    body.close()
+    axes = reading.components[:-1]
+    if name not in reading.meshes:
+        reading.meshes[name] = half_space_shape(table, reading.folder, axes, reading.length)
+    table.known += ["points", "height", "periodic", "depth", *axes]
+    motions = _motions(table, reading)
+    table.close()
+    with body.about():
+        return HalfSpace(name, made, **reading.meshes[name], **motions)
+
+
+def _motions(table: Table, reading: Reading) -> dict[str, Any]:
+    """The total force and the displacement of a body that moves as a whole."""
+    given = {key: table.table(key) for key in ("force", "displacement")}
+    return {
+        key: None if own is None else components_of(own, reading, whole=True)
+        for key, own in given.items()
+    }
+
+
+def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
+    normal, motions = table.table("normal"), _motions(table, reading)
+    values = None if normal is None else components_of(normal, reading, whole=True)
+    if values is not None and not any(values.values()):
+        raise table.fail(
+            "the normal is zero; give the direction that points out of the rigid body.", "normal"
+        )
+    gap = function_of(table, "gap", reading)
+    table.close()
+    return Rigid(
+        name,
+        None if values is None else vector_of(values, reading),
+        (lambda x: np.full(x.shape[1], gap)) if isinstance(gap, (int, float)) else gap,
+        **motions,
+    )
+
+
+def _support(table: Table, mesh: Any, reading: Reading) -> Support:
+    boundary, values = _boundary(table, "boundary", mesh), components_of(table, reading)
+    table.close()
+    return Support(boundary, values or None)
+
+
+def _traction(table: Table, mesh: Any, reading: Reading) -> Traction:
+    boundary, values = _boundary(table, "boundary", mesh), components_of(table, reading)
+    if not values:
+        raise table.fail(
+            f"a traction needs a value for at least one of {', '.join(reading.components)}."
+        )
+    table.close()
+    return Traction(boundary, vector_of(values, reading))
+
+
+def _plate(table: Table, mesh: Any, reading: Reading) -> Plate:
+    boundary, force = _boundary(table, "boundary", mesh), table.table("force")
+    if force is None:
+        raise table.fail(
+            f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the"
+            " whole body."
+        )
+    glued = table.take("glued", bool, True)
+    table.close()
+    return Plate(boundary, components_of(force, reading, whole=True), glued)
+
+
+def vector_of(values: dict[str, float], reading: Reading) -> tuple[float, ...]:
+    return tuple(values.get(c, 0.0) for c in reading.components)
+
+
+def components_of(table: Table, reading: Reading, whole: bool = False) -> dict[str, float]:
+    """The numbers of components in a table, of the present state; `whole`: it holds no others."""
+    found = {}
+    for key in reading.components:
+        there = table.has(key, float, list)
+        if isinstance(table.data.get(key), list):
+            what = "a number, or an array of the numbers in the states of a load path"
+            values = table.numbers(key, None, what)
+            if not values:
+                raise table.fail(
+                    f"{key!r} is an empty array; give a number for every state of the load path.",
+                    key,
+                )
+            if reading.state == 0:
+                reading.lengths.append((len(values), table, key))
+            found[key] = reading.at_state(values)
+        elif there:
+            found[key] = table.take(key, float)
+    if whole:
+        table.close()
+    return found
+
+
+def _boundary(table: Table, key: str, mesh: Any) -> str:
+    name = table.take(key, str, needed=True)
+    known = mesh.boundaries or {}
+    if name not in known:
+        raise table.fail(
+            f"the body has no boundary {name!r}; it has {', '.join(sorted(known)) or 'none'}.", key
+        )
+    return str(name)
+
+
+def _curve(table: Table | None, reading: Reading) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Projection on the circle or sphere around a centre; with fewer components, on a cylinder."""
+    if table is None:
+        return None
+    radius, place = table.take("radius", float, needed=True, low=0.0), table.table("centre")
+    centre = dict.fromkeys(reading.components, 0.0)
+    if place is not None:
+        centre = components_of(place, reading, whole=True)
+    table.close()
+    axes = [reading.components.index(c) for c in centre]
+    middle = np.array(list(centre.values()))[:, None]
+
+    def project(x: np.ndarray) -> np.ndarray:
+        out = np.array(x, dtype=float)
+        away = out[axes] - middle
+        out[axes] = middle + radius * away / np.linalg.norm(away, axis=0)
+        return out
+
+    return project
+
+
+def function_of(table: Table, key: str, reading: Reading, needed: bool = False) -> Any:
+    """A number, or a function of the place from an expression; None if there is none."""
+    what = 'a number, or a text like "0.3 + 0.1 * x"'
+    table.has(key, float, str)
+    if isinstance(table.data.get(key), str):
+        with table.about(key):
+            return Expression(table.take(key, str, needed=needed), reading.components)
+    return table.take(key, float, needed=needed, what=what)
