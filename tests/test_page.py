@@ -3,6 +3,7 @@ it.
 """
 
 import base64
+import gzip
 import html
 import json
 import re
@@ -26,11 +27,8 @@ def decoded(packed):
 
 
 def data_of(file):
-    return json.loads(
-        re.search(
-            r'<script type="application/json" id="data">(.*?)</script>', file.read_text(), re.S
-        )[1]
-    )
+    packed = re.search(r'<script type="text/plain" id="data">(.*?)</script>', file.read_text())[1]
+    return json.loads(gzip.decompress(base64.b64decode(packed)))
 
 
 @pytest.fixture(scope="module")

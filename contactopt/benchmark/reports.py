@@ -108,13 +108,23 @@ def _check_figure(number: int, entry: Table) -> None:
 
 
 def publish(experiment: Path, results: Path, reports: Path) -> None:
-    """Take the small table of a campaign over into REPORTS/NAME."""
+    """Take the small table of a campaign over into REPORTS/NAME.
+
+    A large one keeps four digits, and the course of the tightest run of each method alone.
+    """
     layout = read_layout(experiment)
     drawn = {entry["kind"] for entry in layout.figures}
     left_out = set(LEFT_OUT) - ({"history"} if drawn & WITH_HISTORY else set())
     columns = [*layout.columns] or [name for name in COLUMNS if name not in left_out]
     table, folder = load(results, absent=True), reports / layout.name
-    table["history"] = table["history"].where(table["repeat"] == 0, "[]")
+    kept = table["repeat"] == 0
+    if len(table) > MOST_LINES:
+        kept &= table["tolerance"] == table.groupby(["problem", "method"])["tolerance"].transform(
+            "min"
+        )
+        for name in table.select_dtypes("float"):
+            table[name] = [float(f"{value:.4g}") for value in table[name]]
+    table["history"] = table["history"].where(kept, "[]")
     remove_files(folder, [f"rows.{kind}" for kind in TABLE_FILES])
     kind = TABLE_FILES[len(table) > MOST_LINES]
     save(table, folder / f"rows.{kind}", columns)

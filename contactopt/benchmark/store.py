@@ -230,7 +230,7 @@ def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None
 
     def write(file: Path) -> None:
         if path.suffix == ".parquet":
-            chosen.to_parquet(file, index=False)
+            chosen.to_parquet(file, index=False, compression="zstd")
         else:
             chosen.to_csv(file, index=False, float_format="%.6g")
 

@@ -1,9 +1,9 @@
 """Pages that stand alone: one HTML file with its data, its program and plotly inside, which opens
 without a network.
 
-plotly is stored compressed, at a third of its size, and unpacked by the browser. Data are JSON;
-arrays are base64 of their bytes. Names in the data reach the page as text only, and the page may
-load nothing from elsewhere.
+The data and plotly are stored compressed, at about a quarter of their size, and unpacked by the
+browser. Data are JSON; arrays are base64 of their bytes. Names in the data reach the page as text
+only, and the page may load nothing from elsewhere.
 """
 
 from __future__ import annotations
@@ -77,14 +77,14 @@ def write_html(
     """
     packed = _plotly() if plotly else ""
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
-    encoded = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    encoded = _squeezed(json.dumps(data, allow_nan=False))
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{html.escape(title)}</title><style>{texts['page.css']}</style></head><body>",
         body,
-        f'<script type="application/json" id="data">{encoded}</script>',
+        f'<script type="text/plain" id="data">{encoded}</script>',
         f'<script type="text/plain" id="plotly">{packed}</script>',
         f"<script>{texts['start.js']}\nstart(async () => {{\n"
         + "\n".join(texts[name] for name in programs)
@@ -101,7 +101,12 @@ def _plotly() -> str:
     check_installed()
     from plotly.offline import get_plotlyjs
 
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+    return _squeezed(get_plotlyjs())
+
+
+def _squeezed(text: str) -> str:
+    """A text, compressed, as text."""
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
 
 
 def filled(name: str, **texts: str) -> str:

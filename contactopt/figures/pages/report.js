@@ -1,4 +1,4 @@
-const data = JSON.parse(document.getElementById("data").textContent);
+const data = JSON.parse(await unsqueezed("data"));
 const get = (id) => document.getElementById(id);
 const GREY = "#bbbbbb", MOST = 500;  // rows of a table at a time
 const runs = data.points.map((row) => ({...Object.fromEntries(data.columns.map((name, i) => [name, row[i]])), method: data.methods[row[1]], problem: data.problems[row[0]].name}));

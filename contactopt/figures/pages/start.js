@@ -28,11 +28,15 @@ function plain(name) {  // as text in a chart: plotly reads tags and formulas in
   return String(name).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("$", "&#36;");
 }
 
-async function plotly() {  // unpacks the library of charts
-  const packed = bytes(document.getElementById("plotly").textContent);
+async function unsqueezed(name) {  // the text that an element of this name holds compressed
+  const packed = bytes(document.getElementById(name).textContent);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).text();
+}
+
+async function plotly() {  // unpacks the library of charts
   const script = document.createElement("script");
-  script.textContent = await new Response(stream).text();
+  script.textContent = await unsqueezed("plotly");
   document.head.append(script);
 }
 

@@ -1,4 +1,4 @@
-const data = JSON.parse(document.getElementById("data").textContent);
+const data = JSON.parse(await unsqueezed("data"));
 const [LENGTH, STRESS, FORCE] = data.units;
 const flat = data.dim === 2;
 const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value.type ? unpack(value) : value]));
