@@ -107,7 +107,7 @@ def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
         pairs = pairs[pairs["success_x"] & pairs["success_y"]]
         ratios = pairs["cpu_seconds_y"] / pairs["cpu_seconds_x"]
         factor = float(np.exp(np.log(ratios).mean())) if len(pairs) else 1.0
-        for column in ("cpu_seconds", "call_seconds", "solve_seconds"):
+        for column in {"cpu_seconds", "call_seconds", "solve_seconds"} & {*rows}:
             rows[column] = rows[column] / factor
         known = rows["method"].isin(own["method"])
         rows["method"] = rows["method"].where(~known, rows["method"] + f" ({other.stem})")

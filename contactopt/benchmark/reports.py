@@ -110,7 +110,7 @@ def _check_figure(number: int, entry: Table) -> None:
 def publish(experiment: Path, results: Path, reports: Path) -> None:
     """Take the small table of a campaign over into REPORTS/NAME.
 
-    A large one keeps four digits, and the course of the tightest run of each method alone.
+    A large one keeps three digits, and the course of the tightest run of each method alone.
     """
     layout = read_layout(experiment)
     drawn = {entry["kind"] for entry in layout.figures}
@@ -123,7 +123,7 @@ def publish(experiment: Path, results: Path, reports: Path) -> None:
             "min"
         )
         for name in table.select_dtypes("float"):
-            table[name] = [float(f"{value:.4g}") for value in table[name]]
+            table[name] = [float(f"{value:.3g}") for value in table[name]]
     table["history"] = table["history"].where(kept, "[]")
     remove_files(folder, [f"rows.{kind}" for kind in TABLE_FILES])
     kind = TABLE_FILES[len(table) > MOST_LINES]
