@@ -25,8 +25,6 @@ POINT = ["problem", "start", "method", "tolerance"]
 JOINED = {
     "cpu": ("cpu_seconds", "median"),
     "wall": ("call_seconds", "median"),
-    "low": ("cpu_seconds", lambda t: t.quantile(0.25)),
-    "high": ("cpu_seconds", lambda t: t.quantile(0.75)),
     "residual": ("residual", "max"),
     "claimed": ("claimed", "all"),
     "status": ("status", "last"),
@@ -39,7 +37,10 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     """A row per problem, start, method and tolerance: times [s], worst certificate, memory."""
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
-    return table.assign(_memory=memory).groupby(POINT, sort=False).agg(**joined).reset_index()
+    groups = table.assign(_memory=memory).groupby(POINT, sort=False)
+    times = groups["cpu_seconds"]
+    quartiles = {"low": times.quantile(0.25), "high": times.quantile(0.75)}
+    return groups.agg(**joined).assign(**quartiles).reset_index()
 
 
 def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
