@@ -100,19 +100,21 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
 
 def label_right(ax: Any, ends: Sequence[tuple[float, str, str]]) -> None:
     """Write coloured names beside the axes at (height, name, colour), in order if crowded."""
-    low, high = ax.get_ylim()
-    rows = ax.figure.get_figheight() * 72 * 0.8 / ROOM
+    shares = ax.transScale + ax.transLimits  # to the height of the axes
+    right = ax.get_xlim()[1]
+    step = ROOM / (ax.figure.get_figheight() * 72 * 0.8)
     # equal heights: the first, which is the better, stands above
     ordered = sorted(reversed(ends), key=lambda end: end[0])
-    step, places = (high - low) / rows, list[float]()
-    for height, _, _ in ordered:
+    places = list[float]()
+    for at, _, _ in ordered:
+        height = float(shares.transform((right, at))[1])
         places.append(max(height, places[-1] + step) if places else height)
-    top = high
+    top = 1.0
     for i in reversed(range(len(places))):
         places[i] = top = min(places[i], top)
         top -= step
     for place, (_, name, colour) in zip(places, ordered):
-        where = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+        where = {"xycoords": "axes fraction", "textcoords": "offset points"}
         ax.annotate(name, (1.0, place), (4, 0), color=colour, va="center", fontsize=8, **where)
 
 

@@ -76,12 +76,11 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     import pandas as pd
 
     logs, solved = _logs(points, accuracy)
-    walls, _ = _logs(points, accuracy, "wall")
     low, high = _rank_interval(logs.to_numpy(float))
     claims = points[points["claimed"] & np.isfinite(points["residual"])]
     ratio = (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median()
     tried = points[points["status"] != "refused"].groupby("method")["problem"].nunique()
-    means = np.exp(logs.mean()) - SHIFT
+    means = mean_times(points, accuracy)
     made = pd.DataFrame(
         {
             "method": logs.columns,
@@ -90,7 +89,7 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
             "taken": tried.reindex(logs.columns).fillna(0).astype(int).to_numpy(),
             "mean": means.to_numpy(),
             "over the least": (means / means.min()).to_numpy(),
-            "wall mean": (np.exp(walls.mean()) - SHIFT).reindex(logs.columns).to_numpy(),
+            "wall mean": mean_times(points, accuracy, "wall").reindex(logs.columns).to_numpy(),
             "memory": points.groupby("method")["memory"].max().reindex(logs.columns).to_numpy(),
             "over claim": ratio.reindex(logs.columns).to_numpy(),
             "rank": means.rank(method="min", na_option="bottom").astype(int).to_numpy(),
@@ -117,6 +116,11 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
         bounds = zip(found["rank"], found["best"], found["worst"])
         shown = {"rank (95 %)": [f"{n} ({low} to {high})" for n, low, high in bounds]} | shown
     return found.assign(**shown)[list(shown)]
+
+
+def mean_times(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.Series[float]:
+    """Shifted geometric mean [s] of each method's time to an accuracy, as in `ranking`."""
+    return np.exp(_logs(points, accuracy, time)[0].mean()) - SHIFT
 
 
 def _logs(

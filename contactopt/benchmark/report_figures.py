@@ -33,12 +33,14 @@ from contactopt.benchmark.figure_style import (
     short_tick,
     write_numbers,
 )
-from contactopt.benchmark.ranking import achieved, points
+from contactopt.benchmark.ranking import achieved, mean_times, points
 from contactopt.benchmark.tables import INSTANCE, groups
 from contactopt.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
 
 
 def speed_accuracy(
@@ -131,6 +133,33 @@ def performance_profile(
     ax.set(xscale="log", xlim=(1, largest), ylim=(0, 1.03))
     ax.set(xlabel=f"ratio: {what} / the best method's [-]")
     ax.set(ylabel=f"share of the {len(wide)} instances solved")
+    ax.grid(alpha=0.3)
+    label_right(ax, ends)
+    return figure
+
+
+def time_to_accuracy(
+    table: pd.DataFrame, time: str = "cpu_seconds", labels: Mapping[str, str] = NO_LABELS
+) -> Any:
+    """Draw the mean time to a certificate, over the certificates of the figure.
+
+    It is the shifted geometric mean of the leader table: over the instances that somebody brought
+    so far, with a failure counted at its limit. So a method is not the faster for failing where the
+    others need time. The eight best at the middle have colours and names at their right ends.
+    """
+    figure, ax = make_figure()
+    found, which = points(table), "wall" if time == "call_seconds" else "cpu"
+    across = np.geomspace(*ACCURACIES)
+    curves = [mean_times(found, accuracy, which) for accuracy in across]
+    ends = []
+    for rank, full in enumerate(curves[len(curves) // 2].sort_values().index):
+        height = [float(curve.get(full, np.nan)) for curve in curves]
+        look = FAINT if rank >= len(COLOURS) else {"color": COLOURS[rank], "lw": 1.6}
+        ax.loglog(across, height, **look)
+        if rank < len(COLOURS):
+            ends.append((height[-1], short_label(str(full), labels), COLOURS[rank]))
+    ax.set(xlim=ACCURACIES[:2], xlabel="certificate that is reached [-]")
+    ax.set(ylabel=NAMES.get(time, time) + ", mean")
     ax.grid(alpha=0.3)
     label_right(ax, ends)
     return figure
@@ -302,5 +331,12 @@ def convergence(
 
 FIGURES: dict[str, Callable[..., Any]] = {
     f.__name__: f
-    for f in (speed_accuracy, performance_profile, time_against_size, stability_map, convergence)
+    for f in (
+        speed_accuracy,
+        time_to_accuracy,
+        performance_profile,
+        time_against_size,
+        stability_map,
+        convergence,
+    )
 }
