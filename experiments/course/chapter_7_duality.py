@@ -210,8 +210,9 @@ for way in (1.0, 10.0, 100.0, 1000.0):
     assert np.isclose(missing.value, (np.hypot(way, 1) - way) ** 2 / 4, rtol=0.1)
 
 # %% [markdown]
-# With a positive definite $Q$ and *without* rigid motions this cannot happen: then every
-# displacement is allowed to the springs, and one with $u_n > \mu |u_t|$ exists.
+# With a positive definite $Q$ and *without* rigid motions this cannot happen. Nothing restricts the
+# forces but the cone, and a cone with $\mu > 0$ has an inside: Slater's condition holds for the
+# program in forces. In other words, a node that runs away would stretch its springs.
 #
 # **Coulomb's law.** Its bound $g = \mu r_n$ is not given, but part of the answer. There is no
 # convex energy $P$ whose conjugate would be this bound, and so there is no dual problem. One thing
@@ -220,15 +221,18 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 # $$ r'\left(u + \mu |u_t|\, n\right) = r_n u_n + \left(\mu r_n |u_t| + r_t' u_t\right) \;\ge\; 0 , $$
 #
 # and it is zero exactly if $u$ and $r$ satisfy Coulomb's law. With $u = Qr + q$ the solutions are
-# the points at which this function of $r$ is zero. But it is not convex, so that a minimiser may
-# stop where it is not zero.
+# the forces in the cone with $u_n \ge 0$ at which this function of $r$ is zero. But it is not convex,
+# so that a minimiser may stop where it is not zero.
 #
-# | statement | needs |
+# | statement | is true if |
 # |---|---|
-# | $D(r) \le P(u)$ (weak duality) | nothing |
-# | values of both programs are equal | Slater's condition for one of them |
-# | the program in displacements has a solution | Slater's condition for the program in forces |
-# | the gap bounds the error of the forces | $Q$ positive definite |
+# | $D(r) \le P(u)$ (weak duality) | always |
+# | values of both programs are equal | Slater's condition holds for one of them |
+# | the program in displacements has a solution | Slater's condition holds for the program in forces, and its value is finite |
+# | the gap bounds the error of the forces | $Q$ is positive definite |
+#
+# The conditions are sufficient. In the plane all constraints are linear, and then the values are
+# equal, and both programs have solutions, as soon as both have admissible points.
 #
 # ## Exercises
 #
