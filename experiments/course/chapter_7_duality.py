@@ -84,21 +84,23 @@ assert np.allclose(forces.multipliers["slip"], u[1], atol=1e-4)
 # %% [markdown]
 # The multipliers of each program are the variables of the other one. In the sketch every multiplier
 # is an arrow. Orange are the forces, which are the multipliers of the program in displacements.
-# Blue is the slip, which is the multiplier of the program in forces.
+# Blue is the slip, which is the multiplier of the program in forces. The dotted node has not yet
+# slipped.
 
 # %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(4.6, 2.6), layout="constrained")
-ax.axhspan(-0.4, 0, color="0.8", lw=0)
+ax.axhspan(-0.85, 0, color="0.8", lw=0)
 ax.axhline(0, color="k", lw=1)
-ax.plot([0, u[1]], [0.35, 0.35], "o", ms=11, color="0.75", mec="k")
+for place, look in ((0, {"fc": "w", "ls": ":"}), (u[1], {"fc": "0.6"})):
+    ax.add_patch(plt.Circle((place, 0.1), 0.1, ec="k", **look))
 for tail, head, name, color in (
-    ((u[1], -0.4), (u[1], -0.4 + 0.35 * r[0]), "$r_n$", "C1"),
-    ((u[1] - 0.15, 0.35), (u[1] - 0.15 + 0.7 * r[1], 0.35), "$r_t$", "C1"),
-    ((0, 1.0), (u[1], 1.0), "$u_t$", "C0"),
+    ((u[1], -0.72), (u[1], -0.72 + 0.35 * r[0]), "$r_n$", "C1"),
+    ((u[1] - 0.12, 0.1), (u[1] - 0.12 + 0.7 * r[1], 0.1), "$r_t$", "C1"),
+    ((0, 0.6), (u[1], 0.6), "$u_t$", "C0"),
 ):
     ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
     ax.text((tail[0] + head[0]) / 2 + 0.08, (tail[1] + head[1]) / 2 + 0.1, name, color=color)
-ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.5, 1.4), aspect="equal")
+ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.85, 0.95), aspect="equal")
 _ = ax.axis("off")
 
 # %% [markdown]
@@ -178,9 +180,9 @@ ax.semilogy(gap, "k", lw=2)
 ax.semilogy(errors, "C3--")
 ax.text(75, 3e-6, "gap, mostly of contact")
 ax.text(100, 2.5e-8, "error", color="C3")
-for name, values, at in zip(("springs", "", "friction"), np.transpose(gaps), (90, 0, 115)):
+for name, values, at in zip(("springs", "", "friction"), np.transpose(gaps), (95, 0, 140)):
     ax.semilogy(np.maximum(values, 1e-12), lw=1, color="0.6")
-    ax.annotate(name, (at, values[at]), (6, -14), textcoords="offset points", color="0.4")
+    ax.annotate(name, (at, values[at]), (-30, -20), textcoords="offset points", color="0.4")
 ax.set(xlabel="step [-]", ylabel="energy [N mm]", ylim=(1e-9, None))
 _ = ax.margins(x=0)
 
