@@ -9,7 +9,8 @@ from contactopt.methods.alternating import Alternating
 from contactopt.methods.diagnosis import diagnose
 from contactopt.methods.enumeration import all_solutions
 from contactopt.methods.tresca_iteration import Tresca
-from contactopt.problem import Solution, Status
+from contactopt.problem import Solution, Status, amplification
+from contactopt.problem.certificate import yardsticks
 from contactopt.problem.laws.bilateral import Bilateral
 
 BOTH = (("alternating", Alternating()), ("tresca", Tresca()))
@@ -270,7 +271,7 @@ def test_nothing_is_guaranteed_for_rigid_bodies_or_dragged_plates():
 def test_the_punch_prints_in_a_few_lines(punch):
     report = diagnose(punch, solve(punch))
     assert report.held == 1 and report.rank == report.size - 1  # the node on the symmetry plane
-    assert len(str(report).splitlines()) == 7 and max(map(len, str(report).splitlines())) < 160
+    assert len(str(report).splitlines()) == 8 and max(map(len, str(report).splitlines())) < 160
 
 
 @pytest.mark.parametrize(
@@ -303,3 +304,57 @@ def test_units_do_not_matter(punch):
 def test_a_solution_of_something_else_is_refused(punch):
     with pytest.raises(InputError, match="needs a solution of this problem"):
         diagnose(changed(punch, 0.05), solve(punch))
+
+
+def relative_error(problem: InterfaceProblem, answer: Solution, exact: Solution) -> float:
+    """max |dr_i| / F, with the yardstick F of the certificate of the answer."""
+    r, exact_r = answer.reactions, exact.reactions
+    moved = (problem.Q @ r.ravel()).reshape(r.shape)
+    given = problem.q + (problem.V @ answer.multipliers).reshape(r.shape)
+    force = yardsticks(problem, r, moved, given).force
+    return float(np.linalg.norm(r - exact_r, axis=1).max() / force)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("plate", [False, True])
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_condition_times_certificate_bounds_the_error_of_forces(dim, plate, seed):
+    """Solutions for a slightly different q are answers with known errors; the bound is sharp."""
+    problem = random_problem(seed, dim, plate)
+    pressed = problem.q - np.eye(dim)[0]
+    problem = changed(problem, problem.mu, pressed)
+    exact = solve(problem, tol=1e-13)
+    factor = amplification(problem, exact.reactions, exact.multipliers)
+    rng, ratios = np.random.default_rng(seed), []
+    for _ in range(20):
+        change = 1e-6 * rng.choice([-1.0, 1.0], size=problem.q.shape)
+        other = solve(changed(problem, problem.mu, problem.q + change), tol=1e-13)
+        residual = natural_map_residual(problem, other.reactions, other.multipliers)
+        if residual > 1e-10:
+            ratios.append(relative_error(problem, other, exact) / residual)
+    assert ratios and 0.1 * factor < max(ratios) <= 1.01 * factor
+
+
+def test_a_small_certificate_of_wrong_forces_is_remarked():
+    """mu = 1 - 1e-9 of a node with the threshold 1: r_n = 1 is the one solution."""
+    wedge = InterfaceProblem([[1, -1], [-1, 2]], [[-1e-9, -5.0]], 1 - 1e-9)
+    answer = solve(wedge)
+    report = diagnose(wedge, answer)
+    wrong = abs(answer.reactions[0, 0] - 1) / np.abs(answer.reactions).max()
+    assert answer.solved and 0.01 < wrong < report.local.error < 10 * wrong
+    assert "other forces far away fit nearly as well" in str(report)
+    turned = InterfaceProblem(wedge.Q * 1e-6, wedge.q * 1e-3, wedge.mu)
+    other = diagnose(turned, solve(turned)).local
+    assert other.condition == pytest.approx(report.local.condition, rel=0.1)
+
+
+def test_forces_that_are_not_unique_have_no_condition():
+    """Two contacts of a rigid body share its weight as they like; sliding freely does not count."""
+    shared = InterfaceProblem(
+        np.zeros((4, 4)), np.zeros((2, 2)), 0.0, np.eye(4)[:, ::2] @ [[1.0], [1.0]], [-2.0]
+    )
+    free = np.array([[1.0, 0.0], [0.0, 1.0]] * 2)
+    r, lam = np.array([[1.0, 0.0], [1.0, 0.0]]), np.zeros(1)
+    assert amplification(shared, r, lam) > 1e12
+    loose = InterfaceProblem(np.eye(4), -r, 0.0, free, [-2.0, 0.0])
+    assert amplification(loose, r, np.zeros(2)) < 10

@@ -64,6 +64,7 @@ from contactopt.methods.driver import solve
 from contactopt.problem import (
     InterfaceProblem,
     Solution,
+    amplification,
     balance_residual,
     dimensionless,
     natural_map_residual,
@@ -75,6 +76,7 @@ from contactopt.problem.contact_status import contact_status
 CERTIFIED, DISTINCT = 1e-8, 1e-6
 # an eigenvalue with relatively less imaginary part is real; a smaller one is rounding
 REAL, ZERO = 1e-7, 1e-10
+MUCH = 1e-3  # relative error of forces that deserves a remark
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,8 @@ class Local:
     contraction  mu at which the Tresca map of these stick and slip sets gets spectral radius 1
     singular     mu at which it gets an eigenvalue +1 and the solution stops being isolated; inf:
                  never
+    condition    times the certificate bounds the relative error of the forces (`amplification`)
+    error        this bound: what is known of the forces [-]
     """
 
     stick: int
@@ -109,6 +113,8 @@ class Local:
     tresca_rate: float
     contraction: float
     singular: float
+    condition: float = np.nan
+    error: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -161,6 +167,11 @@ class Diagnosis:
                 f"at the solution: {at.stick} stick, {at.slip} slip, {at.open} open; rate of"
                 f" alternating {at.alternating_rate:.3g}, Tresca {at.tresca_rate:.3g} (1 at mu ="
                 f" {at.contraction:.3g}); isolated up to mu = {at.singular:.3g}"
+            )
+            far = "; other forces far away fit nearly as well" if at.error > MUCH else ""
+            lines.append(
+                f"error of its forces: at most {at.condition:.2g} times the certificate,"
+                f" {at.error:.1g} of the typical force, near this solution{far}"
             )
         return "\n".join(lines)
 
@@ -228,6 +239,8 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
                 f" {residual:.1e}."
             )
         local = _local(scaled, *scales.to_dimensionless(*answer), largest)
+        condition = amplification(problem, *answer)
+        local = replace(local, condition=condition, error=condition * residual)
     return Diagnosis(
         contacts=problem.contacts,
         dim=problem.dim,

@@ -1,6 +1,7 @@
 """The interface problem of frictional contact, its solution and its certificate."""
 
 from contactopt.problem.certificate import (
+    amplification,
     balance_residual,
     fit_multipliers,
     natural_map_residual,
@@ -26,6 +27,7 @@ __all__ = [
     "Solution",
     "Status",
     "alone",
+    "amplification",
     "balance_residual",
     "dimensionless",
     "fit_multipliers",

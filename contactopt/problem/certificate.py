@@ -43,8 +43,8 @@ What a certificate of at most tol promises for Coulomb friction, at every contac
 
 Under orthotropic friction P projects on ellipses, and the bound is that in the direction of r_t.
 The certificate does not bound the distance to a solution: where Q is nearly singular, forces that
-differ much have displacements that differ little. It is the same in all units, and costs one
-product with Q.
+differ much have displacements that differ little (`amplification` says how much). It is the same in
+all units, and costs one product with Q.
 """
 
 from __future__ import annotations
@@ -52,17 +52,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 from contactopt.errors import InputError
 from contactopt.linear.stacked import Stacked
 from contactopt.problem.cones import lengths
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
+from contactopt.problem.scaling import immovable
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
 # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
 ROUNDED = 1e-6
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
+UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
@@ -217,6 +220,57 @@ def balance_residual(
     size = np.maximum(np.abs(problem.s), problem.reach * sizes)
     relative = np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0)
     return float(np.max(np.where(error > 0, relative, 0.0)))
+
+
+def amplification(
+    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray
+) -> float:
+    """Bound the relative error |dr_i| / F of forces by this many times their certificate, to first
+    order: it is the condition of the solution.
+
+    The derivative of the natural map and of the balance by r and lambda is M = [[I - D + D rho Q,
+    D rho V], [V', 0]], D that of P. The certificate bounds every block of M (dr, dlambda), so that
+    the largest sum of norms in a row of blocks of M^-1 bounds dr. Motions that no force feels are
+    left out. It is meant near a solution at which no contact is between two states.
+
+    Parameters
+    ----------
+    problem : with the entries of Q
+    reactions : (k, dim) forces near a solution, normal first [force]
+    multipliers : (p,) displacements of the plates [length]
+
+    Returns
+    -------
+    The factor [-]; inf if the forces are not unique.
+    """
+    r, (k, dim) = np.asarray(reactions, dtype=float), problem.q.shape
+    if k == 0:
+        return 0.0
+    d = (problem.Q @ r.ravel()).reshape(r.shape)
+    w = problem.q + (problem.V @ multipliers).reshape(r.shape)
+    measure = yardsticks(problem, r, d, w)
+    D = problem.law.project(r - measure.rho[:, None] * (d + w))[1].copy()
+    D[~problem.law.rough, 1:] = 0.0  # no friction, no tangential force
+    D[immovable(problem).reshape(k, dim)] = 0.0
+    rows = la.block_diag(*(measure.rho[:, None, None] * D))
+    reach = np.where(problem.reach > 0, problem.reach, 1.0)
+    V, size = problem.V / reach, np.maximum(np.abs(problem.s) / reach / measure.force, 1.0)
+    _, felt, motions = la.svd(rows @ V, full_matrices=False)
+    Z = motions[felt > UNFELT * felt.max(initial=0.0)].T
+    scale, n = measure.length / measure.force, k * dim
+    M = np.block(
+        [
+            [np.eye(n) - la.block_diag(*D) + rows @ problem.Q, scale * rows @ V @ Z],
+            [(V @ Z).T, np.zeros((Z.shape[1],) * 2)],
+        ]
+    )
+    try:
+        inverse = np.linalg.inv(M)[:n].reshape(k, dim, -1)
+    except np.linalg.LinAlgError:
+        return np.inf
+    blocks = inverse[:, :, :n].reshape(k, dim, k, dim).transpose(0, 2, 1, 3)
+    own = np.linalg.norm(blocks, 2, axis=(2, 3)).sum(axis=1)
+    return float((own + np.linalg.norm(inverse[:, :, n:], axis=1) @ (abs(Z).T @ size)).max())
 
 
 def siconos_residual(

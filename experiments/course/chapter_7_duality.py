@@ -84,21 +84,23 @@ assert np.allclose(forces.multipliers["slip"], u[1], atol=1e-4)
 # %% [markdown]
 # The multipliers of each program are the variables of the other one. In the sketch every multiplier
 # is an arrow. Orange are the forces, which are the multipliers of the program in displacements.
-# Blue is the slip, which is the multiplier of the program in forces.
+# Blue is the slip, which is the multiplier of the program in forces. The dotted node has not yet
+# slipped.
 
 # %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(4.6, 2.6), layout="constrained")
-ax.axhspan(-0.4, 0, color="0.8", lw=0)
+ax.axhspan(-0.85, 0, color="0.8", lw=0)
 ax.axhline(0, color="k", lw=1)
-ax.plot([0, u[1]], [0.35, 0.35], "o", ms=11, color="0.75", mec="k")
+for place, look in ((0, {"fc": "w", "ls": ":"}), (u[1], {"fc": "0.6"})):
+    ax.add_patch(plt.Circle((place, 0.1), 0.1, ec="k", **look))
 for tail, head, name, color in (
-    ((u[1], -0.4), (u[1], -0.4 + 0.35 * r[0]), "$r_n$", "C1"),
-    ((u[1] - 0.15, 0.35), (u[1] - 0.15 + 0.7 * r[1], 0.35), "$r_t$", "C1"),
-    ((0, 1.0), (u[1], 1.0), "$u_t$", "C0"),
+    ((u[1], -0.72), (u[1], -0.72 + 0.35 * r[0]), "$r_n$", "C1"),
+    ((u[1] - 0.12, 0.1), (u[1] - 0.12 + 0.7 * r[1], 0.1), "$r_t$", "C1"),
+    ((0, 0.6), (u[1], 0.6), "$u_t$", "C0"),
 ):
     ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
     ax.text((tail[0] + head[0]) / 2 + 0.08, (tail[1] + head[1]) / 2 + 0.1, name, color=color)
-ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.5, 1.4), aspect="equal")
+ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.85, 0.95), aspect="equal")
 _ = ax.axis("off")
 
 # %% [markdown]
@@ -178,9 +180,9 @@ ax.semilogy(gap, "k", lw=2)
 ax.semilogy(errors, "C3--")
 ax.text(75, 3e-6, "gap, mostly of contact")
 ax.text(100, 2.5e-8, "error", color="C3")
-for name, values, at in zip(("springs", "", "friction"), np.transpose(gaps), (90, 0, 115)):
+for name, values, at in zip(("springs", "", "friction"), np.transpose(gaps), (95, 0, 140)):
     ax.semilogy(np.maximum(values, 1e-12), lw=1, color="0.6")
-    ax.annotate(name, (at, values[at]), (6, -14), textcoords="offset points", color="0.4")
+    ax.annotate(name, (at, values[at]), (-30, -20), textcoords="offset points", color="0.4")
 ax.set(xlabel="step [-]", ylabel="energy [N mm]", ylim=(1e-9, None))
 _ = ax.margins(x=0)
 
@@ -210,8 +212,9 @@ for way in (1.0, 10.0, 100.0, 1000.0):
     assert np.isclose(missing.value, (np.hypot(way, 1) - way) ** 2 / 4, rtol=0.1)
 
 # %% [markdown]
-# With a positive definite $Q$ and *without* rigid motions this cannot happen: then every
-# displacement is allowed to the springs, and one with $u_n > \mu |u_t|$ exists.
+# With a positive definite $Q$ and *without* rigid motions this cannot happen. Nothing restricts the
+# forces but the cone, and a cone with $\mu > 0$ has an inside: Slater's condition holds for the
+# program in forces. In other words, a node that runs away would stretch its springs.
 #
 # **Coulomb's law.** Its bound $g = \mu r_n$ is not given, but part of the answer. There is no
 # convex energy $P$ whose conjugate would be this bound, and so there is no dual problem. One thing
@@ -220,15 +223,18 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 # $$ r'\left(u + \mu |u_t|\, n\right) = r_n u_n + \left(\mu r_n |u_t| + r_t' u_t\right) \;\ge\; 0 , $$
 #
 # and it is zero exactly if $u$ and $r$ satisfy Coulomb's law. With $u = Qr + q$ the solutions are
-# the points at which this function of $r$ is zero. But it is not convex, so that a minimiser may
-# stop where it is not zero.
+# the forces in the cone with $u_n \ge 0$ at which this function of $r$ is zero. But it is not convex,
+# so that a minimiser may stop where it is not zero.
 #
-# | statement | needs |
+# | statement | is true if |
 # |---|---|
-# | $D(r) \le P(u)$ (weak duality) | nothing |
-# | values of both programs are equal | Slater's condition for one of them |
-# | the program in displacements has a solution | Slater's condition for the program in forces |
-# | the gap bounds the error of the forces | $Q$ positive definite |
+# | $D(r) \le P(u)$ (weak duality) | always |
+# | values of both programs are equal | Slater's condition holds for one of them |
+# | the program in displacements has a solution | Slater's condition holds for the program in forces, and its value is finite |
+# | the gap bounds the error of the forces | $Q$ is positive definite |
+#
+# The conditions are sufficient. In the plane all constraints are linear, and then the values are
+# equal, and both programs have solutions, as soon as both have admissible points.
 #
 # ## Exercises
 #

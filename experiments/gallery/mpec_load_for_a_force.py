@@ -7,14 +7,15 @@ unknown. Newton's method uses the derivative of the solution.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, solve
+from contactopt import InterfaceProblem, sensitivity, solve
 
 Q, wanted, push, steps = np.array([[2.0, 0.5], [0.5, 1.0]]), -0.25, 0.1, []
 at = lambda push: InterfaceProblem(Q, [[-1.0, push]], 0.8)  # noqa: E731
 for _ in range(4):
-    r_t = solve(at(push), tol=1e-12).reactions[0, 1]
-    slope = (solve(at(push + 1e-6), tol=1e-12).reactions[0, 1] - r_t) / 1e-6
-    push, steps = push + (wanted - r_t) / slope, [*steps, max(abs(wanted - r_t), 1e-16)]
+    answer = solve(at(push), tol=1e-12)
+    miss = wanted - answer.reactions[0, 1]
+    slope = sensitivity(at(push), answer).forward(q=[[0.0, 1.0]]).reactions[0, 1]
+    push, steps = push + miss / slope, [*steps, max(abs(miss), 1e-16)]
 assert steps[-1] < 1e-6
 plt.semilogy(steps, "o-")
 plt.gca().set(xlabel="step [-]", ylabel="error of the friction force [N]")
