@@ -19,6 +19,7 @@ import skfem
 from scipy.sparse.linalg import splu
 
 from contactopt.accuracy.equilibrated import Simplices
+from contactopt.errors import InputError
 
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
 SOFT = 1e-12  # of the energy: rigid motions of a fan leave as many equations over
@@ -112,7 +113,11 @@ def _least_energy(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray, materi
     size = Ki.diagonal().mean()
     soft = sp.diags(-SOFT / size * np.ones(3 * count))
     system = sp.bmat([[Ki, Ei.T], [Ei, soft]], format="csc")
-    solved = splu(system).solve(np.concatenate([-(K @ given)[inner], -E @ given]))
+    try:
+        factors = splu(system)
+    except RuntimeError as error:  # triangles without a height
+        raise InputError("pieces of the facets in contact are too short for a bound.") from error
+    solved = factors.solve(np.concatenate([-(K @ given)[inner], -E @ given]))
     given[inner] = solved[: len(inner)]
     data = cells.data(cells.seen(given.reshape(m.shape)), np.zeros(2))
     return float(cells.products(material, data, data).sum())
