@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import generate
+import museum
 
 import contactopt
 
@@ -27,6 +28,8 @@ exclude_patterns = [
     "accuracy.md",
     "performance.md",
     "course.md",
+    "museum.md",
+    "museum/*",
     "generated/notebooks",
     "**/__pycache__",
 ]
@@ -61,4 +64,5 @@ def setup(app):
         ),
     )
     app.connect("builder-inited", lambda app: generate.write_pages(Path(app.srcdir)))
+    app.connect("build-finished", lambda app, error: museum.write(Path(app.outdir) / "museum"))
     return {"parallel_read_safe": True}

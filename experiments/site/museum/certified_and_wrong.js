@@ -1,5 +1,8 @@
 const Q = [[1, -1], [-1, 2]];
-const problemOf = (p) => ({ Q, q: [-(10 ** -p.digits), p.q_t], mu: 1 - 10 ** -p.digits });
+function problemOf(p) {
+  const mu = 1 - 10 ** -p.digits;
+  return { Q, q: [-(1 - mu), p.q_t], mu };
+}
 
 /* The certificate of one node without plates, as contactopt.problem.certificate defines it. */
 function certificate({ Q, q, mu }, r) {
