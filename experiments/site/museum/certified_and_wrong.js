@@ -18,8 +18,8 @@ function certificate({ Q, q, mu }, r) {
 const room = {
   sliders: {
     digits: ["Nearness to the threshold: −log10 (1 − μ)", 0.3, 11, 0.01, 9],
-    r_n: ["Normal force to be judged, rn [N]", 0, 2, 0.001, 0.87],
-    q_t: ["Pull qt [mm]", -10, -3, 0.001, -5],
+    r_n: ["Normal force to be judged, rₙ [N]", 0, 2, 0.001, 0.87],
+    q_t: ["Pull qₜ [mm]", -10, -3, 0.001, -5],
   },
   breaks: [["Certified and wrong", { digits: 9, r_n: 0.87 }], ["Well conditioned", { digits: 0.3, r_n: 0.87 }], ["The solution", { digits: 9, r_n: 1 }]],
   answers(p) {
@@ -37,14 +37,14 @@ const room = {
     const points = range(201).map((i) => [i / 100, Math.log10(Math.max(judged(i / 100), 1e-14))]);
     const error = Math.abs(p.r_n - a.solution), accepted = a.certificate <= 1e-8, wrong = accepted && error > 0.01;
     const svg = plot(
-      { x: [0, 2], y: [-14.5, 1], xlabel: "normal force r_n [N]", ylabel: "log10 of the certificate", alt: `Certificate of all normal forces from 0 to 2 N. At ${show(p.r_n)} N it is ${show(a.certificate)}.` },
+      { x: [0, 2], y: [-14.5, 1], xlabel: "normal force rₙ [N]", ylabel: "log10 of the certificate", alt: `Certificate of all normal forces from 0 to 2 N. At ${show(p.r_n)} N it is ${show(a.certificate)}.` },
       [{ line: [[0, -8], [2, -8]], kind: "thin" }, { line: points, kind: "one" }, { line: [[1, -99], [1, 99]], kind: "three" }, { dot: [p.r_n, Math.log10(Math.max(a.certificate, 1e-14))], kind: "two" }],
     );
     return {
-      verdict: `The certificate is ${show(a.certificate, 3)}: ${accepted ? "accepted" : "refused"} at a tolerance of 10^−8. The error of the normal force is ${show(100 * error, 3)} percent.`,
+      verdict: `The certificate is ${show(a.certificate, 3)}: ${accepted ? "accepted" : "refused"} at a tolerance of 10⁻⁸. The error of the normal force is ${show(100 * error, 3)} percent.`,
       fails: wrong,
       figures: [[svg, [["one", "certificate"], ["three", "the only solution"], ["thin", "tolerance"], ["two", "judged forces"]]]],
-      rows: [["Friction coefficient", show(a.mu, 13)], ["Threshold of uniqueness", "1"], ["The solution rn [N]", "1"], ["Derivative drn / dqn [N/mm]", show(a.derivative, 3)]],
+      rows: [["Friction coefficient", show(a.mu, 13)], ["Threshold of uniqueness", "1"], ["The solution rₙ [N]", "1"], ["Derivative drₙ / dqₙ [N/mm]", show(a.derivative, 3)]],
     };
   },
 };

@@ -13,16 +13,16 @@ function iterates(f, x) {
 const room = {
   sliders: {
     mu: ["Friction coefficient μ [-]", 0.05, 3, 0.001, 0.6],
-    coupling: ["Coupling Qnt [mm/N]; Qnn = 1", -0.75, 0.75, 0.001, 0.5],
-    q_tt: ["Tangential compliance Qtt [mm/N]", 0.57, 3, 0.001, 1],
-    q_n: ["Load qn [mm]", -2, 2, 0.001, -1],
-    q_t: ["Load qt [mm]", -4, 4, 0.001, 3],
+    coupling: ["Coupling Qₙₜ [mm/N]; Qₙₙ = 1", -0.75, 0.75, 0.001, 0.5],
+    q_tt: ["Tangential compliance Qₜₜ [mm/N]", 0.57, 3, 0.001, 1],
+    q_n: ["Load qₙ [mm]", -2, 2, 0.001, -1],
+    q_t: ["Load qₜ [mm]", -4, 4, 0.001, 3],
     start: ["Start of both iterations", 0, 4, 0.001, 0.5],
   },
   breaks: [
     ["Tresca cycles", { mu: 2, coupling: -0.75, q_tt: 1, q_n: -1, q_t: 3, start: 0.4 }],
     ["Acary-Cadoux cycles", { mu: 1, coupling: 0.75, q_tt: 0.6, q_n: -0.25, q_t: 0.85, start: 0.9 }],
-    ["Both grow: not unique", { mu: 2.5, coupling: 0.7, q_tt: 1, q_n: 0.2, q_t: -0.2, start: 0.4 }],
+    ["Three solutions: the start decides", { mu: 2.5, coupling: 0.7, q_tt: 1, q_n: 0.2, q_t: 0.6, start: 0.7 }],
   ],
   answers(p) {
     const problem = problemOf(p), found = solutions(problem);

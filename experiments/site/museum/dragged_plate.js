@@ -4,8 +4,8 @@ const room = {
   sliders: {
     mu: ["Friction coefficient μ [-]", 0, 2, 0.001, 0.3],
     s: ["Pull on the slide, s [N]", -2, 2, 0.001, 0.5],
-    q_n: ["Load qn [mm]; negative presses", -2, 2, 0.001, -1],
-    coupling: ["Coupling Qnt [mm/N]; Qnn = Qtt = 1", -0.95, 0.95, 0.001, 0],
+    q_n: ["Load qₙ [mm]; negative presses", -2, 2, 0.001, -1],
+    coupling: ["Coupling Qₙₜ [mm/N]; Qₙₙ = Qₜₜ = 1", -0.95, 0.95, 0.001, 0],
   },
   breaks: [
     ["No solution", { mu: 0.3, s: 0.5, q_n: -1, coupling: 0 }],
@@ -21,7 +21,7 @@ const room = {
     const wide = Math.max(1, Math.abs(p.s) * 1.5);
     const line = [[-wide, (p.coupling * wide) - p.q_n], [wide, -p.coupling * wide - p.q_n]];
     const svg = plot(
-      { x: [-wide, wide], y: [-0.1 * high, high], xlabel: "friction r_t [N]", ylabel: "normal force r_n [N]", alt: a.forces ? "The point of balance and closed gap lies in Coulomb's cone." : "The point of balance and closed gap lies outside Coulomb's cone." },
+      { x: [-wide, wide], y: [-0.1 * high, high], xlabel: "friction rₜ [N]", ylabel: "normal force rₙ [N]", alt: a.forces ? "The point of balance and closed gap lies in Coulomb's cone." : "The point of balance and closed gap lies outside Coulomb's cone." },
       [
         { area: [[0, 0], [-p.mu * high, high], [p.mu * high, high]], kind: "ink" },
         { line, kind: "one" }, { line: [[-p.s, -99], [-p.s, 99]], kind: "two" },

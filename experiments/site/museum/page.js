@@ -1,10 +1,11 @@
 "use strict";
 /* Pictures in SVG, sliders, and the words that say what they show. */
 
+const raised = (power) => [...power].map((x) => ({ "-": "\u207b" })[x] || "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[x]).join("");
 const show = (x, digits = 4) =>
   x === null || x === undefined ? "none"
   : x === Infinity ? "infinite"
-  : String(Number(x.toPrecision(digits))).replace("-", "\u2212").replace("e", "\u00b710^");
+  : String(Number(x.toPrecision(digits))).replace(/^-/, "\u2212").replace(/e\+?(.*)$/, (_, power) => `\u00b710${raised(power)}`);
 
 function ticks([low, high]) {
   const raw = (high - low) / 5, power = 10 ** Math.floor(Math.log10(raw));
@@ -77,7 +78,7 @@ function start(room) {
     draw();
   };
   for (const [name, [label, low, high, step]] of Object.entries(room.sliders)) {
-    box.insertAdjacentHTML("beforeend", `<div><label for="${name}">${label}</label><input type="range" id="${name}" min="${low}" max="${high}" step="${step}"><output id="${name}-value" for="${name}"></output></div>`);
+    box.insertAdjacentHTML("beforeend", `<div><label for="${name}">${label}</label><output id="${name}-value" for="${name}"></output><input type="range" id="${name}" min="${low}" max="${high}" step="${step}"></div>`);
     find(name).addEventListener("input", (event) => {
       set(name, event.target.value);
       draw();

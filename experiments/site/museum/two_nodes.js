@@ -25,15 +25,15 @@ function thresholdOf(Q) {
 const room = {
   sliders: {
     mu: ["Friction coefficient μ [-]", 0, 6, 0.001, 1],
-    own: ["Coupling of a node with itself, Qnt [mm/N]", -0.45, 0.45, 0.001, 0.3],
-    cross: ["Coupling across the nodes, Qnt [mm/N]", -0.45, 0.45, 0.001, 0.2],
-    q_n: ["Load qn of both nodes [mm]", -2, 2, 0.001, 0.1],
-    q_t1: ["Load qt of node 1 [mm]", -2, 2, 0.001, -1],
-    q_t2: ["Load qt of node 2 [mm]", -2, 2, 0.001, -1],
+    own: ["Coupling of a node with itself, Qₙₜ [mm/N]", -0.45, 0.45, 0.001, 0.3],
+    cross: ["Coupling across the nodes, Qₙₜ [mm/N]", -0.45, 0.45, 0.001, 0.2],
+    q_n: ["Load qₙ of both nodes [mm]", -2, 2, 0.001, 0.1],
+    q_t1: ["Load qₜ of node 1 [mm]", -2, 2, 0.001, 1],
+    q_t2: ["Load qₜ of node 2 [mm]", -2, 2, 0.001, 0.8],
   },
   breaks: [
-    ["Nine solutions", { mu: 6, own: 0.45, cross: 0, q_n: 0.1, q_t1: -0.35, q_t2: -0.35 }],
-    ["Three solutions", { mu: 6, own: 0.3, cross: 0.2, q_n: 0.1, q_t1: -1, q_t2: -1 }],
+    ["Nine solutions", { mu: 6, own: 0.45, cross: 0, q_n: 0.1, q_t1: 1, q_t2: 1 }],
+    ["Three solutions", { mu: 6, own: 0.3, cross: 0.2, q_n: 0.1, q_t1: 1, q_t2: 0.8 }],
   ],
   answers(p) {
     const found = solutions(problemOf(p));
@@ -53,7 +53,7 @@ const room = {
     );
     const key = [["one", "all solutions"], ["thin", "threshold μ*"], ["two", "at the chosen μ"]];
     return {
-      verdict: `${k} solution${k === 1 ? "" : "s"} of this load. ` + (below ? "The hypothesis holds: μ is below μ*." : "The hypothesis is broken: μ is above μ*, and some loads have several solutions."),
+      verdict: `${k} solution${k === 1 ? "" : "s"} of this load. ` + (below ? "The hypothesis holds: μ is below μ*." : "The hypothesis is broken: μ is above μ*."),
       fails: !below,
       figures: [[figure(0), key], [figure(1), key]],
       rows: [
