@@ -202,7 +202,10 @@ def blackboard(problem, g, r, v):
     for program in (dual, primal):
         program.parameters["g"].value = np.full(problem.contacts, g)
     dual.variables["r"].value = np.reshape(r, dual.variables["r"].shape)
-    primal.variables["u"].value = np.reshape(v, primal.variables["u"].shape)
+    values = {"u": np.array(v), "z": np.array(v) - problem.q.ravel(), "lambda": np.zeros(0)}
+    for variable in (*primal.problem.variables(), *dual.problem.variables()):
+        if variable.value is None:
+            variable.value = values[variable.name()]
     return float(dual.problem.objective.value), float(primal.problem.objective.value)
 
 
