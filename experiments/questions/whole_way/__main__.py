@@ -225,8 +225,8 @@ What the ways are:
 
 - **CalculiX, GetFEM, Kratos**: other finite-element codes on the nodes and elements of our graded
   linear block. They are given the contact zone, which our ways find in a loop over meshes, and they
-  prescribe the depth of the indenter, not its force. CalculiX takes contact by a penalty, GetFEM and
-  Kratos by augmented Lagrangians.
+  prescribe the depth of the indenter, not its force. CalculiX takes contact by a penalty, and the
+  other two by augmented Lagrangians.
 
 The rough surface has waves down to a 64th of its side. There is no exact answer: the share of the
 points that touch is compared with that of {finest} x {finest} points.
