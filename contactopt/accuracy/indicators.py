@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -100,6 +100,27 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
         errors = tuple(inside + share for inside, share in zip(errors, added))
         between = float(sum(share.sum() for share in added))
     return ElementErrors(value, errors, norm, between)
+
+
+def along_path(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:
+    """What each element adds to the error of a quantity of a scene, or of a load path.
+
+    Friction remembers the slip of earlier states, so that their errors matter at the end of a path
+    as well. No adjoint goes back over its steps: the elements are marked by the energy of the error
+    of every state, in which the largest one counts for all.
+    """
+    if solved.path is None:
+        return element_errors(solved, quantity, value)
+    energy = replace(quantity, name=ENERGY)
+    found = []
+    for number, state in enumerate(solved.path.states):
+        reduction = solved.reduction.loaded(state.scene)
+        reduction = replace(reduction, problem=solved.path.problem(number))
+        one = replace(solved, reduction=reduction, solution=state.solution, path=None)
+        found.append(element_errors(one, energy, value))
+    bodies = tuple(np.max(own, axis=0) for own in zip(*(each.bodies for each in found)))
+    worst = max(each.energy for each in found)
+    return ElementErrors(value, bodies, worst, unsigned=True)
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:

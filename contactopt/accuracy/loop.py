@@ -11,7 +11,7 @@ import numpy as np
 
 from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
-from contactopt.accuracy.estimate import Estimate, Judged, Level
+from contactopt.accuracy.estimate import Estimate, Judged, Level, read
 from contactopt.accuracy.everywhere import Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
@@ -81,9 +81,10 @@ def refine(
             f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as"
             " in 'pressure@X,Y'."
         )
-    if adaptive and len(states) > 1:
+    if asked.column and len(states) == 1:
         raise InputError(
-            f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
+            f"the {quantity} is that of a load path, and scene '{scene.name}' has one state; give"
+            " it steps, or ask for another quantity."
         )
     options = _in_time(options or Options(), accuracy)
     search: Everywhere | Locally
@@ -152,7 +153,7 @@ class _Loop:
             raise InputError(
                 f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
             )
-        reading = self.quantity.read(reduction, solution)
+        reading = read(self.quantity, solved)
         facts = self.search.facts(solved)
         judged = self.search.judge(solved, reading)
         self.solved, self.reading, self.judged, self.states = solved, reading, judged, states
