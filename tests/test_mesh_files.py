@@ -458,11 +458,91 @@ def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path)
         ("101,102", "999,102", "names a node that is not there"),
         ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "cannot be read as abaqus"),
         ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
-        ("*Heading", "*PART, NAME=A\n*PART, NAME=B", "several parts"),
+        ("TYPE=C3D20", "TYPE=C3D21", "elements of type C3D21R are not known"),
+        ("up, S1", "upper, S1", "there is no set upper of elements"),
+        ("FLOOR, range", "FLOOR, RANGES", "there is no set RANGES of nodes"),
     ):
         (tmp_path / "two.inp").write_text(text.replace(old, new))
         with pytest.raises(InputError, match=words):
             load_mesh(tmp_path / "two.inp", "LOW")
+
+
+ASSEMBLY = """*Heading
+*Part, name=Brick
+*Node
+{brick}
+*Element, type=C3D20, elset=All
+1, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,
+16,17,18,19,20
+*Nset, nset=Under
+1, 2, 3, 4
+*Elset, elset=_Over_S2, internal
+1,
+*Surface, type=ELEMENT, name=Over
+_Over_S2, S2
+*Surface, type=ELEMENT, name=Skin
+All
+*End Part
+*Part, name=Tool
+*Surface, type=SEGMENTS, name=Rigid
+START, 0., 0.
+*End Part
+*Assembly, name=Assembly
+*Instance, name=Low, part=Brick
+*End Instance
+*Instance, name=Up, part=Brick
+ 0., 0., 3.
+ 0., 0., 3., 0., 1., 3., 90.
+*End Instance
+*Instance, name=Tool-1, part=TOOL
+*End Instance
+*Nset, nset=Foot, instance=Low
+1, 2, 3, 4
+*Nset, nset=Side, instance=Up
+Under
+*Nset, nset=Under, instance=Low
+5, 6, 7, 8
+*Elset, elset=Both
+Low.All, Up.1
+*Surface, type=ELEMENT, name=Front
+Low._Over_S2, S3
+*End Assembly
+"""
+
+
+def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
+    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height:
+    (x, y, z) goes to (z, y, 3 - x).
+    """
+    path, text = tmp_path / "two.inp", ASSEMBLY.format(brick=brick_of_twenty(0.0, 1))
+    path.write_text(text)
+    low, up = load_mesh(path, "Low"), load_mesh(path, "Up")
+    for mesh, z in ((low, 0), (up, 2)):
+        assert volume(mesh) == pytest.approx(1.0)
+        np.testing.assert_allclose(mesh.p.min(axis=1), [0, 0, z], atol=1e-12)
+        assert len(mesh.boundaries["Skin"]) == 6 and flux(mesh, "Skin") == pytest.approx(3.0)
+    assert set(low.boundaries) == {"Foot", "Under", "Low.Under", "Over", "Front", "Skin"}
+    assert set(up.boundaries) == {"Side", "Up.Under", "Over", "Skin"}
+    for mesh, name, axis, value in (
+        (low, "Foot", 2, 0.0), (low, "Low.Under", 2, 0.0), (low, "Under", 2, 1.0),
+        (low, "Over", 2, 1.0), (low, "Front", 1, 0.0),
+        (up, "Side", 0, 0.0), (up, "Up.Under", 0, 0.0), (up, "Over", 0, 1.0),
+    ):  # fmt: skip
+        corners = mesh.p[axis, mesh.facets[:, mesh.boundaries[name]]]
+        np.testing.assert_allclose(corners, value, atol=1e-12)
+    for old, new, words in (
+        ("Low.All, Up.1", "Low.All, Up.None", "there is no set None of elements"),
+        ("instance=Low", "instance=Lowest", "there is no instance Lowest"),
+        ("part=TOOL", "part=Toll", "is of part Toll, which is not there; parts: brick, tool"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=words):
+            load_mesh(path, "Low")
+    path.write_text(text)
+    with pytest.raises(InputError, match="no group 'Tool-1'; its groups of elements are Low, Up"):
+        load_mesh(path, "Tool-1")
+    with pytest.raises(InputError, match="falls into 2 pieces"):
+        load_mesh(path, "Both")
 
 
 @pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])
