@@ -20,6 +20,7 @@ from contactopt.meshes.cells import area_vectors, outer_corners
 OPPOSED = -0.7  # cosine of the angle between normals
 NEAREST = 12  # facets of the other body that are tried
 SIZE = 0.005  # usual distance, over the diagonal of the box around all bodies
+CLOSED = 1e-6  # of the distance, within which a gap is what rounding leaves of zero
 LEAST = 0.02  # of the area of the smaller boundary, which must face the other one
 
 
@@ -60,9 +61,10 @@ def facing_boundaries(meshes: Mapping[str, Any], distance: float) -> list[Facing
 
 
 def as_toml(pairs: Iterable[Facing], mu: Any, length: str) -> str:
-    """The pairs as the tables of a scene file, with their friction and the unit of length."""
+    """The pairs as the tables of a scene file, with their friction and a unit of length or ''."""
+    unit = length and f" {length}"
     return "\n".join(
-        f"[[contacts]]  # gaps from {pair.gaps[0]:.3g} to {pair.gaps[1]:.3g} {length},"
+        f"[[contacts]]  # gaps from {pair.gaps[0]:.3g} to {pair.gaps[1]:.3g}{unit},"
         f" {pair.share:.0%} of the areas\n"
         f'upper = "{":".join(pair.sides[0])}"\nlower = "{":".join(pair.sides[1])}"\n'
         f"mu = {json.dumps(mu)}"
@@ -124,7 +126,8 @@ def _pairs(upper: str, one: _Surface, lower: str, two: _Surface, distance: float
     made, covered = [], np.zeros(len(i), dtype=bool)
     for share, first, second, chosen in sorted(tried, key=lambda own: -own[0]):
         if not covered[chosen].all():
-            gaps = float(gap[chosen].min()), float(gap[chosen].max())
+            own = np.where(np.abs(gap[chosen]) < CLOSED * distance, 0.0, gap[chosen])
+            gaps = float(own.min()), float(own.max())
             made.append(Facing(((upper, first), (lower, second)), float(share), gaps))
         covered |= chosen
     return made
