@@ -545,6 +545,88 @@ def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
         load_mesh(path, "Both")
 
 
+def exodus_bricks(path, hdf5):
+    """Two bricks of twenty nodes, one on the other, and a tetrahedron beside them."""
+    places = np.array([
+        [float(word) for word in line.split(",")[1:]]
+        for z in (0.0, 1.0) for line in brick_of_twenty(z, 1).splitlines()
+    ])  # fmt: skip
+    corners = np.array([[5, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1.0]])
+    # edges: those below, those along the third axis, those above
+    order = np.array([*range(12), 16, 17, 18, 19, 12, 13, 14, 15]) + 1
+    letters = np.zeros((3, 8), dtype="S1")
+    for row, name in zip(letters, ("low", "up", "tip")):
+        row[: len(name)] = list(name)
+    values = {
+        "coordx": np.append(places[:, 0], corners[:, 0]),
+        "coordy": np.append(places[:, 1], corners[:, 1]),
+        "coordz": np.append(places[:, 2], corners[:, 2]),
+        "eb_prop1": np.array([10, 20, 30]), "eb_names": letters,
+        "connect1": order[None], "connect2": order[None] + 20,
+        "connect3": np.array([[41, 42, 43, 44]]),
+        "ss_prop1": np.arange(1, 7),
+        **{f"elem_ss{k}": np.array([1, 2, 3][: 3 if k < 5 else 2]) for k in range(1, 7)},
+        **{f"side_ss{k}": np.full(3 if k < 5 else 2, k) for k in range(1, 7)},
+        "ns_prop1": np.array([7]), "node_ns1": np.array([1, 2, 3, 4]),
+    }  # fmt: skip
+    kinds = {"connect1": "HEX20", "connect2": "HEX20", "connect3": "TETRA4"}
+    if hdf5:
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            for name, value in values.items():
+                file[name] = value
+            for name, kind in kinds.items():
+                file[name].attrs["elem_type"] = np.bytes_(kind)
+        return
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w") as file:
+        for name, value in values.items():
+            lengths = tuple(f"{name}_{axis}" for axis in range(value.ndim))
+            for length, size in zip(lengths, value.shape):
+                file.createDimension(length, size)
+            value = value if value.dtype.kind != "i" else value.astype("i4")
+            file.createVariable(name, value.dtype, lengths)[:] = value
+        for name, kind in kinds.items():
+            file.variables[name].elem_type = kind
+
+
+@pytest.mark.parametrize("hdf5", [False, True])
+def test_exodus_files_keep_the_names_of_blocks_and_their_side_sets(tmp_path, hdf5):
+    path = tmp_path / "bricks.exo"
+    exodus_bricks(path, hdf5)
+    low, up, tip = (load_mesh(path, name) for name in ("low", "up", "tip"))
+    assert type(up) is skfem.MeshHex2 and type(tip) is skfem.MeshTet1
+    for mesh, size in ((low, 1.0), (up, 1.0), (tip, 1 / 6)):
+        assert volume(mesh) == pytest.approx(size) and flux(mesh) == pytest.approx(3 * size)
+    # of a brick: (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (1, 5, 8, 4), (1, 4, 3, 2), (5, 6, 7, 8)
+    for side, (axis, value) in enumerate(((1, 0), (0, 1), (1, 1), (0, 0), (2, 0), (2, 1)), 1):
+        for mesh, z in ((low, 0), (up, 1)):
+            corners = mesh.p[:, mesh.facets[:, mesh.boundaries[f"side {side}"]]]
+            assert corners.shape[2] == 1
+            np.testing.assert_allclose(corners[axis], value + (z if axis == 2 else 0), atol=1e-12)
+    for side, axis in ((1, 1), (3, 0), (4, 2)):  # of a tetrahedron; its second side is oblique
+        corners = tip.p[:, tip.facets[:, tip.boundaries[f"side {side}"]]]
+        np.testing.assert_allclose(corners[axis], 5.0 if axis == 0 else 0.0, atol=1e-12)
+    assert set(low.boundaries) == {"nodes 7", *(f"side {k}" for k in range(1, 7))}
+    with pytest.raises(InputError, match="its groups of elements are low, up, tip"):
+        load_mesh(path, "middle")
+    path.write_bytes(path.read_bytes()[: 400 if not hdf5 else 1000])
+    with pytest.raises(InputError, match="cannot be read as exodus"):
+        load_mesh(path)
+
+
+def test_groups_of_med_files_keep_their_names(gmsh, tmp_path):
+    pytest.importorskip("h5py")
+    disc_in_plate(gmsh, tmp_path / "a.msh", 3, 2)
+    gmsh.write(str(tmp_path / "a.med"))
+    for name in ("disc", "plate"):
+        own, other = (load_mesh(tmp_path / file, name) for file in ("a.msh", "a.med"))
+        assert set(own.boundaries) == set(other.boundaries) == {"rim"}
+        assert other.nelements == own.nelements
+        assert volume(other) == pytest.approx(volume(own), rel=1e-12)
+        assert flux(other, "rim") == pytest.approx(flux(own, "rim"), rel=1e-12)
+
+
 @pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])
 def test_plane_elements_of_calculix(tmp_path, kind, count):
     corners = [[1, 0], [2, 0], [2, 1], [1, 1]] if count in (4, 8) else [[1, 0], [2, 0], [1, 1]]

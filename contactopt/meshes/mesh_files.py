@@ -64,9 +64,16 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
     """
     groups = read_groups(path)
     found: dict[str | None, skfem.Mesh] = {}
-    refused = []
-    names: list[Any] = [*groups.names(_place(path, groups)[0])]
+    refused: list[str] = []
+    known: dict[Any, str] = {}
+    dim = _place(path, groups)[0]
+    names: list[Any] = [*groups.names(dim)]
     for group in names or [None]:
+        own = groups.members.get((group, dim), {})
+        same = tuple((i, elements.tobytes()) for i, elements in sorted(own.items()))
+        if known.setdefault(same, group) != group:
+            refused.append(f"group {group!r} is the same as {known[same]!r}")
+            continue
         try:
             found[group] = _body(path, groups, group, 1.0)
         except InputError as error:
