@@ -7,10 +7,14 @@ and VS Code open from the same file. MathJax comes with sphinx-mathjax-offline: 
 from elsewhere, neither when they are built nor when they are read.
 """
 
+import os
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
+SITE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
+sys.path[:0] = [str(SITE), str(ROOT)]
+# the chapters import the exercises of the course, in processes of their own
+os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 import docstrings
 import generate
 
