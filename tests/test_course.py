@@ -191,6 +191,13 @@ def test_what_is_no_answer_gets_one_sentence(answer, kind):
     assert verdict.sentence.endswith("Give 2 numbers: gap [mm], force [N].")
 
 
+def test_rounding_to_three_digits_and_arrays_of_one_number_are_right():
+    assert grade("3.5", (3.63, 1.91, 1.15)).right and not grade("3.5", (3.63, 1.90, 1.15)).right
+    assert grade("1.2", np.array([2.64])).right and not grade("1.2", 2.65).right
+    assert grade("6.7", 218).right and not grade("6.7", 217.9).right
+    assert grade("1.2", 2640.0).kind == "unit"
+
+
 # two nodes in space; each case spoils one condition at the second node
 PRESSED = InterfaceProblem(
     np.diag([1.0, 1.0, 1.0, 1.0, 2.0, 2.0]),
@@ -273,15 +280,11 @@ def test_the_worst_contact_is_drawn(number):
     assert len(plt.get_fignums()) == 1
 
 
-def cells_of(name, text):
-    return json.loads(nbgrader.source_notebook(name, text))["cells"]
-
-
 @pytest.mark.parametrize("name", list(CHAPTERS))
 def test_nbgrader_gets_an_answer_and_a_graded_cell_for_each_exercise(name):
     marked = [
         (cell["metadata"]["nbgrader"], "".join(cell["source"]))
-        for cell in cells_of(name, CHAPTERS[name].read_text())
+        for cell in json.loads(nbgrader.source_notebook(CHAPTERS[name].read_text()))["cells"]
         if "nbgrader" in cell["metadata"]
     ]
     answers = [text for mark, text in marked if mark["solution"]]

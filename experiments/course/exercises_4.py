@@ -23,8 +23,8 @@ E, nu = 5.0, 0.3  # MPa, -: the block of the chapter
 
 
 @cache
-def block() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Stiffness K and integral C of p(U) p(v) h / E of the free unknowns, and Q and q."""
+def block() -> tuple[np.ndarray, ...]:
+    """Stiffness K and integral C of p(U) p(v) h / E of the free unknowns, Q, q, and places x."""
     mesh = MeshTri.init_tensor(np.linspace(-2, 2, 33), np.linspace(0, 2, 17)).with_boundaries(
         {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2}
     )
@@ -49,12 +49,14 @@ def block() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         stiff, np.column_stack([np.eye(len(free))[:, places], -(K @ down)[free]])
     )
     q = moved[places, -1].reshape(-1, 2)
-    q[:, 0] += mesh.p[0, bottom.nodal_ix] ** 2 / 20
-    return stiff, C, moved[places, :-1], q
+    x = mesh.p[0, bottom.nodal_ix]
+    q[:, 0] += x**2 / 20
+    return stiff, C, moved[places, :-1], q, x
 
 
 def rough(law: laws.Law | float = 0.1) -> InterfaceProblem:
-    return InterfaceProblem(*block()[2:], law)
+    _, _, Q, q, x = block()
+    return InterfaceProblem(Q, q, law, coordinates=[x])
 
 
 def forces_of(law: laws.Law | float) -> np.ndarray:

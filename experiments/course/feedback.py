@@ -17,7 +17,8 @@ import numpy as np
 from contactopt import InterfaceProblem, laws, natural_map_residual
 from contactopt.problem.certificate import Yardsticks, fit_multipliers, yardsticks
 
-CLOSE = 1e-3  # relative error that still counts as right: three digits from pen and paper
+CLOSE = 1e-3  # relative error of numbers, and certificate of forces, that still counts as right
+TOLD = 0.2  # a condition is told first if its violation is this share of the largest one
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,9 @@ class State:
 
 @dataclass(frozen=True)
 class Numbers:
-    """The answer agrees with numbers to a relative error; `names` says what each of them is."""
+    """The answer agrees with numbers to a relative error, or is rounded to three digits; integers
+    are exact.
+    """
 
     value: Any
     close: float = CLOSE
@@ -118,10 +121,12 @@ class Numbers:
     def agrees(self, answer: Any, value: Any) -> bool:
         """Whether two answers are the same to the accuracy that is asked for."""
         a, b = np.asarray(answer, dtype=float), np.asarray(value, dtype=float)
-        size = float(np.abs(b).max(initial=0.0))
-        return a.shape == b.shape and bool(
-            np.allclose(a, b, rtol=self.close, atol=0.1 * self.close * size)
-        )
+        if a.shape != b.shape or np.asarray(self.value).dtype.kind == "i":
+            return np.array_equal(a, b)
+        least = 0.1 * self.close * float(np.abs(b).max(initial=0.0))
+        rounded = np.array([float(f"{x:.3g}") for x in b.ravel()]).reshape(b.shape)
+        same = np.isclose(a, b, rtol=self.close, atol=least) | np.isclose(a, rounded, rtol=1e-12)
+        return bool(same.all())
 
     def verdict(self, answer: np.ndarray) -> Verdict:
         value = np.asarray(self.value, dtype=float)
@@ -133,14 +138,16 @@ class Numbers:
             return wrong("order", "These are the right numbers in a wrong order.")
         for factor in (1e-6, 1e-3, 1e3, 1e6):
             if self.agrees(factor * answer, value):
-                return wrong("unit", f"Your answer is {1 / factor:g} times the right one: units.")
+                return wrong(
+                    "unit", f"Your answer is {1 / factor:g} times the right one. Look at the units."
+                )
         for factor in (0.5, 2.0):
             if self.agrees(factor * answer, value):
                 return wrong("half", "A factor of two is missing, or one too many.")
         good = [i + 1 for i in range(answer.size) if self._part(answer, value, i)]
         if good and value.size > 1:
             return wrong("part", f"Of your {value.size} numbers these are right: {good}.")
-        return wrong("number", "")
+        return wrong("number", "This is none of the mistakes that are often made.")
 
     def _part(self, answer: np.ndarray, value: np.ndarray, i: int) -> bool:
         return self.agrees(answer.ravel()[i], value.ravel()[i])
@@ -182,17 +189,19 @@ def as_numbers(answer: Any, right: Right, asks: str) -> np.ndarray | Verdict:
         )
     if not np.all(np.isfinite(given)):
         return wrong("type", f"Not every number of your answer is finite. {wanted}")
-    if given.shape not in right.shapes:
-        return wrong("shape", f"Your answer holds {_size(given.shape)}. {wanted}")
-    return given.astype(float)
+    flat = np.squeeze(given).shape
+    for shape in right.shapes:
+        if given.shape == shape or flat == tuple(n for n in shape if n > 1):
+            return given.astype(float).reshape(shape)
+    return wrong("shape", f"Your answer holds {_size(given.shape)}. {wanted}")
 
 
 def _size(shape: Sequence[int]) -> str:
     if len(shape) == 0:
         return "one number"
     if len(shape) == 1:
-        return f"{shape[0]} number{'s' if shape[0] > 1 else ''}"
-    return f"{shape[0]} row{'s' if shape[0] > 1 else ''} of {shape[1]} numbers"
+        return f"{shape[0]} number{'' if shape[0] == 1 else 's'}"
+    return f"{shape[0]} row{'s' if shape[0] > 1 else ''} of {_size(shape[1:])}"
 
 
 def judge_forces(problem: InterfaceProblem, r: np.ndarray) -> Verdict:
@@ -258,9 +267,11 @@ def _worst(problem: InterfaceProblem, r: np.ndarray) -> Verdict:
             "balance",
             f"The contact forces do not balance the load in {what}: V' r + s is {missing[j]:.3g}.",
         )
-    for kind, size, tell in _conditions(problem, r, u, measure):
+    conditions = _conditions(problem, r, u, measure)
+    least = max(CLOSE, TOLD * max(float(size.max()) for _, size, _ in conditions))
+    for kind, size, tell in conditions:
         i = int(np.argmax(size))
-        if size[i] > CLOSE:
+        if size[i] > least:
             more = int(np.sum(size > CLOSE)) - 1
             where = "The node" if problem.contacts == 1 else f"Contact {i}"
             also = f" So {'do' if more > 1 else 'does'} {more} more." if more else ""
@@ -291,7 +302,7 @@ def _conditions(
             (shear - bound) / F,
             lambda i: (
                 f"carries the friction force {shear[i]:.3g} N, beyond its bound {bound[i]:.3g} N."
-                " So it cannot stick: it slips, with friction at its bound."
+                " Before it carries so much, it slips."
             ),
         ),
         (
@@ -349,7 +360,8 @@ def draw(problem: InterfaceProblem, r: np.ndarray, contact: int) -> Any:
     ax.plot(x[order], r[order, 0], "C0.-", label="normal force")
     ax.plot(x[order], shear[order], "C1.-", label="friction force")
     ax.plot(x[order], bound[order], "k--", lw=1, label="bound of friction")
+    ax.plot(x[order], -bound[order], "k--", lw=1)
     ax.axvline(x[contact], color="C3", lw=1, label=f"contact {contact}")
     ax.set(xlabel="place of the contact", ylabel="force [N]")
-    ax.legend(frameon=False, fontsize=7)
+    ax.legend(frameon=False, fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)
     return fig

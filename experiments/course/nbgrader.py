@@ -20,8 +20,9 @@ from experiments.course.grader import exercise
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 CELL = re.compile(r'^(answer = .*?)  # (.*)\ncheck\("(\d\.\d)", answer\)\n', re.M)
-GRADED = """from experiments.course.grader import grade
+GRADED = """from experiments.course.grader import check, grade
 
+check("{number}", answer)
 verdict = grade("{number}", answer)
 assert verdict.right, verdict.sentence"""
 
@@ -35,7 +36,7 @@ def solved(text: str) -> str:
     return CELL.sub(answered, text)
 
 
-def source_notebook(name: str, text: str) -> str:
+def source_notebook(text: str) -> str:
     """A chapter as the source of an assignment."""
     book = jupytext.reads(text, "py:percent")
     book.metadata["kernelspec"] = KERNEL
@@ -46,14 +47,14 @@ def source_notebook(name: str, text: str) -> str:
         if not found:
             continue
         line, asks, number = found.groups()
-        task, place = exercise(number), f"{name.rsplit('_', 1)[0]}-{number.replace('.', '-')}"
+        task, place = exercise(number), number.replace(".", "-")
         graded = cell.copy()
         # nbgrader puts `answer = ...` of the course's configuration in place of what it removes
         cell.source = (
             f"{line}  # {asks}\n### BEGIN SOLUTION\n{task.solution.strip()}\n### END SOLUTION"
         )
         cell.metadata = {"nbgrader": mark(f"answer-{place}", solution=True)}
-        graded.source, graded["id"] = GRADED.format(number=number), f"grade-{number[0]}-{number[2]}"
+        graded.source, graded["id"] = GRADED.format(number=number), f"grade-{place}"
         points = mark(f"grade-{place}", grade=True, locked=True) | {"points": task.level}
         graded.metadata = {"nbgrader": points}
         cells.append(graded)
@@ -71,7 +72,7 @@ def main(folder: str) -> None:
     for path in sorted(Path(__file__).parent.glob("chapter_*.py")):
         target = Path(folder, path.stem, f"{path.stem}.ipynb")
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(source_notebook(path.stem, path.read_text()))
+        target.write_text(source_notebook(path.read_text()))
         print(target)
 
 

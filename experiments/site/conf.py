@@ -11,15 +11,15 @@ import os
 import sys
 from pathlib import Path
 
-SITE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
-sys.path[:0] = [str(SITE), str(ROOT)]
-# the chapters import the exercises of the course, in processes of their own
-os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import generate
 
 import contactopt
 
+# the chapters, which run in processes of their own, import the exercises of the course
+os.environ["PYTHONPATH"] = os.pathsep.join([sys.path[1], os.environ.get("PYTHONPATH", "")])
 project, author = "contactopt", "The contactopt developers"
 copyright = author
 version = release = contactopt.__version__
