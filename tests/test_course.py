@@ -76,6 +76,15 @@ def test_a_chapter_runs_and_its_solutions_are_right(name, tmp_path, monkeypatch,
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("answer", "told"), [("99.0", "not right yet"), ("0.978", "right")])
+def test_a_script_grades_the_answer_that_stands_in_it(answer, told, tmp_path, capsys):
+    text = CHAPTERS["chapter_7_duality"].read_text()
+    path = tmp_path / "mine.py"
+    path.write_text(text.replace("answer = ...  # N mm", f"answer = {answer}", 1))
+    runpy.run_path(str(path))
+    assert f"Exercise 7.1: {told}." in capsys.readouterr().out
+
+
 def example(number):
     """A right answer, from the kind of the exercise."""
     right = right_answer(number)

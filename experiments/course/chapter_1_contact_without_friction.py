@@ -291,8 +291,8 @@ assert primal_without_spring.status == "unbounded" and dual_without_spring.statu
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("1.1")` gives a hint, three times, and then the solution. The first three need
-# pen and paper only.
+# mechanics. `hint("1.1")` gives a hint, three times, and then the solution. `table(1)` shows what
+# you have done since the notebook was started. The first three need pen and paper only.
 #
 # **1.1** (Pen and paper.) A spring of stiffness 4.4 N/mm holds a node 0.6 mm above the floor. A
 # load of 6.5 N pulls it down. How large are the gap and the contact force?
@@ -367,9 +367,6 @@ check("1.8", answer)
 # %% tags=["exercise"]
 answer = (..., ...)  # upper [N], lower [N]
 check("1.9", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(1)

@@ -305,7 +305,8 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("2.1")` gives a hint, three times, and then the solution.
+# mechanics. `hint("2.1")` gives a hint, three times, and then the solution. `table(2)` shows what
+# you have done since the notebook was started.
 #
 # **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1.2, 2.5)$ mm/N, $q = (-1.5, 1.1)$ mm and
 # $\mu = 0.3$. Find the normal force and the friction force.
@@ -378,9 +379,6 @@ check("2.8", answer)
 # %% tags=["exercise"]
 answer = (..., ..., ...)  # r_n, r_1, r_2 [N]
 check("2.9", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(2)

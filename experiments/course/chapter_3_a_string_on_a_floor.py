@@ -305,7 +305,8 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("3.1")` gives a hint, three times, and then the solution.
+# mechanics. `hint("3.1")` gives a hint, three times, and then the solution. `table(3)` shows what
+# you have done since the notebook was started.
 #
 # **3.1** (Pen and paper.) The ends of the string are only 0.07 mm above the floor. At which
 # distance from the end does the contact begin?
@@ -372,9 +373,6 @@ check("3.7", answer)
 # %% tags=["exercise"]
 answer = ...  # -
 check("3.8", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(3)

@@ -335,7 +335,8 @@ assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("4.1")` gives a hint, three times, and then the solution.
+# mechanics. `hint("4.1")` gives a hint, three times, and then the solution. `table(4)` shows what
+# you have done since the notebook was started.
 #
 # **4.1** (Pen and paper.) A mesh of the block has $41 \times 21$ nodes, and its top row is held.
 # How many free unknowns does the primal problem have? How many unknowns does the dual problem with
@@ -408,9 +409,6 @@ check("4.7", answer)
 # %% tags=["exercise"]
 answer = (..., ...)  # a [mm], theta [-]
 check("4.8", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(4)

@@ -285,7 +285,8 @@ assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, 
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("5.1")` gives a hint, three times, and then the solution.
+# mechanics. `hint("5.1")` gives a hint, three times, and then the solution. `table(5)` shows what
+# you have done since the notebook was started.
 #
 # **5.1** (Pen and paper.) A sledge is pressed down with 130 N and pulled with 23 N. What is the
 # smallest friction coefficient with which it stands still?
@@ -365,9 +366,6 @@ check("5.8", answer)
 # %% tags=["exercise"]
 answer = (..., ..., ..., ...)  # r_n, r_plus, r_minus [N], sigma [mm]
 check("5.9", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(5)

@@ -195,7 +195,7 @@ assert answer.solved and 0 < slips.sum() < len(slips)
 # | | unknowns | matrix | memory for $N = 100$ |
 # |---|---|---|---|
 # | primal | $3 N^3$ | sparse, 81 entries per row | 3 GB, and more for its factors |
-# | dual, $Q$ as an array | $3 N^2$ | dense | 7 GB (exercise 6.1) |
+# | dual, $Q$ as an array | $3 N^2$ | dense | 7 GB (as in exercise 6.1) |
 # | dual, $Q$ known by its products | $3 N^2$ | never formed | as much as the primal |
 #
 # The third way never forms $Q$. It computes products $Q r = \sum_b T_b K_b^{-1} T_b' r$. The sum is
@@ -313,7 +313,8 @@ assert difference > 0.1
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("6.1")` gives a hint, three times, and then the solution.
+# mechanics. `hint("6.1")` gives a hint, three times, and then the solution. `table(6)` shows what
+# you have done since the notebook was started.
 #
 # **6.1** (Pen and paper.) A contact surface has $120 \times 80$ nodes in 3D. How many gigabytes
 # ($10^9$ bytes) does $Q$ take as an array of numbers of 8 bytes?
@@ -383,9 +384,6 @@ check("6.7", answer)
 # %% tags=["exercise"]
 answer = (..., ..., ...)  # u_n, u_1, u_2 [mm]
 check("6.8", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(6)

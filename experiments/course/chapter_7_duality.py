@@ -239,7 +239,8 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 # ## Exercises
 #
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
-# mechanics. `hint("7.1")` gives a hint, three times, and then the solution.
+# mechanics. `hint("7.1")` gives a hint, three times, and then the solution. `table(7)` shows what
+# you have done since the notebook was started.
 #
 # **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4.3$ N/mm replaces the floor: it costs
 # $f(u_n) = \tfrac12 \kappa \max(-u_n, 0)^2$. Its conjugate enters the dual problem as $f^*(-r_n)$.
@@ -315,9 +316,6 @@ check("7.8", answer)
 # %% tags=["exercise"]
 answer = ...  # N
 check("7.9", answer)
-
-# %% [markdown]
-# This table shows what you have done. It counts from the last start of the notebook.
 
 # %%
 table(7)

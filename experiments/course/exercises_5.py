@@ -75,12 +75,10 @@ EXERCISES = (
             "It has to hold 23 N.",
         ),
         """
-# The smallest coefficient for which forces in the cones balance the load, by a linear program.
-normal, friction, coefficient = cp.Variable(2), cp.Variable(2), 1.0
-least = cp.Problem(
-    cp.Minimize(cp.sum(cp.abs(friction)) / 130), [cp.sum(normal) == 130, cp.sum(friction) == -23]
-)
-answer = least.solve(solver=cp.CLARABEL)
+# A linear program: each runner carries 65 N, and the friction forces hold the pull.
+least, friction = cp.Variable(), cp.Variable(2)
+law = [cp.abs(friction) <= 65 * least, cp.sum(friction) == -23]
+answer = cp.Problem(cp.Minimize(least), law).solve(solver=cp.CLARABEL)
 """,
     ),
     Exercise(
@@ -276,7 +274,7 @@ answer = ((0.26 + 31 / 110) / 2, 1.0)
         (
             "r_t = r_plus - r_minus. Which of the two is zero if the node slips to the right?",
             "r_plus = 0 and r_minus = mu r_n. Then u_n = 0 gives r_n.",
-            "sigma is |u_t|: the last row of the second condition makes it so.",
+            "r_minus is not zero, so that its partner sigma - u_t is.",
         ),
         """
 # All ways to choose which of the four unknowns are zero.
