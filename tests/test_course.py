@@ -3,8 +3,11 @@ what is wrong with typical mistakes.
 """
 
 import json
+import os
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import cvxpy as cp
@@ -80,9 +83,21 @@ def test_a_chapter_runs_and_its_solutions_are_right(name, tmp_path, monkeypatch,
 def test_a_script_grades_the_answer_that_stands_in_it(answer, told, tmp_path, capsys):
     text = CHAPTERS["chapter_7_duality"].read_text()
     path = tmp_path / "mine.py"
-    path.write_text(text.replace("answer = ...  # N mm", f"answer = {answer}", 1))
+    path.write_text(text.replace("answer = ...  # value", f"answer = {answer}  # value", 1))
     runpy.run_path(str(path))
     assert f"Exercise 7.1: {told}." in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", [ROOT, ROOT / "experiments" / "course"])
+def test_a_chapter_finds_the_exercises_from_its_own_folder_and_from_that_of_the_repository(folder):
+    script = ROOT / "experiments" / "course" / "chapter_7_duality.py"
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    command = [sys.executable, os.path.relpath(script, folder)]
+    done = subprocess.run(
+        command, cwd=folder, env=env | {"MPLBACKEND": "Agg"}, capture_output=True, text=True
+    )
+    assert "0 of 9 exercises are right." in done.stdout, done.stderr
 
 
 def example(number):
@@ -138,7 +153,9 @@ def test_questions_and_records_agree_and_no_answer_stands_in_a_chapter(name):
     cells = [cell for cell in re.split(r"^(?=# %%)", text, flags=re.M) if "exercise" in cell[:30]]
     for number, cell in zip(exercises(chapter), cells, strict=True):
         line, call = cell.strip().splitlines()[1:]
-        assert re.fullmatch(r"answer = (\.\.\.|\((\.\.\.(, )?)+\))  # .*", line)
+        place, told = line.split("  # ")
+        assert re.fullmatch(r"answer = (\.\.\.|\((\.\.\.(, )?)+\))", place)
+        assert told == exercise(number).asks
         assert call == f'check("{number}", answer)'
 
 

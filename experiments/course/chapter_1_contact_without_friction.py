@@ -9,12 +9,16 @@
 # with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -305,14 +309,14 @@ check("1.1", answer)
 # **1.2** (Pen and paper.) For which load does the node of exercise 1.1 just touch the floor?
 
 # %% tags=["exercise"]
-answer = ...  # N
+answer = ...  # load [N]
 check("1.2", answer)
 
 # %% [markdown]
 # **1.3** (Pen and paper.) How large is the compliance $Q$ of a spring of 2.3 N/mm in m/N?
 
 # %% tags=["exercise"]
-answer = ...  # m/N
+answer = ...  # compliance [m/N]
 check("1.3", answer)
 
 # %% [markdown]
@@ -321,7 +325,7 @@ check("1.3", answer)
 # large is the force of the ceiling?
 
 # %% tags=["exercise"]
-answer = ...  # N, positive
+answer = ...  # force of the ceiling [N]
 check("1.4", answer)
 
 # %% [markdown]
@@ -339,7 +343,7 @@ check("1.5", answer)
 # node of this chapter?
 
 # %% tags=["exercise"]
-answer = ...  # N
+answer = ...  # force after two steps [N]
 check("1.6", answer)
 
 # %% [markdown]
@@ -348,7 +352,7 @@ check("1.6", answer)
 # as $\gamma > k$.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # [N/mm], [N/mm]
+answer = (..., ...)  # second derivative without contact, with contact [N/mm]
 check("1.7", answer)
 
 # %% [markdown]
@@ -356,7 +360,7 @@ check("1.7", answer)
 # step to the next, late in the iteration, with the step size $\alpha = 0.4$?
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # ratio of two gaps [-]
 check("1.8", answer)
 
 # %% [markdown]
@@ -365,7 +369,7 @@ check("1.8", answer)
 # those without load. A load of 4 N pulls the lower node down. Find the forces of both floors.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # upper [N], lower [N]
+answer = (..., ...)  # forces on the upper and on the lower node [N]
 check("1.9", answer)
 
 # %%

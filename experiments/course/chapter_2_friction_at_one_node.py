@@ -8,12 +8,16 @@
 # You need chapter 1. The chapter takes 40 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
 from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -320,7 +324,7 @@ check("2.1", answer)
 # chapter sticks, if $q = (-3.1, 5.3)$ mm?
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # friction coefficient [-]
 check("2.2", answer)
 
 # %% [markdown]
@@ -336,7 +340,7 @@ check("2.3", answer)
 # and $\mu = 1.5$. Give their normal forces, the smallest first.
 
 # %% tags=["exercise"]
-answer = (..., ..., ...)  # three numbers [N]
+answer = (..., ..., ...)  # three normal forces, the smallest first [N]
 check("2.4", answer)
 
 # %% [markdown]
@@ -344,7 +348,7 @@ check("2.4", answer)
 # this chapter with $\mu = 0.7$?
 
 # %% tags=["exercise"]
-answer = ...  # mm
+answer = ...  # gap [mm]
 check("2.5", answer)
 
 # %% [markdown]
@@ -352,7 +356,7 @@ check("2.5", answer)
 # Above which friction coefficient are there loads with several solutions?
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # friction coefficient [-]
 check("2.6", answer)
 
 # %% [markdown]
@@ -368,7 +372,7 @@ check("2.7", answer)
 # step of Tresca's iteration multiply an error of the bound, while the node slips to the right?
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # factor of the error in one step, with its sign [-]
 check("2.8", answer)
 
 # %% [markdown]

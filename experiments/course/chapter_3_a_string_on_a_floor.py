@@ -9,12 +9,16 @@
 # minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -312,14 +316,14 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # distance from the end does the contact begin?
 
 # %% tags=["exercise"]
-answer = ...  # mm
+answer = ...  # distance from the end [mm]
 check("3.1", answer)
 
 # %% [markdown]
 # **3.2** (Pen and paper.) Which part of the weight does the floor carry in exercise 3.1?
 
 # %% tags=["exercise"]
-answer = ...  # between 0 and 1
+answer = ...  # part of the weight [-]
 check("3.2", answer)
 
 # %% [markdown]
@@ -337,7 +341,7 @@ check("3.3", answer)
 # the finer mesh by `np.interp(x_fine, x_coarse, touches) >= 0.5`, and count again.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # steps, steps
+answer = (..., ...)  # steps from all nodes, steps from the coarse set
 check("3.4", answer)
 
 # %% [markdown]
@@ -346,7 +350,7 @@ check("3.4", answer)
 # four elements and $d = 0.07$ mm, start with $r = 0$, and make one sweep from left to right.
 
 # %% tags=["exercise"]
-answer = (..., ..., ...)  # three forces [N]
+answer = (..., ..., ...)  # three forces after one sweep [N]
 check("3.5", answer)
 
 # %% [markdown]
@@ -354,7 +358,7 @@ check("3.5", answer)
 # only, where it lies on the floor?
 
 # %% tags=["exercise"]
-answer = ...  # N/mm^2
+answer = ...  # stiffness per length [N/mm^2]
 check("3.6", answer)
 
 # %% [markdown]
@@ -363,7 +367,7 @@ check("3.6", answer)
 # of the energy by $b$, at $b = 0$?
 
 # %% tags=["exercise"]
-answer = ...  # N mm / mm = N
+answer = ...  # derivative of the energy [N]
 check("3.7", answer)
 
 # %% [markdown]
@@ -371,7 +375,7 @@ check("3.7", answer)
 # the matrix.
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # condition number [-]
 check("3.8", answer)
 
 # %%

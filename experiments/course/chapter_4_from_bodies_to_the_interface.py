@@ -10,6 +10,8 @@
 # minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
@@ -40,6 +42,8 @@ from contactopt import (
 )
 from contactopt.problem.laws.tresca import Tresca
 from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -343,7 +347,7 @@ assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
 # friction have?
 
 # %% tags=["exercise"]
-answer = (..., ...)  # primal, dual
+answer = (..., ...)  # unknowns of the primal problem, of the dual problem
 check("4.1", answer)
 
 # %% [markdown]
@@ -352,7 +356,7 @@ check("4.1", answer)
 # tip over?
 
 # %% tags=["exercise"]
-answer = ...  # mm
+answer = ...  # distance from the middle [mm]
 check("4.2", answer)
 
 # %% [markdown]
@@ -361,7 +365,7 @@ check("4.2", answer)
 # each node. The certificate grades them.
 
 # %% tags=["exercise"]
-answer = ...  # (33, 2) forces [N]
+answer = ...  # 33 rows r_n, r_t [N]
 check("4.3", answer)
 
 # %% [markdown]
@@ -380,7 +384,7 @@ check("4.4", answer)
 # one?
 
 # %% tags=["exercise"]
-answer = ...  # N/mm
+answer = ...  # stiffness of the contact [N/mm]
 check("4.5", answer)
 
 # %% [markdown]
@@ -388,7 +392,7 @@ check("4.5", answer)
 # modulus 1.7 times as large. By which factor does $Q$ change?
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # factor of Q [-]
 check("4.6", answer)
 
 # %% [markdown]
@@ -397,7 +401,7 @@ check("4.6", answer)
 # 0$, and $s$. Find the two forces.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # left, right [N]
+answer = (..., ...)  # forces of the left and of the right point [N]
 check("4.7", answer)
 
 # %% [markdown]
@@ -407,7 +411,7 @@ check("4.7", answer)
 # a proof?
 
 # %% tags=["exercise"]
-answer = (..., ...)  # a [mm], theta [-]
+answer = (..., ...)  # motion upwards [mm], rotation [-]
 check("4.8", answer)
 
 # %%

@@ -9,6 +9,7 @@
 # You need chapters 2 and 4. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
 import time
 
 import cvxpy as cp
@@ -17,6 +18,8 @@ import numpy as np
 
 from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce, scenes, solve
 from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -292,7 +295,7 @@ assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, 
 # smallest friction coefficient with which it stands still?
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # friction coefficient [-]
 check("5.1", answer)
 
 # %% [markdown]
@@ -301,14 +304,14 @@ check("5.1", answer)
 # runner stands on stone, with $\mu = 0.45$. What is the largest pull that the sledge withstands?
 
 # %% tags=["exercise"]
-answer = ...  # N
+answer = ...  # largest pull [N]
 check("5.2", answer)
 
 # %% [markdown]
 # **5.3** (Program.) How many nodes of the block slip if $\mu = 0.2$, and how many if $\mu = 0.1$?
 
 # %% tags=["exercise"]
-answer = (..., ...)  # with 0.2, with 0.1
+answer = (..., ...)  # slipping nodes with mu = 0.2, with mu = 0.1
 check("5.3", answer)
 
 # %% [markdown]
@@ -318,7 +321,7 @@ check("5.3", answer)
 # `diagnose` predicts.
 
 # %% tags=["exercise"]
-answer = ...  # -
+answer = ...  # factor in one step [-]
 check("5.4", answer)
 
 # %% [markdown]
@@ -328,7 +331,7 @@ check("5.4", answer)
 # 0.4$.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # normal, tangential [N]
+answer = (..., ...)  # normal component, tangential component [N]
 check("5.5", answer)
 
 # %% [markdown]
@@ -336,7 +339,7 @@ check("5.5", answer)
 # $|p_t| \le \mu p_n$. Compute it for the numbers of exercise 5.5.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # normal, tangential [N]
+answer = (..., ...)  # normal component, tangential component [N]
 check("5.6", answer)
 
 # %% [markdown]
@@ -344,7 +347,7 @@ check("5.6", answer)
 # but not with `solve`. The certificate grades them.
 
 # %% tags=["exercise"]
-answer = ...  # (25, 2) forces [N]
+answer = ...  # 25 rows r_n, r_t [N]
 check("5.7", answer)
 
 # %% [markdown]
@@ -353,7 +356,7 @@ check("5.7", answer)
 # of the friction cones does negative work on it, and the load does positive work.
 
 # %% tags=["exercise"]
-answer = (..., ...)  # a, b [-]
+answer = (..., ...)  # up, along [-]
 check("5.8", answer)
 
 # %% [markdown]
@@ -364,7 +367,7 @@ check("5.8", answer)
 # \end{pmatrix}$ mm/N and $q = (-3, 5)$ mm, for $\mu = 0.6$.
 
 # %% tags=["exercise"]
-answer = (..., ..., ..., ...)  # r_n, r_plus, r_minus [N], sigma [mm]
+answer = (..., ..., ..., ...)  # r_n [N], r_plus [N], r_minus [N], sigma [mm]
 check("5.9", answer)
 
 # %%

@@ -9,6 +9,8 @@
 # You need chapters 3 and 5. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
@@ -26,6 +28,8 @@ from contactopt import (
 )
 from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -320,7 +324,7 @@ assert difference > 0.1
 # ($10^9$ bytes) does $Q$ take as an array of numbers of 8 bytes?
 
 # %% tags=["exercise"]
-answer = ...  # GB
+answer = ...  # memory [GB]
 check("6.1", answer)
 
 # %% [markdown]
@@ -328,7 +332,7 @@ check("6.1", answer)
 # many facets are needed so that at most 0.7 % of the friction is lost in any direction?
 
 # %% tags=["exercise"]
-answer = ...  # an integer
+answer = ...  # number of facets
 check("6.2", answer)
 
 # %% [markdown]
@@ -347,7 +351,7 @@ check("6.3", answer)
 # angle between 0 and 90 degrees.)
 
 # %% tags=["exercise"]
-answer = ...  # degrees
+answer = ...  # angle [degrees]
 check("6.4", answer)
 
 # %% [markdown]
@@ -355,7 +359,7 @@ check("6.4", answer)
 # How large is the contact modulus $E^*$ in Hertz's formulas?
 
 # %% tags=["exercise"]
-answer = ...  # MPa
+answer = ...  # contact modulus [MPa]
 check("6.5", answer)
 
 # %% [markdown]
@@ -364,7 +368,7 @@ check("6.5", answer)
 # point load $P$ moves the surface by $P / (\pi E^* r)$ at the distance $r$.
 
 # %% tags=["exercise"]
-answer = ...  # mm
+answer = ...  # amplitude of the displacement [mm]
 check("6.6", answer)
 
 # %% [markdown]
@@ -373,7 +377,7 @@ check("6.6", answer)
 # is this bound $10^{-6}$ or less for $\kappa = 900$?
 
 # %% tags=["exercise"]
-answer = ...  # an integer
+answer = ...  # number of iterations
 check("6.7", answer)
 
 # %% [markdown]

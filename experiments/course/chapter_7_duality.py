@@ -8,12 +8,16 @@
 # You need chapter 2. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, laws, models, reduce
 from contactopt.meshes.structured import tensor_mesh
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -247,7 +251,7 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 # What is $f^*(-r_n)$ for $r_n = 2.9$ N?
 
 # %% tags=["exercise"]
-answer = ...  # N mm
+answer = ...  # value of the conjugate [N mm]
 check("7.1", answer)
 
 # %% [markdown]
@@ -263,7 +267,7 @@ check("7.2", answer)
 # (0, 2.1)$ mm, if all you know is the admissible force $r = (2.1, -0.4)$ N?
 
 # %% tags=["exercise"]
-answer = ...  # N mm
+answer = ...  # bound [N mm]
 check("7.3", answer)
 
 # %% [markdown]
@@ -279,7 +283,7 @@ check("7.4", answer)
 # $g = 0.83$ N? Which multiplier is it?
 
 # %% tags=["exercise"]
-answer = ...  # mm
+answer = ...  # derivative [mm]
 check("7.5", answer)
 
 # %% [markdown]
@@ -297,7 +301,7 @@ check("7.6", answer)
 # least, if $u_t = 1.3$ mm and $\mu = 0.35$?
 
 # %% tags=["exercise"]
-answer = ...  # mm
+answer = ...  # smallest gap [mm]
 check("7.7", answer)
 
 # %% [markdown]
@@ -305,7 +309,7 @@ check("7.7", answer)
 # that is needed at $\lambda = 17.3$ mm?
 
 # %% tags=["exercise"]
-answer = ...  # N mm
+answer = ...  # energy [N mm]
 check("7.8", answer)
 
 # %% [markdown]
@@ -314,7 +318,7 @@ check("7.8", answer)
 # largest friction force in the direction $(1, 1) / \sqrt 2$?
 
 # %% tags=["exercise"]
-answer = ...  # N
+answer = ...  # largest friction force [N]
 check("7.9", answer)
 
 # %%
