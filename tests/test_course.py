@@ -136,6 +136,15 @@ def test_guesses_and_answers_to_other_exercises_do_not_pass(number):
             assert not grade(number, example(other)).right, other
 
 
+@pytest.mark.parametrize("number", NUMBERS)
+def test_no_answer_raises_or_passes_by_its_size(number):
+    rng = np.random.default_rng(3)
+    for shape in right_answer(number).shapes:
+        for size in (0.0, 5e-324, 1e-300, 1e-9, 1e9, 1e99):
+            tried = size * rng.choice([-1.0, 1.0], size=shape)
+            assert not grade(number, tried).right, tried
+
+
 def test_there_are_sixty_exercises_in_three_levels():
     levels = [exercise(number).level for number in NUMBERS]
     assert len(NUMBERS) == 60 and set(levels) == {1, 2, 3}
@@ -207,6 +216,7 @@ def test_a_chapter_has_all_its_parts_and_folds_what_only_draws(name, generate):
         (1j, "type"),
         ((0.0, np.nan), "type"),
         ((0.0, np.inf), "type"),
+        ((1e300, 0.0), "type"),
         (3.86, "shape"),
         ((0.0, 3.86, 0.0), "shape"),
     ],

@@ -36,8 +36,8 @@ def another_load(load: np.ndarray) -> str | None:
         return "Without any load the only force is zero."
     if abs(load[0] * -0.5 - load[1] * 0.1) < 1e-3 * np.linalg.norm(load):
         return "This is the load of the text or a multiple of it. Find another direction."
-    if load[0] < 0:
-        return "This load presses the node on the floor, q_n < 0, so that it cannot hang freely."
+    if load[0] <= 0:
+        return "This load presses the node on the floor, q_n <= 0, so that it cannot hang freely."
     f_n, f_t = stick = -np.linalg.solve(Q, load)
     if abs(f_t) > 1.5 * f_n:
         return f"To stick, the node would need r = {np.round(stick, 3)} N, outside the cone."

@@ -39,7 +39,8 @@ def on_the_hill() -> tuple[np.ndarray, np.ndarray]:
 def hill_problem() -> InterfaceProblem:
     Q, q = on_the_hill()
     both = np.column_stack([q, np.zeros(39)])
-    return InterfaceProblem(np.kron(Q, np.eye(2)), both, 0.0, areas=np.full(39, 1 / 40))
+    x, areas = np.arange(1, 40) / 40, np.full(39, 1 / 40)
+    return InterfaceProblem(np.kron(Q, np.eye(2)), both, 0.0, areas=areas, coordinates=[x])
 
 
 def touching(Q: np.ndarray, q: np.ndarray) -> np.ndarray:

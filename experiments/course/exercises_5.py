@@ -51,9 +51,10 @@ def unknowns() -> tuple[float, ...]:
 def slides(motion: np.ndarray) -> str | None:
     """Whether a motion proves that no forces hold the sledge."""
     up, along = motion
-    if up < 0.26 * abs(along) - 1e-9:
+    least = 1e-6 * max(abs(up), abs(along))
+    if up < 0.26 * abs(along) - least:
         return "Forces on the edge of a cone can do negative work: up must be >= mu |along|."
-    if not -110 * up + 31 * along > 1e-9 * abs(along):
+    if -110 * up + 31 * along <= least:
         return f"The load does the work {-110 * up + 31 * along:.3g}, which is not positive."
     return None
 

@@ -248,7 +248,7 @@ answer = missing.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10)
                 "This is the work of slip, f, and not the bound.",
             ),
             (0.85, "The mean of both bounds is no ellipse."),
-            (0.5, "Along the diagonal the bound is larger than across the grooves."),
+            (0.5, "This is the bound in the second direction. Along the diagonal it is larger."),
             (np.hypot(1.2, 0.5), "The forces do not reach both bounds at once."),
         ),
         (

@@ -18,6 +18,7 @@ from contactopt import InterfaceProblem, laws, natural_map_residual
 from contactopt.problem.certificate import Yardsticks, fit_multipliers, yardsticks
 
 CLOSE = 1e-3  # relative error of numbers, and certificate of forces, that still counts as right
+HUGE = 1e100  # from here on numbers count as infinite
 TOLD = 0.2  # a condition is told first if its violation is this share of the largest one
 
 
@@ -187,7 +188,7 @@ def as_numbers(answer: Any, right: Right, asks: str) -> np.ndarray | Verdict:
         return wrong(
             "type", f"Your answer has the type {type(answer).__name__}, and is no number. {wanted}"
         )
-    if not np.all(np.isfinite(given)):
+    if not np.all(np.abs(given) < HUGE):
         return wrong("type", f"Not every number of your answer is finite. {wanted}")
     flat = np.squeeze(given).shape
     for shape in right.shapes:
