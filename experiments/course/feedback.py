@@ -176,10 +176,9 @@ Right = Forces | State | Numbers | Open
 def as_numbers(answer: Any, right: Right, asks: str) -> np.ndarray | Verdict:
     """The answer as an array of a shape that the exercise asks for, or what is wrong with it."""
     wanted = f"Give {_size(right.shapes[0])}: {asks}."
-    if type(answer).__module__.startswith("cvxpy"):
-        return wrong(
-            "type", f"This is a part of a cvxpy program; its `.value` is the number. {wanted}"
-        )
+    parts = answer if isinstance(answer, (tuple, list)) else [answer]
+    if any(type(part).__module__.startswith("cvxpy") for part in parts):
+        return wrong("type", f"A part of a cvxpy program has its number in `.value`. {wanted}")
     try:
         given = np.asarray(answer)
         if given.dtype.kind not in "iuf":
