@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import generate
+import museum
 
 import contactopt
 
@@ -31,6 +32,8 @@ exclude_patterns = [
     "accuracy.md",
     "performance.md",
     "course.md",
+    "museum.md",
+    "museum/*",
     "generated/notebooks",
     "**/__pycache__",
 ]
@@ -65,4 +68,5 @@ def setup(app):
         ),
     )
     app.connect("builder-inited", lambda app: generate.write_pages(Path(app.srcdir)))
+    app.connect("build-finished", lambda app, error: museum.write(Path(app.outdir) / "museum"))
     return {"parallel_read_safe": True}

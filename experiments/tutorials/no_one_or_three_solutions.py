@@ -7,7 +7,8 @@
 # exactly two, and none at all. It also shows a method that runs in circles although there is
 # exactly one solution. And it shows the tools that tell you all this before you solve.
 #
-# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters.
+# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters. The pages of [the
+# museum](../museum.md#one-node-one-solution-or-three) show the same with sliders.
 
 # %%
 import cvxpy as cp
@@ -153,8 +154,8 @@ assert set(numbers) == {1, 3}
 
 # %% [markdown]
 # For other loads the pair appears at another $\mu$. Below which $\mu$ is there one solution
-# *whatever the load*? For one contact the answer is known exactly: $\mu^* = K_{tt} / |K_{tn}| =
-# 2/3$. `diagnose` finds it without knowing the load.
+# *whatever the load*? For one contact the answer is known exactly ([proof](../museum.md#one-node-one-solution-or-three)):
+# $\mu^* = K_{tt} / |K_{tn}| = 2/3$. `diagnose` finds it without knowing the load.
 
 # %%
 print(diagnose(problem))
@@ -180,7 +181,7 @@ _ = ax.legend(frameon=False)
 # Just above the threshold only loads in a narrow sector have three solutions. With more friction
 # the sector becomes wider.
 #
-# For many contacts no such formula is known. `diagnose` then gives two bounds: a coefficient below
+# For many contacts no such formula is known; for two there is [a sharp threshold](../museum.md#two-nodes-the-sharp-threshold). `diagnose` then gives two bounds: a coefficient below
 # which the solution is *guaranteed* to be unique for every load, and a coefficient at which some
 # load has several. Between the two bounds `diagnose` makes no statement. If a plate can move along
 # the surface, nothing is guaranteed, and the first bound is zero.
@@ -243,7 +244,8 @@ assert np.isclose(max(y for _, y in path), 14.5, atol=0.1)  # the cycle runs bet
 # same number 2/3 decides: below it the iteration converges, and above it the iteration runs in
 # circles. But mind the sign. At a slope of $-1$ the *iteration* stops converging. At a slope of
 # $+1$ the solution stops being *unique*, and this needs a node that slips to the right. Here the
-# slope is negative, so the solution is unique, and only the method fails. There are two remedies:
+# slope is negative, so the solution is unique, and only the method fails
+# ([cobwebs to try](../museum.md#two-iterations-as-cobwebs)). There are two remedies:
 # half steps, or another method.
 
 # %%
@@ -308,7 +310,8 @@ assert len(all_solutions(piston(2.0, give=1e-2))) == 1
 # $s = 0.5$, so that the balance $V' r + s = 0$ asks for $r_t = -0.5$ N. With $\mu = 0.3$ the cone
 # then asks for $r_n \ge 1.67$ N. But the node overlaps the floor by 1 mm only, $q = (-1, 0)$. The
 # gap would be $u_n = r_n - 1 \ge 0.67$ mm, and an open contact carries no force. The cone contains
-# forces that hold the slide; the contact cannot make them.
+# forces that hold the slide; the contact cannot make them ([the same with
+# sliders](../museum.md#a-plate-that-friction-cannot-hold)).
 
 # %%
 dragged = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3, [[0.0], [1.0]], [0.5])
