@@ -109,7 +109,7 @@ def _instance(parts: dict[str, _Reader], options: dict[str, str], rows: list[lis
     made.name = name
     numbers = [[float(word or 0) for word in row] for row in rows]
     if numbers:
-        made.shift = np.array(numbers[0][:3])
+        made.shift[: len(numbers[0])] = numbers[0]
     if len(numbers) > 1:
         *ends, angle = numbers[1]
         first, last = np.reshape(ends, (2, 3))
