@@ -750,7 +750,7 @@ def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence
     for key, found in text.members.items():
         assert all(np.array_equal(members, binary.members[key][i]) for i, members in found.items())
     data, rng, refused = (tmp_path / "1.msh").read_bytes(), np.random.default_rng(0), 0
-    for trial in range(40):
+    for trial in range(40 if version == "4.1" else 6):  # 2.2 is read by another process
         bad = np.frombuffer(data, np.uint8).copy()
         bad[rng.integers(30, len(bad), 5)] = rng.integers(0, 256, 5)
         (tmp_path / "bad.msh").write_bytes(
@@ -760,4 +760,4 @@ def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence
             mesh_formats.read_groups(tmp_path / "bad.msh")
         except InputError as error:
             refused += "\n" not in str(error)
-    assert refused > 20
+    assert refused > (trial + 1) / 2

@@ -23,7 +23,7 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
-from contactopt.meshes.msh4 import read_msh2, read_msh4, version
+from contactopt.meshes.msh4 import read_msh4, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
@@ -161,9 +161,9 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, C
             " Gmsh's format; save it in version 4.1 or 2.2."
         )
     if binary:  # meshio trusts the counts of damaged files
-        newer = stated != "4.0"
         older = str(stated)[0] == "2"
-        yield "gmsh", partial(read_msh2, path) if older else partial(read_msh4, path, newer)
+        reader = partial(_read_apart, path, "gmsh", size)
+        yield "gmsh", reader if older else partial(read_msh4, path, stated != "4.0")
         return
     for newer in (False, True):  # "4" stands for either
         if stated in (("4", "4.1") if newer else ("4", "4.0")):
