@@ -13,7 +13,7 @@ import skfem.io.meshio
 
 from contactopt import InputError, load_mesh
 from contactopt.meshes import mesh_formats
-from contactopt.meshes.mesh_files import name_boundaries
+from contactopt.meshes.mesh_files import load_bodies, name_boundaries
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.0]])
 TWO = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
@@ -543,6 +543,9 @@ def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
         load_mesh(path, "Tool-1")
     with pytest.raises(InputError, match="falls into 2 pieces"):
         load_mesh(path, "Both")
+    bodies, refused = load_bodies(path)
+    assert set(bodies) == {"Low", "Up"} and len(refused) == 3
+    assert any("'Both' is the same as" in told or "same as 'Both'" in told for told in refused)
 
 
 def exodus_bricks(path, hdf5):

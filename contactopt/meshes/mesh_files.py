@@ -41,7 +41,7 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     Parameters
     ----------
     path : File in any format that meshio reads: Gmsh (.msh), VTK (.vtu, .vtk), Abaqus and CalculiX
-        (.inp), XDMF, Nastran, ... A plane mesh may lie across any axis.
+        (.inp), Exodus, MED, XDMF, Nastran, ... A plane mesh may lie across any axis.
     group : Name of the group of elements that is the body, or the number of a group without a name.
         None: all elements.
     scale : Unit of length of the file in that of the scene: 1000 for a file in metres and a scene
