@@ -83,8 +83,8 @@ def test_faces_are_named_by_their_outward_normals_and_measure_what_they_should(p
 
 
 def test_the_printed_beginning_of_a_scene_is_solved_as_our_own_mesh_is(parts, capsys):
-    """The cube without its bore on the plate: tetrahedra of Gmsh and our bricks give the same force,
-    and nearly the same approach.
+    """The cube without its bore on the plate: tetrahedra of Gmsh and our bricks give the same
+    force, and nearly the same approach.
     """
     draw(bored=False)
     asked = ["mesh", str(parts), "--size", "0.8", "--name", "back=body1:y-", "--no-open", "-q"]
@@ -134,6 +134,33 @@ def test_the_page_has_a_colour_for_each_boundary(parts):
 def test_what_is_not_there_is_told(parts, options, words, capsys):
     assert main(["mesh", str(parts), "--no-page", *options]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_faces_of_iges_files_become_a_solid_and_plane_parts_stay_plane(tmp_path, monkeypatch):
+    import gmsh
+
+    monkeypatch.chdir(tmp_path)
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    occ = gmsh.model.occ
+    occ.addBox(0, 0, 0, 1, 2, 3)
+    occ.synchronize()
+    gmsh.write("box.iges")
+    gmsh.clear()
+    occ.addRectangle(0, 0, 0, 4, 2)
+    occ.addDisk(2, 3, 0, 1, 1)
+    occ.synchronize()
+    gmsh.write("plane.step")
+    gmsh.finalize()
+    mesh_part(Path("box.iges"), Path("box.msh"))
+    (box,) = load_bodies(Path("box.msh"))[0].values()
+    assert area(box, "z+") == pytest.approx(2.0) and area(box, "x-") == pytest.approx(6.0)
+    mesh_part(Path("plane.step"), Path("plane.msh"))
+    plate, disc = load_bodies(Path("plane.msh"))[0].values()
+    assert set(plate.boundaries) == {"x-", "x+", "y-", "y+"}
+    corners = plate.p[:, plate.facets[:, plate.boundaries["y+"]]]
+    np.testing.assert_allclose(corners[1], 2.0)
+    assert area(disc, "ellipse1") == pytest.approx(2 * np.pi, rel=1e-4)
 
 
 def test_damaged_files_are_told(tmp_path):

@@ -25,9 +25,8 @@ ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
 SHARE = 15  # usual number of elements along the diagonal of the smallest body
 AROUND = 16  # elements around a full circle, where the size does not make them smaller
 GRID = (np.arange(15) + 0.5) / 15  # parameters of a face among which a place on it is looked for
+FLAT = 1e-5  # a part is plane if it is thinner than this fraction of its size
 ALONG = 1 - 1e-9  # component of a normal that lies along an axis
-KINDS = {"Plane": "plane", "Line": "line", "Cylinder": "cylinder", "Cone": "cone",
-         "Sphere": "sphere", "Torus": "torus", "Circle": "circle"}  # fmt: skip
 
 
 def mesh_part(
@@ -64,10 +63,15 @@ def mesh_part(
             gmsh.model.occ.synchronize()
         except Exception as error:  # the class of Gmsh's errors is Exception
             raise InputError(f"part '{path}' cannot be read: {error}") from error
-        dim = 3 if gmsh.model.getEntities(3) else 2
+        box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+        plane = np.ptp(box[:, 2]) < FLAT * np.ptp(box, axis=0).max()
+        if not plane and not gmsh.model.getEntities(3):  # IGES files hold the faces of a solid
+            gmsh.model.occ.healShapes(makeSolids=True)
+            gmsh.model.occ.synchronize()
+        dim = 2 if plane else 3
         bodies = _bodies(gmsh, dim)
         if not bodies:
-            raise InputError(f"part '{path}' holds neither solids nor faces.")
+            raise InputError(f"part '{path}' holds no solids, nor faces in the plane of x and y.")
         sides = {
             f"{body}:{name}": tag
             for body, own in bodies.items()
@@ -126,7 +130,7 @@ def _sides(gmsh: Any, dim: int, body: int) -> dict[str, int]:
     found: dict[str, int] = {}
     counts: dict[str, int] = {}
     for _, tag in gmsh.model.getBoundary([(dim, body)], oriented=False):
-        kind = KINDS.get(gmsh.model.getType(dim - 1, tag), "face" if dim == 3 else "edge")
+        kind = gmsh.model.getType(dim - 1, tag).lower().replace(" ", "-")
         way = _direction(gmsh, dim, body, tag) if kind in ("plane", "line") else ""
         name = way or kind
         counts[name] = counts.get(name, 0) + 1

@@ -101,7 +101,7 @@ def _places(ids: np.ndarray, found: set[int]) -> np.ndarray:
 
 def _instance(parts: dict[str, _Reader], options: dict[str, str], rows: list[list[str]]) -> _Reader:
     """A copy of a part, moved along the first row, then turned about the axis of the second."""
-    name, of = options["name"], options["part"]
+    name, of = options["name"], options.get("part", "")
     if of.lower() not in parts:
         known = ", ".join(parts) or "none"
         raise ValueError(f"instance {name} is of part {of}, which is not there; parts: {known}")
