@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Chapter 1. A spring, a node and a floor
 #
-# The smallest contact problem has one unknown. It already shows everything that this course is
-# about: an energy that is minimised under a constraint, a second problem in the contact forces, the
+# The smallest contact problem has one unknown. It already has all that every chapter of this course
+# has: an energy that is minimised under a constraint, a second problem in the contact forces, the
 # conditions that join the two, a program that a solver can read, and several ways to go wrong.
 #
 # You need derivatives, and the idea of a minimum under a constraint. The chapter takes 30 minutes
@@ -193,7 +193,7 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 # The derivative of this function is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. For every
 # $\gamma$ but $\gamma = k$ it is zero exactly at the solution. Such a method is called
 # *consistent*. (The penalty method is not: its minimum is another point.) There is a price. The
-# function is convex only if $\gamma > k$. For a smaller $\gamma$ it has no minimum.
+# function is strictly convex if $\gamma > k$. For a smaller $\gamma$ it is concave and has no minimum.
 #
 # ## Proximal Galerkin: never below the floor
 #

@@ -299,7 +299,7 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # |---|---|---|
 # | Tresca's iteration | the box program, again and again | $\mu$ times the coupling $\lvert Q_{nt} \rvert / Q_{nn}$ exceeds 1 while the node slips |
 # | cone program | associated friction | the node slips: then it is another law |
-# | Acary and Cadoux | the cone program with a shift, again and again | the factor below exceeds 1; for many nodes there is no proof of convergence |
+# | Acary and Cadoux | the cone program with a shift, again and again | the factor above is not between -1 and 1; for many nodes there is no proof of convergence |
 #
 # ## Exercises
 #

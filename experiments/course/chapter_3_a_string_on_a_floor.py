@@ -123,7 +123,7 @@ assert np.allclose(r.value, floor.dual_value, atol=1e-3)
 # $$ d = \frac{f a^2}{2 T}, \qquad a = \sqrt{2 T d / f} . $$
 #
 # On the floor the string is straight, so its tension carries nothing. There the floor carries
-# exactly the weight: $r_i = f h$.
+# exactly the weight: $r_i = f h$, and half of it at a node where the contact ends.
 
 
 # %%

@@ -279,7 +279,7 @@ assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 
 # %% [markdown]
 # Both methods find the same pressure, up to the error of the mesh. If $\gamma_0$ is too small, the
-# energy has no minimum, as in chapter 1 (exercise 4.4).
+# energy is not convex, as in chapter 1 (exercise 4.4).
 #
 # ## Friction with a given bound
 #
@@ -309,7 +309,7 @@ assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
 # The remedy is to treat the rigid motions as unknowns of the interface problem. In the plane there
 # are three: two translations and a rotation. The columns of a matrix $V$ hold what these motions do
 # to the contact. The unknowns $\lambda$ say how far the block moves in each of them. In return, the
-# contact forces have to balance the load, and $s$ is minus the load in each motion:
+# contact forces have to balance the load, and $s$ is the load in each motion:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0 . $$
 #
@@ -329,6 +329,7 @@ print(
 
 assert floating.V.shape[1] == 3 and resting.solved
 assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
+assert np.isclose(floating.s.min(), -4.0)  # the load, downwards
 
 # %% [markdown]
 # ## Exercises

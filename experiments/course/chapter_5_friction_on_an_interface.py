@@ -64,7 +64,7 @@ _ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim
 #
 # First let the friction bound $g_i$ of every node be given. Then the solution is the minimum of an
 # energy. The *primal* problem has the displacements $u$ of the contact and the motion $\lambda$ of
-# the plate as its unknowns. With the stiffness $S = Q^{-1}$ it is
+# the plate as its unknowns. With the stiffness $S = Q^{-1}$ of the components that can move it is
 #
 # $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| . $$
 #
@@ -113,8 +113,8 @@ assert np.allclose(S @ (u.value - q - V @ plate.value)[moves], r.value[moves], a
 # ## Method 1: Tresca's iteration
 #
 # Solve the dual for a bound $g$, set $g = \mu r_n$, and repeat. Each step is one quadratic program
-# (QP: a quadratic cost with linear constraints). The certificate falls by the same factor in every
-# step. It stops falling when it has reached the accuracy of the QP solver.
+# (QP: a quadratic cost with linear constraints). As soon as no node changes its state any more, the
+# certificate falls by about the same factor in every step. It stops falling when it has reached the accuracy of the QP solver.
 
 # %%
 g.value, road = np.zeros(k), []
@@ -172,7 +172,7 @@ assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ra
 
 # %% [markdown]
 # Once the states are right, the next step is exact. Therefore Newton's method ends with an error of
-# the size of rounding. Tresca's iteration does not.
+# the size of rounding. Tresca's iteration comes closer step by step, as far as its QP solver allows.
 #
 # ## Method 3: a cone program with a shift
 #
@@ -189,8 +189,8 @@ assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ra
 # the contact force of the last iteration to the force of the spring. By repetition it removes the
 # error, although $\kappa$ is moderate.
 #
-# Now we compare five methods. Each is asked for a small certificate and for smaller and smaller
-# ones.
+# Now we compare five methods. Each is asked for a certificate of $10^{-2}$, and then for smaller and
+# smaller ones.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")

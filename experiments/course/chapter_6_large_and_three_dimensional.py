@@ -30,8 +30,9 @@ from contactopt.teaching import Slider, check
 # %% [markdown]
 # ## The mechanical system
 #
-# A rigid plate presses a square rubber block on a foundation with 100 N. The system has two planes
-# of symmetry, so a quarter of it is enough. It has a fourth of the unknowns, and the same answer.
+# A rigid plate presses a square rubber block on a foundation with 100 N. Two planes of symmetry cut
+# the system into four equal quarters, and one of them is enough. It has about a fourth of the
+# unknowns, and the same answer.
 #
 # The normal $n$ points out of the foundation, upwards. The two tangents $t_1$ and $t_2$ lie in the
 # surface, along $x$ and $y$. Every contact has three components in the order $(n, t_1, t_2)$: the
@@ -62,8 +63,8 @@ ax.view_init(elev=22, azim=-58)
 #
 # As before, let the friction bound $g_i$ of every contact be given first. Only one thing is new:
 # $|r_{t,i}|$ and $|u_{t,i}|$ are now the lengths of vectors with two components. $S = Q^{-1}$ is
-# the stiffness at the contact. $V$ is the motion of the plate, $\lambda$ its size, and $s$ is minus
-# the load on it.
+# the stiffness at the contact. $V$ is the motion of the plate, $\lambda$ its size, and $s$ is the
+# load in this direction.
 #
 # Primal, in displacements:
 #

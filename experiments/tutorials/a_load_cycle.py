@@ -113,7 +113,7 @@ assert np.allclose(history["stick_half_width"][loading], exact, rtol=0.03)
 # ## Unloading: slip turns round
 #
 # Now reduce $T$ from its largest value $T^*$. The edge slips back at once, while the middle keeps
-# the traction that it had. To slip *against* the old direction the traction has to change by $2 \mu
+# the slip that it had. To slip *against* the old direction the traction has to change by $2 \mu
 # p$, from one bound to the other. So unloading is a first loading in the other direction and of
 # twice the size. This is Masing's rule:
 #

@@ -118,8 +118,8 @@ assert np.allclose(r, solve(problem).reactions, atol=1e-6 * r.max())
 # ## The experiment
 #
 # One file says what is run. Every combination of the listed values is one run. The first problems
-# are elastic: the flat punch on three meshes. The others are harder: $Q$ has rank 10 only for 12
-# contacts, so the forces are not unique. They come from a generator that we write and register in
+# are elastic: the flat punch on three meshes. The others are harder: $Q$ has rank 10 only for the 24
+# components of 12 contacts, so the forces need not be unique. They come from a generator that we write and register in
 # the same way.
 
 # %%

@@ -231,8 +231,8 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 
 # %% [markdown]
 # The condition number of the whole $Q$ is about ten times that of its normal block, but it grows at
-# the same rate. The reason is one more soft motion: the punch, which is held at its top, can sway
-# sideways.
+# the same rate. The main reason is one more soft motion: the punch, which is held at its top, can
+# sway sideways.
 #
 # [Tutorial 3](why_the_preconditioner_works.py) shows how an iterative method can undo the division
 # by $|\xi|$.

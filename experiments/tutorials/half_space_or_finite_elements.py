@@ -58,7 +58,7 @@ assert np.allclose(small.Q @ r, Q @ r)
 
 # %% [markdown]
 # The array above has $432^2$ entries. With $512 \times 512$ points it would have $6 \cdot 10^{11}$,
-# but the transforms need a few megabytes only. Nothing else changes: the problem $u = Qr + V\lambda
+# but the transforms need about a hundred megabytes only. Nothing else changes: the problem $u = Qr + V\lambda
 # + q$, its solvers and its certificate are the same as for finite elements.
 
 # %%

@@ -11,6 +11,8 @@
 # museum](../museum.md#one-node-one-solution-or-three) show the same with sliders.
 
 # %%
+from dataclasses import replace
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
@@ -95,11 +97,12 @@ assert all(s.residual < 1e-12 for s in solutions)
 # lies between the two. All three obey every law exactly. Which one happens in reality depends on
 # what happened before, and the data say nothing about that.
 #
-# If a method starts near one of the solutions, it finds this one:
+# Newton's method finds the solution near which it starts:
 
 # %%
 for s in solutions:
-    again = solve(problem, "newton", start=s)
+    nearby = replace(s, reactions=s.reactions + np.array([[0.001, -0.0003]]))
+    again = solve(problem, "newton", start=nearby)
     assert again.solved and np.allclose(again.reactions, s.reactions)
 print("from nothing:", solve(problem).reactions[0])
 

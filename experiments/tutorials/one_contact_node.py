@@ -164,7 +164,7 @@ assert np.allclose(error[1:] / error[:-1], mu * Q[0, 1] / Q[0, 0], rtol=1e-2)
 
 # %% [markdown]
 # Does more friction push this factor beyond one, so that the iteration fails? For this load it does
-# not. From $\mu = 0.84$ on the node sticks. Then the friction force no longer depends on $\mu$, and
+# not. From $\mu = 5/6$ on the node sticks. Then the friction force no longer depends on $\mu$, and
 # the factor is $Q_{nt}^2 / (Q_{nn} Q_{tt}) = 0.13$, which is below one for every positive definite
 # $Q$.
 #
