@@ -11,6 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from browser import CHROMIUM, Browser
 from test_how_tos import PAGES
 
 import contactopt
@@ -128,6 +129,28 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
                     f"{path.name} links to {target}"
                 )
     assert (built / "_static" / "mathjax" / "tex-chtml.js").exists()
+
+
+FITS = """all.map((slide, k) => { show(k); return slide.scrollHeight <= slide.clientHeight
+  && [...slide.querySelectorAll("main > div")].every((part) => part.scrollHeight <= part.clientHeight + 1) })"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the slides with")
+def test_slides_fit_and_their_formulas_and_figures_are_drawn(built):
+    files = sorted((built / "lectures").glob("*.html"))
+    assert len(files) == 12
+    for file in files:
+        with Browser(file, 1280, 720) as page:
+            page.wait("window.ready")
+            assert page.ask("all.length") >= 8 and all(page.ask(FITS))
+            assert page.ask("document.querySelectorAll('main mjx-container').length") > 5
+            assert page.ask("document.querySelectorAll('mjx-merror').length") == 0
+            pictures = page.ask(
+                "[...document.querySelectorAll('figure img')].map((i) => i.naturalWidth)"
+            )
+            assert pictures and min(pictures) > 100
+            assert not page.faults
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import generate
+import lectures
 import museum
 
 import contactopt
@@ -29,6 +30,7 @@ exclude_patterns = [
     "performance.md",
     "course.md",
     "museum.md",
+    "lecturers.md",
     "museum/*",
     "generated/notebooks",
     "**/__pycache__",
@@ -50,6 +52,13 @@ autodoc_default_options = {"members": True}
 maximum_signature_line_length = 100
 
 
+def write_lectures(app, error):
+    """Write the slides, from the notebooks that MyST-NB has executed."""
+    notebooks = Path(app.outdir).parent / "jupyter_execute" / "generated"
+    if error is None:
+        lectures.write(notebooks, Path(app.outdir) / "lectures")
+
+
 def setup(app):
     """Register the reader of docstrings, and write the pages that are made from tables."""
     app.connect(
@@ -65,4 +74,5 @@ def setup(app):
     )
     app.connect("builder-inited", lambda app: generate.write_pages(Path(app.srcdir)))
     app.connect("build-finished", lambda app, error: museum.write(Path(app.outdir) / "museum"))
+    app.connect("build-finished", write_lectures)
     return {"parallel_read_safe": True}
