@@ -221,12 +221,28 @@ def test_a_coupled_way_that_turns_out_dear_is_left(coupled_by_a_little, thicknes
     solved = solve_scene(scene)
     solution, notes = solved.solution, " ".join(solved.solution.notes)
     assert solution.solved and not isinstance(solved.reduction.problem.Q, InterfaceOperator)
-    assert "takes more V-cycles" in notes and "takes its place" in notes
+    assert "more V-cycles of multigrid are needed" in notes and "replaces them" in notes
     assert solution.seconds["given up"] > 0
     expected = solve_scene(scene, options=Options(solver="superlu")).solution
     assert np.array_equal(solution.reactions, expected.reactions)
     again = solve_scene(scene, start=solved)  # which does not try it once more
     assert again.solution.solved and "given up" not in again.solution.seconds
+
+
+def test_one_way_after_the_other_is_left_until_one_keeps_its_promise(
+    coupled_by_a_little, monkeypatch
+):
+    for way in costs.COSTS:
+        if way[0] == "products":
+            monkeypatch.setitem(costs.COSTS, way, (0.95, *[0.0] * (len(costs.COSTS[way]) - 1)))
+    monkeypatch.setitem(costs.USUAL, "products", 10)
+    scene = _blocks(0.05, 0.3)
+    solved = solve_scene(scene)
+    first, second = solved.solution.notes
+    assert "more V-cycles of multigrid are needed" in first and "implicit Q" in first
+    assert "more products with Q are needed" in second and "explicit Q" in second
+    expected = solve_scene(scene, options=Options(Q="explicit", solver="superlu")).solution
+    assert np.array_equal(solved.solution.reactions, expected.reactions)
 
 
 def test_a_coupled_way_that_keeps_its_promise_is_kept(coupled_by_a_little):

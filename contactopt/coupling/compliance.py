@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from contactopt.bodies.protocol import Body
 from contactopt.coupling.coupling import Coupling
 from contactopt.errors import InputError
+from contactopt.linear.budget import spend
 from contactopt.linear.concurrency import each
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import Interface, InterfaceOperator, Product, dense
@@ -71,6 +72,8 @@ def operator(
     parallel = _parallel(moving)
     acts = each(lambda term: term[0].product(term[1]), moving, parallel)
     terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
+    iterative = any(body.iterative for body in bodies)
+    unknowns = sum(B.shape[1] for B in maps)
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
         def moves(term: tuple[Product, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -81,6 +84,8 @@ def operator(
                 columns = np.flatnonzero(load.any(axis=0))
             return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
 
+        if not iterative:  # V-cycles are counted where they are made
+            spend(X.shape[1] * unknowns)
         out = np.zeros(X.shape)
         for (_, rows), (columns, own) in zip(terms, each(moves, terms, parallel)):
             out[np.ix_(rows, columns)] += own
@@ -89,7 +94,6 @@ def operator(
     weights = [nodal_weights(made.chart, made.areas) for made in couplings]
     moved = np.any([body.moved(B) for body, B in zip(bodies, maps)], axis=0)
     complete = all(body.complete for body in bodies)
-    iterative = any(body.iterative for body in bodies)
     return InterfaceOperator(
         product,
         estimate_diagonal(product, weights, moved),

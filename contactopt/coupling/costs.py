@@ -27,8 +27,9 @@ COSTS: dict[tuple[str, str], tuple[float, ...]] = {
     ("products", "pardiso"): (1.15e-01, 5.45e-07, 0.0, 8.84e-08, 8.31e-04, 1.06e-06),
     ("coupled", "multigrid"): (1.58e-01, 1.72e-06, 9.96e-04, 3.40e-07),
 }
-CYCLES = 125  # V-cycles of all bodies by the coupled way, in the mean of the scenes of the fit
-MOST_DEARER = 10.0  # times the cost of the coupled way, up to which another way may replace it
+# steps of a way, in the mean of the scenes of the fit: V-cycles of all bodies, or products with Q
+USUAL = {"coupled": 125, "products": 58}
+MOST_DEARER = 10.0  # times the cost of a way, up to which another way may replace it
 FORM_OF = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
 
 
@@ -94,37 +95,49 @@ def estimates(
 
 @dataclass(frozen=True)
 class NextBest:
-    """The way to take where the coupled way turns out dearer than it promised.
+    """The way to take where one of many steps turns out dearer than it promised.
 
-    Q, solver : The form of Q and the solver of the bodies.
-    cycles : V-cycles of the coupled way that cost as much as both ways were estimated to cost. Who
-        gives up after them has spent at most twice what the better of the two would have taken.
+    left : The way that is left then: 'coupled' or 'products'.
+    Q, solver : The form of Q and the solver of the bodies to take instead.
+    expected : Work [steps times unknowns] of the way that is left, by its estimate.
+    most : Work that costs as much as both ways were estimated to cost. Who gives up after it has
+        spent at most twice what the better of the two would have taken.
+    then : What takes the place of this way in turn; None where nothing does.
     """
 
+    left: str
     Q: str
     solver: str
-    cycles: float
+    expected: float
+    most: float
+    then: NextBest | None
 
 
-def next_best(costs: Mapping[tuple[str, str], float], once: bool) -> NextBest | None:
-    """The best of the ways without multigrid, where the coupled way is the cheapest of all.
+def next_best(costs: Mapping[tuple[str, str], float], unknowns: int, once: bool) -> NextBest | None:
+    """The best of the ways that can take the place of the cheapest one.
 
-    None where another way is the cheapest, or where all others cost too much to fall back on.
+    Any way by factors takes the place of the coupled one, and a dense Q that of products.
 
     Parameters
     ----------
     costs, once : As from `estimates`.
+    unknowns : Number of displacement unknowns of all bodies, which each step goes over.
 
     Returns
     -------
-    The way, and when to take it.
+    The way, and when to take it. None where a dense Q is the cheapest, or where all others cost too
+    much to fall back on.
     """
-    others = [way for way in costs if way[0] != "coupled"]
     taken = min(costs, key=lambda way: costs[way])
-    if taken[0] != "coupled" or not others:
+    surer = {"coupled": ("dense", "products"), "products": ("dense",), "dense": ()}[taken[0]]
+    others = {way: cost for way, cost in costs.items() if way[0] in surer}
+    if not others:
         return None
-    best = min(others, key=lambda way: costs[way])
-    ratio = costs[best] / costs[taken] * (1.0 if once else AGAIN)
+    best = min(others, key=lambda way: others[way])
+    again = AGAIN if taken[0] == "coupled" and not once else 1.0
+    ratio = costs[best] / costs[taken] * again
     if ratio > MOST_DEARER:
         return None
-    return NextBest(FORM_OF[best[0]], best[1], CYCLES * (1.0 + ratio))
+    work = float(USUAL[taken[0]] * unknowns)
+    then = next_best(others, unknowns, once)
+    return NextBest(taken[0], FORM_OF[best[0]], best[1], work, work * (1.0 + ratio), then)

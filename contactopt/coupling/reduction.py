@@ -33,7 +33,7 @@ from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import card, count, line
 from contactopt.coupling.compliance import compliance, filling, operator
-from contactopt.coupling.costs import CYCLES, FORM_OF, estimates, next_best
+from contactopt.coupling.costs import FORM_OF, estimates, next_best
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.coupling.posed import posed
@@ -262,7 +262,7 @@ def reduce_bodies(
 
     Raises
     ------
-    TooDear : Where a budget of V-cycles is open (contactopt.linear.budget) and too low.
+    TooDear : Where a budget of work is open (contactopt.linear.budget) and too low.
     """
     start = time.perf_counter()
     assembled, couplings, maps, planes = posed(scene, elements, zone, Q, coupling)
@@ -299,7 +299,7 @@ def _way(
     once: bool,
 ) -> tuple[str, str]:
     """The form of Q and the solver of the bodies that were asked for; for `auto`, those of
-    the cheapest way. Where that is the coupled one, the budget that is open gets its limit.
+    the cheapest way. Where that takes many steps, the budget that is open gets its limit.
     """
     Q, solver = asked
     if any(body.iterates(solver) for body in assembled if not body.work.stiffness):
@@ -313,10 +313,7 @@ def _way(
     way, solver = min(costs, key=lambda own: costs[own])
     told = ", ".join(f"{name} {by} {cost:.2g} s" for (name, by), cost in costs.items())
     log.info("scene '%s': the way is %s by %s, of %s", scene.name, way, solver, told)
-    other = next_best(costs, once)
-    if other is not None:
-        size = sum(body.unknowns for body in assembled)
-        fill(CYCLES * size, other.cycles * size, other)
+    fill(next_best(costs, sum(body.unknowns for body in assembled), once))
     return FORM_OF[way], solver
 
 

@@ -1,7 +1,8 @@
-"""What a solution by V-cycles may cost before another way to it is the better bargain.
+"""What a solution may cost before another way to it is the better bargain.
 
-Work is counted in V-cycles times the unknowns of their body. Whoever solves a scene opens a budget,
-the choice of the way fills it in, and every V-cycle of multigrid draws on it, wherever it is made.
+Work is counted in V-cycles, or in products with Q by factors, times the unknowns of the bodies that
+they go over. Whoever solves a scene opens a budget, and the choice of the way fills it in. Every
+V-cycle of multigrid and every product by factors draws on it, wherever it is made.
 """
 
 from __future__ import annotations
@@ -10,26 +11,35 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
+
+
+class Alternative(Protocol):
+    """Another way to a solution, the work that was expected of the first one, and the most that it
+    may take.
+    """
+
+    @property
+    def expected(self) -> float: ...
+    @property
+    def most(self) -> float: ...
 
 
 @dataclass(eq=False)
 class Budget:
-    """Work that was done, that was expected, that may be done, and what is done instead of more."""
+    """Work that was done, and what is done instead of too much of it."""
 
     spent: float = 0.0
-    expected: float = 0.0
-    most: float = float("inf")
     instead: Any = None
 
     def check(self, work: float) -> None:
         """TooDear if so much work in all is too much."""
-        if work > self.most:
+        if self.instead is not None and work > self.instead.most:
             raise TooDear(self.instead)
 
 
 class TooDear(Exception):
-    """More V-cycles are needed than another way to the solution would cost.
+    """More work is needed than another way to the solution would cost.
 
     instead  the other way
     """
@@ -48,19 +58,21 @@ def _present() -> Budget:
 
 
 @contextmanager
-def open_budget() -> Iterator[None]:
-    """Count the V-cycles inside the block from zero on, and without a limit until `fill`."""
-    token = _open.set(Budget())
+def open_budget(instead: Alternative | None = None) -> Iterator[None]:
+    """Count the work inside the block from zero on; without a limit where there is no other way,
+    until `fill` names one.
+    """
+    token = _open.set(Budget(instead=instead))
     try:
         yield
     finally:
         _open.reset(token)
 
 
-def fill(expected: float, most: float, instead: Any) -> None:
-    """Say what the budget that is open is made for, and what is done where it is too low."""
-    budget = _present()
-    budget.expected, budget.most, budget.instead = expected, most, instead
+def fill(instead: Alternative | None) -> None:
+    """Say what is done where the budget that is open is too low, if anything is."""
+    if instead is not None:
+        _present().instead = instead
 
 
 def spend(work: float) -> None:
@@ -78,4 +90,5 @@ def spent() -> float:
 def expect(slower: float) -> None:
     """TooDear if the budget does not allow `slower` times the work that was expected."""
     budget = _present()
-    budget.check(budget.expected * slower)
+    if budget.instead is not None:
+        budget.check(budget.instead.expected * slower)

@@ -87,8 +87,8 @@ class Solved:
            from each solution; none if the scene has no zone
     path   all states of a load path, of which this is the last one; None where there is one state
            only
-    turned the way that was taken in place of the coupled one, which turned out to be too dear; None
-           where the first choice was kept
+    turned the way that was taken in place of one that turned out to be too dear; None where the
+           first choice was kept
     """
 
     reduction: Reduction
@@ -127,19 +127,35 @@ def solve_scene(
     if start is not None and start.turned is not None:
         options = replace(options, Q=start.turned.Q, solver=start.turned.solver)
         return replace(_one_way(scene, elements, zone, options, start, once), turned=start.turned)
-    begin = time.perf_counter()
-    try:
-        with open_budget():
-            return _one_way(scene, elements, zone, options, start, once)
-    except TooDear as too_dear:
-        gone, other = time.perf_counter() - begin, too_dear.instead
-    note = f"multigrid takes more V-cycles here than expected; {other.solver} takes its place"
-    options.note(note)
-    options = replace(options, Q=other.Q, solver=other.solver)
-    solved = _one_way(scene, elements, zone, options, start, once)
+    gone = 0.0
+    notes: tuple[str, ...] = ()
+    turned: NextBest | None = None
+    while True:
+        begin = time.perf_counter()
+        try:
+            with open_budget(turned and turned.then):
+                solved = _one_way(scene, elements, zone, options, start, once)
+            break
+        except TooDear as too_dear:
+            turned = too_dear.instead
+        gone += time.perf_counter() - begin
+        notes = (*notes, _left(turned))
+        options.note(notes[-1])
+        options = replace(options, Q=turned.Q, solver=turned.solver)
+    if turned is None:
+        return solved
     solution = solved.solution
-    seconds, notes = solution.seconds | {"given up": gone}, (*solution.notes, note)
-    return replace(solved, solution=replace(solution, seconds=seconds, notes=notes), turned=other)
+    solution = replace(
+        solution,
+        seconds=solution.seconds | {"given up": gone},
+        notes=(*solution.notes, *notes),
+    )
+    return replace(solved, solution=solution, turned=turned)
+
+
+def _left(other: NextBest) -> str:
+    steps = {"coupled": "V-cycles of multigrid", "products": "products with Q"}[other.left]
+    return f"more {steps} are needed than expected; an {other.Q} Q by {other.solver} replaces them"
 
 
 def _one_way(
@@ -151,7 +167,7 @@ def _one_way(
     once: bool,
 ) -> Solved:
     """The scene solved by the way that the options name, or the cheapest one; TooDear where that
-    is the coupled one and its V-cycles cost more than they promised.
+    takes many more steps than expected.
     """
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver, once=once)

@@ -20,6 +20,7 @@ LIMIT = 60.0  # s for each solve
 SCENES = {
     "cubes": ((16, 16), 1.0, 0.3, 1.0),
     "flat bricks, 12 to 1": ((20, 12), 20.0, 0.3, 1.0),
+    "thin plate, 60 to 1": ((28, 6), 60.0, 0.3, 1.0),
     "nearly incompressible": ((16, 16), 1.0, 0.4995, 1.0),
     "graded to the contact": ((16, 16), 1.0, 0.3, 3.0),
 }

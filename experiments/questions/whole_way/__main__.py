@@ -1,157 +1,47 @@
 """How much accuracy does a second buy on the whole way, from the mesh to the answer?
 
 Scenes with exact answers are solved on finer and finer meshes in every way that fits them. A second
-table sets the tolerance of the solver against the mesh. The environment variable TAMAAS names a
-Python that has the peer Tamaas.
+table sets the tolerance of the solver against the mesh. The environment variables TAMAAS, GETFEM
+and KRATOS name Pythons that have these peers.
 """
 
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
 
-from contactopt import HalfSpace, Scene, reduce_bodies, scenes, solve
-from contactopt.accuracy import refine
-from contactopt.readings.half_space_readings import surface_contact
+from contactopt import scenes, solve
 from contactopt.readings.quantities import value_of
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
 from experiments.questions import elements as bricks
 from experiments.questions.accuracy.half_space import flat, indenter
-from experiments.questions.half_spaces.rough import TAMAAS
+from experiments.questions.whole_way.ours import (
+    FINEST,
+    QUANTITIES,
+    SHORT,
+    Row,
+    adaptive,
+    cattaneo,
+    half_space,
+    meshed,
+    rough,
+    tamaas,
+)
+from experiments.questions.whole_way.peers import CODES, hertz_line
 from experiments.report import COLUMN, label_lines, measure, paper_axes, stored
 
-Row = dict[str, Any]
-QUANTITIES = ("peak", "width", "stick", "approach")
 LARGE, SMALL = 1e4, 20.0  # bodies of graded and of uniform meshes over the half-width
-BOX = 2.5  # side of the square of a half-space's points over the contact radius
 TOLERANCES = tuple(10.0**-power for power in range(1, 9))
 MESHES = (4, 8, 16, 32, 64)
-SHORT = 0.5  # CPU seconds, below which a run is repeated three times
 FORMS = ("explicit", "implicit")  # of Q, on graded linear meshes
 MARGIN = 0.1  # of the mesh's own error, within which a tolerance no longer matters
-
-
-def timed(act: Callable[[], Any]) -> tuple[float, Any]:
-    """CPU seconds, the median of three where it is short, and the answer."""
-    seconds: list[float] = []
-    while len(seconds) < (3 if sum(seconds) < SHORT else 1):
-        start = time.process_time()
-        answer = act()
-        seconds.append(time.process_time() - start)
-    return median(seconds), answer
-
-
-def relative(values: dict[str, float], scene: Scene) -> dict[str, float]:
-    """Errors over the exact values; nan for what the scene does not have."""
-    exact, out = scene.reference, dict.fromkeys(QUANTITIES, np.nan)
-    truth = {"peak": exact.peak, "width": exact.half_width, "approach": exact.approach}
-    if exact.stick_half_width:
-        truth["stick"] = exact.stick_half_width / exact.half_width
-    return out | {key: value / truth[key] - 1 for key, value in values.items()}
-
-
-def meshed(scene: Scene, read: tuple[str, ...], form: str = "auto") -> Row:
-    """One scene with a mesh, remeshed to its contact zone where it has one."""
-    seconds, solved = timed(lambda: solve_zone(scene, options=Options(Q=form, tol=1e-9)))
-    return whole(scene, solved, read, seconds)
-
-
-def whole(scene: Scene, solved: Any, read: tuple[str, ...], seconds: float) -> Row:
-    """The row of a solved scene."""
-    reduction, solution = solved.reduction, solved.solution
-    names = {"peak": "pressure"}
-    values = {q: value_of(names.get(q, q), reduction, solution) for q in read}
-    return {"unknowns": reduction.dofs, "seconds": seconds} | relative(values, scene)
-
-
-def adaptive(scene: Scene, target: float) -> Row:
-    """The search for a target of the peak pressure, all its meshes included."""
-    seconds, (solved, _) = timed(lambda: refine([scene], "pressure", target, adaptive=True))
-    return whole(scene, solved, ("peak", "width"), seconds)
-
-
-def half_space(points: int) -> Row:
-    """Hertz's point contact on a half-space without a mesh."""
-    scene = box_scene(points)
-
-    def act() -> Any:
-        reduction = reduce_bodies(scene)
-        return reduction.problem, solve(reduction.problem, tol=1e-9)
-
-    seconds, (problem, solution) = timed(act)
-    pressure = solution.reactions[:, 0] / problem.areas
-    values = round_contact(np.linalg.norm(problem.chart.places, axis=0), pressure, scene)
-    values["approach"] = -float(solution.multipliers[0])
-    return {"unknowns": 3 * problem.contacts, "seconds": seconds} | relative(values, scene)
-
-
-def box_scene(points: int) -> Scene:
-    """A rigid sphere on a square of points that is BOX contact radii wide."""
-    scene = scenes.hertz_half_space()
-    side = BOX * scene.reference.half_width
-    ticks = (np.arange(points) + 0.5) * side / points - side / 2
-    assert isinstance(scene.lower, HalfSpace)
-    return replace(scene, lower=replace(scene.lower, points=(ticks, ticks)))
-
-
-def round_contact(distance: np.ndarray, pressure: np.ndarray, scene: Scene) -> dict[str, float]:
-    """Peak and radius of p^2 = p0^2 (1 - r^2 / a^2), fitted inside and near the edge."""
-    a = scene.reference.half_width
-    inner = distance < 0.5 * a
-    edge = (distance > 0.5 * a) & (distance < 0.95 * a)
-    top = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, 2)[-1]
-    slope, at = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
-    return {"peak": float(np.sqrt(top)), "width": float(np.sqrt(-at / slope))}
-
-
-def tamaas(points: int, python: str) -> Row:
-    """The same points, load and tolerance in Tamaas: Polonsky and Keer's method, its solve only."""
-    scene = box_scene(points)
-    assert isinstance(scene.lower, HalfSpace)
-    problem = reduce_bodies(scene).problem
-    side = BOX * scene.reference.half_width
-    force = 100.0
-    exact = scene.reference
-    radius = exact.half_width**2 / exact.approach
-    modulus = 0.75 * force * radius / exact.half_width**3
-    places = problem.chart.places
-    gap = (np.sum(places**2, axis=0) / (2 * radius)).reshape(points, points)
-    with tempfile.TemporaryDirectory() as folder:
-        given, answer = Path(folder) / "given.npz", Path(folder) / "answer.npz"
-        np.savez(given, gap=gap, length=side, pressure=force / side**2, tol=1e-9, modulus=modulus,
-                 periodic=False)  # fmt: skip
-        subprocess.run([python, "-c", TAMAAS, given, answer], check=True, capture_output=True)
-        theirs = np.load(answer)
-        seconds, pressure = float(theirs["seconds"]), theirs["pressure"].ravel()
-    values = round_contact(np.linalg.norm(places, axis=0), pressure, scene)
-    return {"unknowns": points**2, "seconds": seconds} | relative(values, scene)
-
-
-def cattaneo(points: int) -> Row:
-    """Two like spheres without Poisson's effect, pressed and sheared, on half-spaces."""
-    material = replace(scenes.hertz_half_space().lower.material, nu=0.0)
-    scene = scenes.cattaneo_half_space(material=material, elements=points)
-
-    def act() -> Any:
-        problem = reduce_bodies(scene).problem
-        return problem, solve(problem, tol=1e-9)
-
-    seconds, (problem, solution) = timed(act)
-    numbers = surface_contact(problem, solution)
-    values = {"stick": float(np.sqrt(numbers.stick_area / numbers.area))}
-    return {"unknowns": 3 * problem.contacts, "seconds": seconds} | relative(values, scene)
 
 
 def runs() -> Iterator[tuple[str, str, float, Callable[[], Row]]]:
@@ -183,6 +73,13 @@ def runs() -> Iterator[tuple[str, str, float, Callable[[], Row]]]:
     python = os.environ.get("TAMAAS") or (sys.executable if find_spec("tamaas") else "")
     for n in (16, 32, 64, 128) if python else ():
         yield "Hertz, point", "Tamaas", n, lambda p=n: tamaas(p, python)
+    for n in (160, 256, 512):
+        yield "rough surface", "half-space", n, lambda p=n: rough(p)
+        if python:
+            yield "rough surface", "Tamaas", n, lambda p=n: rough(p, python)
+    for code in CODES:
+        for n in (4, 8, 16, 32):
+            yield "Hertz, line", code, n, lambda c=code, p=n: hertz_line(c, p, LARGE)
     for n in (8, 16, 32, 64):
         yield "Cattaneo, point", "half-space", n, lambda p=n: cattaneo(p)
         sheared = scenes.cattaneo(dim=2, elements=n)
@@ -201,7 +98,7 @@ def rows() -> list[Row]:
     for scene, way, size, act in runs():
         head: Row = {"scene": scene, "way": way, "size": size}
         try:
-            row = head | act() | {"end": "solved"}
+            row = head | dict.fromkeys(QUANTITIES, np.nan) | act() | {"end": "solved"}
         except Exception as error:
             empty = dict.fromkeys(("unknowns", "seconds", *QUANTITIES), np.nan)
             row = head | empty | {"end": str(error).partition(".")[0]}
@@ -326,9 +223,15 @@ What the ways are:
 - **half-space**: no mesh at all; `size` is the number of points along a side.
 - **Tamaas**: another code on the same points. Its time is that of its solve alone.
 
-Not compared on these scenes: CalculiX, which has a [report of its own](../calculix/report.md) on
-one mesh, GetFEM and Kratos, for which no model is written here yet, bodies that are solved by
-iteration together with the contact, and a rough surface.
+- **CalculiX, GetFEM, Kratos**: other finite-element codes on the nodes and elements of our graded
+  linear block. They are given the contact zone, which our ways find in a loop over meshes, and they
+  prescribe the depth of the indenter, not its force. CalculiX takes contact by a penalty, and the
+  other two by augmented Lagrangians.
+
+The rough surface has waves down to a 64th of its side. There is no exact answer: the share of the
+points that touch is compared with that of {finest} x {finest} points.
+
+Not compared on these scenes: bodies that are solved by iteration together with the contact.
 
 **The fronts.** These runs are beaten by no other in both time and error.
 
@@ -354,7 +257,7 @@ if __name__ == "__main__":
     measure(
         "whole_way",
         "Speed against accuracy of the whole way",
-        TEXT.format(short=SHORT, small=SMALL, large=LARGE),
+        TEXT.format(short=SHORT, small=SMALL, large=LARGE, finest=FINEST),
         {
             "rows": rows,
             "tolerances": tolerances,
