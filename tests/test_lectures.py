@@ -1,5 +1,5 @@
-"""The lectures are made of the chapters and tutorials, without a second copy of a sentence; the page
-for lecturers keeps its promises. tests/test_site.py looks at the slides in the browser.
+"""The lectures are made of the chapters and tutorials, without a second copy of a sentence; the
+page for lecturers keeps its promises. tests/test_site.py looks at the slides in the browser.
 """
 
 import html

@@ -131,8 +131,11 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
     assert (built / "_static" / "mathjax" / "tex-chtml.js").exists()
 
 
-FITS = """all.map((slide, k) => { show(k); return slide.scrollHeight <= slide.clientHeight
-  && [...slide.querySelectorAll("main > div")].every((part) => part.scrollHeight <= part.clientHeight + 1) })"""
+FITS = """all.map((slide, k) => {
+  show(k);
+  const parts = [slide, ...slide.querySelectorAll("main > div")];
+  return parts.every((part) => part.scrollHeight <= part.clientHeight + 1);
+})"""
 
 
 @pytest.mark.slow
