@@ -219,6 +219,34 @@ def test_python_on_pages_written_by_hand_runs(path, capsys, tmp_path, monkeypatc
         assert "solved" in capsys.readouterr().out
 
 
+COLUMNS = 80  # of a program on a page; tables of plug-ins have one line for each entry
+
+
+def programs():
+    """The lines of the programs on pages: of pages by hand, tutorials and the gallery."""
+    fences = re.compile(r"```(?:python|toml|sh)\n(?!# in )(.*?)```", re.S)
+    for path in SITE.glob("*.md"):
+        yield from ((path.name, block) for block in fences.findall(path.read_text()))
+    for path in (SITE.parent / "tutorials").glob("*.py"):
+        text = re.sub(r"^# ?", "", path.read_text(), flags=re.M)
+        yield from ((path.name, block) for block in fences.findall(text))
+        yield path.name, "\n".join(re.findall(r"^[^#].*", path.read_text(), re.M))
+    for path in (SITE.parent / "gallery").glob("*.py"):
+        yield path.name, path.read_text().split('"""', 2)[2]
+
+
+def test_programs_fit_a_page():
+    found = list(programs())
+    assert len(found) > 80
+    long = [
+        (name, line) for name, text in found for line in text.splitlines() if len(line) > COLUMNS
+    ]
+    assert not long, long
+    pages = sorted(map(str, SITE.glob("*.md")))
+    formatted = [sys.executable, "-m", "ruff", "format", "--isolated", "--check", "--line-length"]
+    subprocess.run([*formatted, str(COLUMNS), *pages], check=True)
+
+
 def test_what_is_written_by_hand_belongs_to_a_method():
     for path in (SITE / "notes").glob("*.md"):
         assert path.stem in METHODS
