@@ -64,7 +64,7 @@ ax.view_init(elev=22, azim=-58)
 # As before, let the friction bound $g_i$ of every contact be given first. Only one thing is new:
 # $|r_{t,i}|$ and $|u_{t,i}|$ are now the lengths of vectors with two components. $S = Q^{-1}$ is
 # the stiffness at the contact. $V$ is the motion of the plate, $\lambda$ its size, and $s$ is the
-# load in this direction.
+# load on it, positive upwards.
 #
 # Primal, in displacements:
 #
