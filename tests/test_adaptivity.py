@@ -16,6 +16,7 @@ from contactopt.meshes.mesh_refinement import boundary_curves, divide
 from contactopt.meshes.structured import simplices
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
+from contactopt.solving.follow import follow
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
 
@@ -226,5 +227,18 @@ def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
     assert "contacts" in capsys.readouterr().out
     with pytest.raises(InputError, match="needs an aim"):
         run("punch-2d", adaptive=True)
-    with pytest.raises(InputError, match="load path"):
-        run("cattaneo-2d", accuracy=0.1, quantity="energy", adaptive=True)
+    with pytest.raises(InputError, match="that of a load path"):
+        run("punch-2d", accuracy=0.1, quantity="friction_work", adaptive=True)
+
+
+def test_a_hysteresis_loop_has_a_known_error():
+    states = scenes.shear_cycle(2, steps=2, shear=45.0)
+    solved, estimate = refine(states, "friction_work", 0.03, adaptive=True)
+    assert solved.path is not None and len(solved.path.states) == len(states)
+    assert estimate.reached and estimate.extrapolated is None
+    fine = follow(scenes.shear_cycle(2, steps=2, shear=45.0, elements=80))
+    exact = fine.history["friction_work"][-1]
+    first = estimate.levels[0]
+    assert abs(first.value - exact) > 0.03 * exact  # the first mesh is too coarse
+    assert abs(estimate.value - exact) <= estimate.error * estimate.value
+    assert estimate.levels[-1].unknowns < 20 * first.unknowns

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contactopt.cards import count, line
+from contactopt.readings.peaks import Reading
+from contactopt.readings.quantities import Quantity
+from contactopt.solving.solve_scene import Solved
 
 
 @dataclass(frozen=True)
@@ -135,3 +138,11 @@ class Judged:
     grading: float = 0.0
     order: float | None = None
     energy: float = 0.0
+
+
+def read(quantity: Quantity, solved: Solved) -> Reading:
+    """Read a quantity from a solved scene, or from the whole load path if it belongs to that."""
+    if quantity.column:
+        assert solved.path is not None
+        return Reading(float(solved.path.history[quantity.column][-1]))
+    return quantity.read(solved.reduction, solved.solution)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from contactopt.accuracy.estimate import read
 from contactopt.accuracy.marking import spread
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.interface import sensitivity
 from contactopt.derivatives.states import Duals
 from contactopt.errors import InputError
-from contactopt.readings.quantities import Quantity
+from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
 
@@ -100,6 +101,55 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
         errors = tuple(inside + share for inside, share in zip(errors, added))
         between = float(sum(share.sum() for share in added))
     return ElementErrors(value, errors, norm, between)
+
+
+def read_once(solved: Solved, name: str) -> dict[str, float | None]:
+    """Read a quantity from a solution, with the error that this one mesh lets expect.
+
+    Parameters
+    ----------
+    solved : The solved scene.
+    name : Of contactopt.readings.quantities.
+
+    Returns
+    -------
+    "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
+
+    Raises
+    ------
+    InputError : For a quantity that the scene does not have.
+    """
+    quantity = find_quantity(name, solved.reduction.scene)
+    reading = read(quantity, solved)
+    size = np.inf
+    elastic = [part for part in solved.reduction.scene.parts if part.elastic]
+    if solved.path is None and all(part.meshed for part in elastic):
+        errors = element_errors(solved, quantity, reading.value)
+        size = np.inf if errors.unsigned else errors.size
+    size += reading.uncertainty
+    known = np.isfinite(size) and reading.value != 0 and not reading.missing
+    return {"value": reading.value, "error": size / abs(reading.value) if known else None}
+
+
+def along_path(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:
+    """What each element adds to the error of a quantity of a scene, or of a load path.
+
+    Friction remembers the slip of earlier states, so that their errors matter at the end of a path
+    as well. No adjoint goes back over its steps: the elements are marked by the energy of the error
+    of every state, in which the largest one counts for all.
+    """
+    if solved.path is None:
+        return element_errors(solved, quantity, value)
+    energy = replace(quantity, name=ENERGY)
+    found = []
+    for number, state in enumerate(solved.path.states):
+        reduction = solved.reduction.loaded(state.scene)
+        reduction = replace(reduction, problem=solved.path.problem(number))
+        one = replace(solved, reduction=reduction, solution=state.solution, path=None)
+        found.append(element_errors(one, energy, value))
+    bodies = tuple(np.max(own, axis=0) for own in zip(*(each.bodies for each in found)))
+    worst = max(each.energy for each in found)
+    return ElementErrors(value, bodies, worst, unsigned=True)
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy.estimate import Judged
+from contactopt.accuracy.estimate import Judged, read
 from contactopt.accuracy.everywhere import SAFETY, best_order, mesh_error, stuck
-from contactopt.accuracy.indicators import ElementErrors, element_errors
+from contactopt.accuracy.indicators import ElementErrors, along_path
 from contactopt.accuracy.marking import (
     at_contacts,
     check_refinable,
@@ -31,6 +31,7 @@ from contactopt.solving.solve_scene import Options, Solved, solve_scene
 # of the estimated error that the marked elements make; Doerfler's marking allows anything between 0
 # and 1
 SHARE = 0.6
+LESS = 0.25  # by how much the change of a path falls at most from one mesh to the next
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
 
 
@@ -71,9 +72,14 @@ class Locally:
         if self.whole:
             mesh, order = mesh_error(self.values, self.best)
             return Judged(SAFETY * abs(mesh), mesh, order=order)
-        self.errors = element_errors(solved, self.quantity, reading.value)
+        self.errors = along_path(solved, self.quantity, reading.value)
         # of two refinements, since what one changes may be small by chance
-        change = float(np.max(np.abs(np.diff(self.values[-3:])), initial=0.0))
+        changes = np.abs(np.diff(self.values[-3:]))
+        if solved.path is not None:  # nothing but the changes tells the error of a whole path
+            size = SAFETY * float(np.max(changes[::-1] * (1.0, LESS)[: len(changes)], initial=0.0))
+            size = size if len(changes) else np.inf
+            return Judged(size + reading.uncertainty, np.nan, energy=self.errors.energy)
+        change = float(np.max(changes, initial=0.0))
         size = self.errors.size
         if self.errors.unsigned:  # no adjoint: what the last refinement changed, twice
             size = 2 * change if len(self.values) > 1 else np.inf
@@ -136,4 +142,4 @@ class Locally:
         other = self._solved([otherwise(scene, self.shapes) for scene in before])
         if not other.solution.solved:
             return np.inf, sentence
-        return abs(self.quantity.read(other.reduction, other.solution).value - value), sentence
+        return abs(read(self.quantity, other).value - value), sentence

@@ -11,7 +11,7 @@ import numpy as np
 
 from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
-from contactopt.accuracy.estimate import Estimate, Judged, Level
+from contactopt.accuracy.estimate import Estimate, Judged, Level, read
 from contactopt.accuracy.everywhere import Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
@@ -20,7 +20,7 @@ from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
 from contactopt.readings.peaks import Peak, Reading
-from contactopt.readings.quantities import Quantity, find_quantity
+from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse
 from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
@@ -75,15 +75,11 @@ def refine(
     """
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     scene = states[-1]
-    asked = find_quantity(quantity, scene)
+    asked = quantity_of_states(quantity, states)
     if asked.nodal:
         raise InputError(
             f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as"
             " in 'pressure@X,Y'."
-        )
-    if adaptive and len(states) > 1:
-        raise InputError(
-            f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
         )
     options = _in_time(options or Options(), accuracy)
     search: Everywhere | Locally
@@ -152,7 +148,7 @@ class _Loop:
             raise InputError(
                 f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
             )
-        reading = self.quantity.read(reduction, solution)
+        reading = read(self.quantity, solved)
         facts = self.search.facts(solved)
         judged = self.search.judge(solved, reading)
         self.solved, self.reading, self.judged, self.states = solved, reading, judged, states

@@ -13,6 +13,7 @@ derivatives by forces, multipliers and displacements.
     pressure, width              the largest pressure [stress] and the half-width of contact
                                  [length]; of one pair of several pressure:PAIR
     stick                        the half-width of stick over that of contact [-]
+    friction_work                dissipated along a load path [force length]
 
 ROWS has one row for each. What it makes, a Quantity, is all that is known of it, and all that
 errors, gradients, fits and the command line know of it.
@@ -20,7 +21,7 @@ errors, gradients, fits and the command line know of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -53,12 +54,14 @@ class Quantity:
     reader  (reduction, solution) -> Reading: value, uncertainty, local maxima; None: the value of
             the slopes
     nodal   whether it means another thing on the next mesh
+    column  of a load path's history, whose last value it is; empty for what one state has
     """
 
     name: str
     slopes: Callable[[State], Seeds]
     reader: Reader | None = None
     nodal: bool = False
+    column: str = ""
 
     def read(self, reduction: Reduction, solution: Solution) -> Reading:
         """Read it from a solution; InputError where the scene does not have it."""
@@ -86,6 +89,19 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
         named = ", ".join(own for own, (form, _) in ROWS.items() if form == "[:PAIR]")
         raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {named}.")
     return make(name, rest, scene)
+
+
+def quantity_of_states(name: Any, states: Sequence[Scene]) -> Quantity:
+    """As `find_quantity`, for a scene or the states of its load path: InputError also for a
+    quantity of paths where there is one state only.
+    """
+    found = find_quantity(name, states[-1])
+    if found.column and len(states) == 1:
+        raise InputError(
+            f"the {name} is that of a load path, and scene '{states[-1].name}' has one state; give"
+            " it steps, or ask for another quantity."
+        )
+    return found
 
 
 def seeds_of(quantity: Any, state: State) -> Seeds:
@@ -235,6 +251,16 @@ def _pressure_at(state: State, number: int) -> Seeds:
     return Functional(weights)(state)
 
 
+def _path_column(name: str, rest: str, scene: Scene) -> Quantity:
+    def slopes(state: State) -> Seeds:
+        raise InputError(
+            f"the {name} is that of a whole load path: no single state has it, and it has no"
+            " derivative here."
+        )
+
+    return Quantity(name, slopes, column=name)
+
+
 def _energy(state: State) -> Seeds:
     reduction, by_r, by_U = state.reduction, np.zeros(state.problem.q.shape), []
     for number, (body, B) in enumerate(zip(reduction.bodies, reduction.maps)):
@@ -269,5 +295,6 @@ ROWS: dict[str, tuple[str, Callable[[str, str, Scene], Quantity]]] = {
     "normal_force": ("[:PAIR]", _pair_force),
     "shear_force": ("[:PAIR]", _pair_force),
     "resultant": (":PAIR:COMPONENT", _pair_resultant),
+    "friction_work": ("", _path_column),
 }
 NAMES = (*(f"{kind}{form}" for kind, (form, _) in ROWS.items()), *PLACED)
