@@ -43,6 +43,7 @@ ACCURACY = (
     "facing_surfaces",
     "load_cycle",
     "calculix",
+    "second_reading",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
