@@ -236,14 +236,15 @@ sunk = -(F - k * g0) / (k + stiffness)
 
 gamma = 4.0
 v = cp.Variable()
-nitsche = cp.Minimize(  # E - r^2 / (2 gamma), written as one parabola so that cvxpy sees that it is convex
+# E - r^2 / (2 gamma), written as one parabola: so cvxpy sees that it is convex
+nitsche = cp.Minimize(
     (k - k**2 / gamma) / 2 * (v - g0) ** 2
     + F * (1 - k / gamma) * (v - g0)
     + cp.square(cp.pos(k * (v - g0) + F - gamma * v)) / (2 * gamma)
 )
 cp.Problem(nitsche).solve(solver=cp.CLARABEL)
 print(f"Nitsche: gap {v.value:.1e} mm, force {residual_force(v.value):.4f} N")
-print(f"proximal Galerkin after 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
+print(f"proximal Galerkin, 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.loglog(stiffness / k, -sunk, "o-")
@@ -282,7 +283,7 @@ primal_without_spring = cp.Problem(cp.Minimize(-1.0 * gap))
 dual_without_spring = cp.Problem(cp.Minimize(0.0), [force == -1.0])
 for program in (primal_without_spring, dual_without_spring):
     program.solve(solver=cp.CLARABEL)
-print(f"primal: {primal_without_spring.status}, dual: {dual_without_spring.status}")
+print("primal:", primal_without_spring.status, "dual:", dual_without_spring.status)
 
 assert primal_without_spring.status == "unbounded" and dual_without_spring.status == "infeasible"
 

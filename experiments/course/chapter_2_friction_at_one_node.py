@@ -123,7 +123,7 @@ def dual(g, Q=Q, q=q):
 
 
 for g in (0.0, 1.0, 2.0, 3.0):
-    print(f"bound {g} N: primal {np.round(primal(g), 4)}, dual {np.round(dual(g), 4)}")
+    print(f"bound {g} N: primal", np.round(primal(g), 4), "dual", np.round(dual(g), 4))
     assert np.allclose(primal(g), dual(g), atol=1e-4)
 assert np.allclose(dual(3.0), -K @ q, atol=1e-4)  # from 2 N on the node sticks: u = 0
 
@@ -206,7 +206,7 @@ f = cp.Variable(2)
 energy = cp.quad_form(f, cp.psd_wrap(Q)) / 2 + q @ f
 cp.Problem(cp.Minimize(energy), [cp.SOC(mu * f[0], f[1:])]).solve(solver=cp.CLARABEL)
 lifted = Q @ f.value + q
-print(f"associated: force {np.round(f.value, 3)}, gap {lifted[0]:.3f} mm, slip {lifted[1]:.3f} mm")
+print("associated: force", np.round(f.value, 3), "gap and slip", np.round(lifted, 3))
 
 assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 
@@ -284,9 +284,8 @@ assert min(np.abs(np.array(slips[-4:]) - right)) > 0.1  # it has not converged
 wedged = InterfaceProblem(Q, [[0.1, -0.5]], 1.5)
 for found in all_solutions(wedged):
     state = Q @ found.reactions[0] + wedged.q[0]
-    print(
-        f"force {np.round(found.reactions[0], 4)}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm"
-    )
+    force = np.round(found.reactions[0], 4)
+    print(f"force {force}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm")
 
 assert len(all_solutions(wedged)) == 3
 assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1

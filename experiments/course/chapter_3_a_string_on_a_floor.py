@@ -63,7 +63,7 @@ _ = ax.axis("off")
 
 # %%
 def string(N):
-    """Stiffness A [N/mm], weights w [N] and places x [mm] of the inner nodes."""
+    """Stiffness [N/mm], weights [N] and places [mm] of the inner nodes."""
     h = L / N
     A = T / h * (2 * np.eye(N - 1) - np.eye(N - 1, k=1) - np.eye(N - 1, k=-1))
     weight = np.full(N - 1, f * h)
@@ -156,7 +156,8 @@ def lowered(height):
     height = max(height, 1e-9)
     if height < f * L**2 / (8 * T):
         gap, touch = exact(height, line)
-        ax.set_title(f"height {height:.2f} mm: touches from {touch:.2f} to {L - touch:.2f} mm")
+        ends = f"{touch:.2f} to {L - touch:.2f} mm"
+        ax.set_title(f"height {height:.2f} mm: touches from {ends}")
     else:
         gap = height - f / (2 * T) * line * (L - line)
         ax.set_title(f"height {height:.2f} mm: hangs freely")

@@ -145,7 +145,7 @@ def newton(rho=1.0, steps=20):
         pressed = np.maximum(r[n] - rho * u[n], 0) if step > 1 else np.ones(k)
         trial = r[t] - rho * u[t] if step > 1 else np.zeros(k)
         slips = (np.abs(trial) > mu * pressed) & (pressed > 0)
-        # rows of A r + B u = 0: one normal and one tangential equation for every node
+        # rows of A r + B u = 0: a normal and a tangential equation for every node
         A, B = np.zeros((2 * k, 2 * k)), np.zeros((2 * k, 2 * k))
         for i in range(k):
             if pressed[i] == 0:
@@ -164,9 +164,8 @@ def newton(rho=1.0, steps=20):
 
 
 forces, steps = newton()
-print(
-    f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces.reshape(-1, 2)):.0e}"
-)
+certificate = natural_map_residual(problem, forces.reshape(-1, 2))
+print(f"Newton: {steps} steps, certificate {certificate:.0e}")
 
 assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8)
 

@@ -95,8 +95,8 @@ ax.view_init(elev=22, azim=-58)
 
 # %%
 def pulled(degrees):
-    """One node on its own: pressed down by 1 mm and pulled 3 mm in a direction, that angle from the
-    first tangent.
+    """One node on its own: pressed down by 1 mm and pulled 3 mm, in the
+    direction with that angle from the first tangent.
     """
     angle = np.deg2rad(degrees)
     return InterfaceProblem(np.eye(3), [[-1.0, 3 * np.cos(angle), 3 * np.sin(angle)]], 0.5)
@@ -182,7 +182,7 @@ ax.plot(x[slips], y[slips], "rx", ms=5, label="slips", zorder=4)
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
 ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 fig.colorbar(dots, label="pressure [MPa]")
-print(f"{problem.contacts} contacts, {int(slips.sum())} slip, certificate {answer.residual:.0e}")
+print(f"{int(slips.sum())} of {problem.contacts} contacts slip, {answer.residual:.0e}")
 
 assert answer.solved and 0 < slips.sum() < len(slips)
 
@@ -223,9 +223,8 @@ for elements in (4, 8, 12):
     for name in ("none", "neumann"):
         history = solve(implicit, "newton", linear="krylov", preconditioner=name).history
         products[elements].append(history[-1]["products"] / len(history))
-    print(
-        f"{elements} elements: {products[elements][0]:.0f} products without, {products[elements][1]:.0f} with"
-    )
+    without, with_it = products[elements]
+    print(f"{elements} elements: {without:.0f} products without, {with_it:.0f} with")
 
 fig, ax = plt.subplots(figsize=(5, 3.2), layout="constrained")
 ax.plot(
@@ -277,9 +276,8 @@ line = np.linspace(0, 1.3 * hertz.half_width, 200)
 ax.plot(line, hertz.pressure(line), "k", lw=1, label="Hertz")
 ax.set(xlabel="distance from the axis [mm]", ylabel="pressure [MPa]")
 ax.legend(frameon=False)
-print(
-    f"{flat.contacts} contacts, {round_answer.products} products, peak {p.max() / hertz.peak:.4f} of Hertz"
-)
+peak = p.max() / hertz.peak
+print(flat.contacts, "contacts,", round_answer.products, f"products, {peak:.4f} of Hertz")
 
 assert round_answer.solved and abs(p.max() / hertz.peak - 1) < 5e-3
 
@@ -303,9 +301,7 @@ wrong = InterfaceProblem(
 )  # the diagonal in place of Q
 other = solve(wrong)
 difference = np.abs(other.reactions - answer.reactions).max() / answer.reactions.max()
-print(
-    f"with the diagonal in place of Q the forces are wrong by {100 * difference:.0f} % of the largest"
-)
+print(f"with the diagonal in place of Q: wrong by {difference:.0%} of the largest force")
 
 assert difference > 0.1
 

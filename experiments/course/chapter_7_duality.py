@@ -75,7 +75,8 @@ for program in (forces, displacements):
     print(program)
 r, u = forces.variables["r"].value, displacements.variables["u"].value
 print("forces", np.round(r, 4), "N; displacements", np.round(u, 4), "mm")
-print(f"P = {displacements.problem.value:.5f}, D = {-forces.problem.value:.5f} N mm")
+P, D = displacements.problem.value, -forces.problem.value
+print(f"P = {P:.5f}, D = {D:.5f} N mm")
 
 assert np.isclose(displacements.problem.value, -forces.problem.value, atol=1e-5)
 assert np.allclose(displacements.multipliers["reaction"], r, atol=1e-4)
@@ -169,7 +170,7 @@ for _ in range(150):
     errors.append((force - best) @ C @ (force - best) / 2)
     force = admissible(force - (C @ force + start) / np.linalg.norm(C, 2))
 gap = np.sum(gaps, axis=1)
-print(f"after {len(gap)} steps: gap {gap[-1]:.1e} N mm, error {errors[-1]:.1e} N mm")
+print(f"{len(gap)} steps: gap {gap[-1]:.1e} N mm, error {errors[-1]:.1e} N mm")
 
 assert np.all(np.array(gaps) >= -1e-12) and np.all(gap >= np.array(errors) - 1e-10)
 assert gap[-1] < 0.02 * gap[0]
