@@ -37,7 +37,7 @@ exclude_patterns = [
 ]
 html_theme, html_title = "furo", f"contactopt {version}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
-html_search_scorer = "search.js"
+html_search_scorer = str(Path(__file__).parent / "search.js")
 html_show_sourcelink, html_copy_source = False, False
 
 myst_enable_extensions = ["dollarmath", "amsmath"]
