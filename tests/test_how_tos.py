@@ -29,6 +29,7 @@ PAGES = (
     "your_solver",
     "figures_for_a_paper",
     "from_calculix",
+    "take_home",
 )
 BLOCK = re.compile(r"```(python|toml|sh|text)\n(.*?)```", re.S)
 

@@ -9,12 +9,17 @@
 # with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -290,78 +295,86 @@ assert primal_without_spring.status == "unbounded" and dual_without_spring.statu
 # %% [markdown]
 # ## Exercises
 #
-# Replace `...` by your answer, and run the cell and the one below it, which grades your answer. The
-# first two exercises need pen and paper only.
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("1.1")` gives a hint, three times, and then the solution. `table(1)` shows what
+# you have done since the notebook was started. The first three need pen and paper only.
 #
-# **1.1** (Pen and paper.) A spring of stiffness 4 N/mm holds a node 0.5 mm above the floor. A load
-# of 5 N pulls it down. How large are the gap and the contact force?
+# **1.1** (Pen and paper.) A spring of stiffness 4.4 N/mm holds a node 0.6 mm above the floor. A
+# load of 6.5 N pulls it down. How large are the gap and the contact force?
 
 # %% tags=["exercise"]
 answer = (..., ...)  # gap [mm], force [N]
-
-# %% [markdown] tags=["solution"]
-# The spring would let the node sink by $5/4 = 1.25$ mm, which is more than 0.5 mm. So the node
-# touches the floor, $u = 0$, and the contact force is $r = F - k g_0 = 5 - 2 = 3$ N.
-
-# %% tags=["solution"]
-answer = (0.0, 3.0)
-
-# %%
-check("1.1", answer if ... not in answer else ..., (0.0, 3.0))
+check("1.1", answer)
 
 # %% [markdown]
 # **1.2** (Pen and paper.) For which load does the node of exercise 1.1 just touch the floor?
 
 # %% tags=["exercise"]
-answer = ...  # N
-
-# %% [markdown] tags=["solution"]
-# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too. A contact
-# whose gap and force are both zero is called *weakly active*.
-
-# %% tags=["solution"]
-answer = 4 * 0.5
-
-# %%
-check("1.2", answer, 2.0)
+answer = ...  # load [N]
+check("1.2", answer)
 
 # %% [markdown]
-# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this
-# chapter ($k = 2$ N/mm, $g_0 = 1$ mm) *up*, with $F = -5$ N. Write the primal program in cvxpy. How
+# **1.3** (Pen and paper.) How large is the compliance $Q$ of a spring of 2.3 N/mm in m/N?
+
+# %% tags=["exercise"]
+answer = ...  # compliance [m/N]
+check("1.3", answer)
+
+# %% [markdown]
+# **1.4** (Program.) Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of
+# this chapter ($k = 2$ N/mm, $g_0 = 1$ mm) *up* with 5.3 N. Write the primal program in cvxpy. How
 # large is the force of the ceiling?
 
 # %% tags=["exercise"]
-answer = ...  # N, positive
-
-# %% [markdown] tags=["solution"]
-# The multiplier of $u \le 2$ is the force of the ceiling. By hand: $-E'(2) = -(2 \cdot 1 - 5) = 3$
-# N.
-
-# %% tags=["solution"]
-w = cp.Variable()
-ceiling = w <= 2
-cp.Problem(cp.Minimize(k * (w - g0) ** 2 / 2 - 5 * w), [w >= 0, ceiling]).solve(solver=cp.CLARABEL)
-answer = float(ceiling.dual_value)
-
-# %%
-check("1.3", answer, 3.0)
+answer = ...  # force of the ceiling [N]
+check("1.4", answer)
 
 # %% [markdown]
-# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks only 0.01 mm
-# into the floor? Give its stiffness as a multiple of the stiffness $k$ of the spring.
+# **1.5** (Program.) How stiff must the penalty spring be, so that the node of this chapter sinks
+# only 0.007 mm into the floor? Give its stiffness as a multiple of the stiffness $k$ of the spring.
 
 # %% tags=["exercise"]
 answer = ...  # kappa / k [-]
+check("1.5", answer)
 
-# %% [markdown] tags=["solution"]
-# The depth is $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ mm. This gives $\kappa = 298$
-# N/mm, which is 149 times the stiffness of the spring.
+# %% [markdown]
+# **1.6** (Program.) The *method of multipliers* repairs the penalty. It starts with $r = 0$. In
+# each step it minimises $E(u) + \tfrac{1}{2\kappa} [\,r - \kappa u\,]_+^2$, and then takes $[\,r -
+# \kappa u\,]_+$ as its new $r$. How large is $r$ after two steps with $\kappa = 5$ N/mm, for the
+# node of this chapter?
 
-# %% tags=["solution"]
-answer = (3 / 0.01 - k) / k
+# %% tags=["exercise"]
+answer = ...  # force after two steps [N]
+check("1.6", answer)
+
+# %% [markdown]
+# **1.7** (Program.) Nitsche's function consists of two parabolas. Give its second derivatives for
+# $\gamma = 2.7$ N/mm, first where $r \lt \gamma u$, then where $r > \gamma u$. Both are positive,
+# as $\gamma > k$.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # second derivative without contact, with contact [N/mm]
+check("1.7", answer)
+
+# %% [markdown]
+# **1.8** (Program.) By which factor does the gap of the proximal Galerkin method change from one
+# step to the next, late in the iteration, with the step size $\alpha = 0.4$?
+
+# %% tags=["exercise"]
+answer = ...  # ratio of two gaps [-]
+check("1.8", answer)
+
+# %% [markdown]
+# **1.9** (Think.) A spring of 3 N/mm holds an upper node 0.5 mm above a floor of its own. From this
+# node a second spring of 1.5 N/mm holds a lower node, 0.2 mm above another floor. Both gaps are
+# those without load. A load of 4 N pulls the lower node down. Find the forces of both floors.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # forces on the upper and on the lower node [N]
+check("1.9", answer)
 
 # %%
-check("1.4", answer, 149.0)
+table(1)
 
 # %% [markdown]
 # ## References

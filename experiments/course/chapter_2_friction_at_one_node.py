@@ -8,12 +8,17 @@
 # You need chapter 1. The chapter takes 40 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -302,78 +307,84 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 #
 # ## Exercises
 #
-# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1, 2)$ mm/N, $q = (-1, 1)$ mm and $\mu =
-# 0.3$. Find the normal force and the friction force.
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("2.1")` gives a hint, three times, and then the solution. `table(2)` shows what
+# you have done since the notebook was started.
+#
+# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1.2, 2.5)$ mm/N, $q = (-1.5, 1.1)$ mm and
+# $\mu = 0.3$. Find the normal force and the friction force.
 
 # %% tags=["exercise"]
-answer = ...  # (r_n, r_t) in N
-
-# %% [markdown] tags=["solution"]
-# Nothing couples the directions, so $r_n = -q_n / Q_{nn} = 1$ N. To stick, the node would need $r_t
-# = -q_t / Q_{tt} = -0.5$ N, which is more than friction can give. So the node slips to the right
-# with $r_t = -0.3$ N. The slip is $u_t = 1 - 0.6 = 0.4$ mm.
-
-# %% tags=["solution"]
-answer = (1.0, -0.3)
-
-# %%
-check("2.1", answer, (1.0, -0.3))
+answer = (..., ...)  # r_n, r_t [N]
+check("2.1", answer)
 
 # %% [markdown]
 # **2.2** (Pen and paper.) What is the smallest friction coefficient with which the node of this
-# chapter sticks?
+# chapter sticks, if $q = (-3.1, 5.3)$ mm?
 
 # %% tags=["exercise"]
-answer = ...
-
-# %% [markdown] tags=["solution"]
-# If the node sticks, $u = 0$, so that $r = -K q = (1, -2)$ N. The cone contains this force if $\mu
-# \ge 2$.
-
-# %% tags=["solution"]
-answer = 2.0
-
-# %%
-check("2.2", answer, 2.0)
+answer = ...  # friction coefficient [-]
+check("2.2", answer)
 
 # %% [markdown]
-# **2.3** Write the iteration of Acary and Cadoux. Solve the case $\mu = 1.5$ with it, in which
-# Tresca's iteration failed. The certificate grades your forces.
+# **2.3** (Program.) Write the iteration of Acary and Cadoux. Solve the case $\mu = 1.5$ with it, in
+# which Tresca's iteration failed. The certificate grades your forces.
 
 # %% tags=["exercise"]
-answer = ...  # (r_n, r_t) in N
-
-# %% tags=["solution"]
-x, shift = cp.Variable(2), cp.Parameter(nonneg=True, value=0.0)
-cost = cp.quad_form(x, cp.psd_wrap(Q)) / 2 + q @ x + 1.5 * shift * x[0]
-program = cp.Problem(cp.Minimize(cost), [cp.SOC(1.5 * x[0], x[1:])])
-for _ in range(60):  # an error shrinks by .7 each time
-    program.solve(solver=cp.CLARABEL)
-    shift.value = abs(float((Q @ x.value + q)[1]))
-answer = x.value
-
-# %%
-check("2.3", answer, InterfaceProblem(Q, [q], 1.5))
+answer = (..., ...)  # r_n, r_t [N]
+check("2.3", answer)
 
 # %% [markdown]
-# **2.4** (Pen and paper.) Find the three solutions of the wedged node, $q = (0.1, -0.5)$ mm and
-# $\mu = 1.5$. Try the three states open, stick, and slip to the left. Give the three normal forces,
-# the smallest first.
+# **2.4** (Pen and paper.) Find the three solutions of the wedged node with $q = (0.13, -0.55)$ mm
+# and $\mu = 1.5$. Give their normal forces, the smallest first.
 
 # %% tags=["exercise"]
-answer = ...  # three numbers [N]
+answer = (..., ..., ...)  # three normal forces, the smallest first [N]
+check("2.4", answer)
 
-# %% [markdown] tags=["solution"]
-# *Open:* if $r = 0$, then $u = q$, and the gap $u_n = 0.1$ mm is not negative. This is a solution.
-# *Stick:* if $u = 0$, then $r = -K q = (0.3, 0.4)$ N, and the cone contains this force, because
-# $0.4 \le 1.5 \cdot 0.3$. *Slip to the left:* $u_n = (1 - 1.5)\, r_n + 0.1 = 0$ gives $r_n = 0.2$ N
-# and $r_t = 0.3$ N. The slip $u_t = -0.2 + 0.6 - 0.5 = -0.1$ mm is negative, as we assumed.
+# %% [markdown]
+# **2.5** (Program.) How large is the gap in the solution of *associated* friction, for the node of
+# this chapter with $\mu = 0.7$?
 
-# %% tags=["solution"]
-answer = (0.0, 0.2, 0.3)
+# %% tags=["exercise"]
+answer = ...  # gap [mm]
+check("2.5", answer)
+
+# %% [markdown]
+# **2.6** (Pen and paper.) Let $Q = \begin{pmatrix} 1.3 & -0.8 \\ -0.8 & 2 \end{pmatrix}$ mm/N.
+# Above which friction coefficient are there loads with several solutions?
+
+# %% tags=["exercise"]
+answer = ...  # friction coefficient [-]
+check("2.6", answer)
+
+# %% [markdown]
+# **2.7** (Think.) Find another load $q$ for which the node of this chapter has three solutions with
+# $\mu = 1.5$. Multiples of $(0.1, -0.5)$ mm do not count.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # q_n, q_t [mm]
+check("2.7", answer)
+
+# %% [markdown]
+# **2.8** (Think.) Take $Q$ of exercise 2.6 and $\mu = 0.7$. By which factor, with its sign, does a
+# step of Tresca's iteration multiply an error of the bound, while the node slips to the right?
+
+# %% tags=["exercise"]
+answer = ...  # factor of the error in one step, with its sign [-]
+check("2.8", answer)
+
+# %% [markdown]
+# **2.9** (Think.) In space a node has two tangential directions. Let $Q = \operatorname{diag}(1, 1,
+# 3)$ mm/N, $q = (-2, 1.5, 2)$ mm and $\mu = 0.5$. Find the three forces. Friction is opposite to
+# the *slip*, and the slip is not parallel to $(1.5, 2)$.
+
+# %% tags=["exercise"]
+answer = (..., ..., ...)  # r_n, r_1, r_2 [N]
+check("2.9", answer)
 
 # %%
-check("2.4", answer, (0.0, 0.2, 0.3))
+table(2)
 
 # %% [markdown]
 # ## References

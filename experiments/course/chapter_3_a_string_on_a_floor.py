@@ -9,12 +9,17 @@
 # minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -304,89 +309,78 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # %% [markdown]
 # ## Exercises
 #
-# **3.1** (Pen and paper.) The ends of the string are only 0.09 mm above the floor. At which
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("3.1")` gives a hint, three times, and then the solution. `table(3)` shows what
+# you have done since the notebook was started.
+#
+# **3.1** (Pen and paper.) The ends of the string are only 0.07 mm above the floor. At which
 # distance from the end does the contact begin?
 
 # %% tags=["exercise"]
 answer = ...  # distance from the end [mm]
-
-# %% [markdown] tags=["solution"]
-# $a = \sqrt{2 T d / f} = \sqrt{0.18 / 8} = 0.15$ mm.
-
-# %% tags=["solution"]
-answer = 0.15
-
-# %%
-check("3.1", answer, 0.15)
+check("3.1", answer)
 
 # %% [markdown]
 # **3.2** (Pen and paper.) Which part of the weight does the floor carry in exercise 3.1?
 
 # %% tags=["exercise"]
-answer = ...  # between 0 and 1
-
-# %% [markdown] tags=["solution"]
-# The floor carries the weight of the part that lies on it. This part is $(L - 2 a) / L = 0.7$.
-
-# %% tags=["solution"]
-answer = 0.7
-
-# %%
-check("3.2", answer, 0.7)
+answer = ...  # part of the weight [-]
+check("3.2", answer)
 
 # %% [markdown]
-# **3.3** A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) / 0.2)^2)$ mm
-# where this number is positive. The ends of the string stay at $d = 0.25$ mm. Change $q$ and solve
-# for the 39 forces. The certificate grades them.
+# **3.3** (Program.) A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) /
+# 0.2)^2)$ mm where this number is positive. The ends of the string stay at $d = 0.25$ mm. Change
+# $q$ and solve for the 39 forces. The certificate grades them.
 
 # %% tags=["exercise"]
 answer = ...  # 39 forces [N]
-
-# %% [markdown] tags=["solution"]
-# The gap is now measured from the hill, so the height of the hill is subtracted from $q$. $Q$ does
-# not change.
-
-# %% tags=["solution"]
-hill = np.maximum(0.2 * (1 - ((x - 0.5) / 0.2) ** 2), 0)
-answer = active_set(Q, q - hill)[0]
-
-
-# %%
-def frictionless(Q, q):
-    """An interface problem in the forces r_n alone: tangential components get the same compliance,
-    and no friction.
-    """
-    return InterfaceProblem(np.kron(Q, np.eye(2)), np.column_stack([q, np.zeros(len(q))]), 0.0)
-
-
-hill_problem = frictionless(Q, q - np.maximum(0.2 * (1 - ((x - 0.5) / 0.2) ** 2), 0))
-given = answer if answer is ... else np.column_stack([answer, np.zeros(len(x))])
-check("3.3", given, hill_problem)
+check("3.3", answer)
 
 # %% [markdown]
-# **3.4** The active set method above starts with the guess that all nodes touch. On 320 elements,
-# start it from the set that it found on 160 elements. How many steps does it take? (`np.repeat` or
-# `np.interp` carry a set to the finer mesh.)
+# **3.4** (Program.) The active set method above starts with the guess that all nodes touch. Count
+# its steps on 320 elements. Then start it from the set that it found on 160 elements, carried to
+# the finer mesh by `np.interp(x_fine, x_coarse, touches) >= 0.5`, and count again.
 
 # %% tags=["exercise"]
-answer = ...  # number of steps
+answer = (..., ...)  # steps from all nodes, steps from the coarse set
+check("3.4", answer)
 
-# %% tags=["solution"]
-A_c, w_c, x_c = string(160)
-A_f, w_f, x_f = string(320)
-coarse = active_set(np.linalg.inv(A_c), d - np.linalg.solve(A_c, w_c))[0]
-touches, Q_f, answer = np.interp(x_f, x_c, coarse > 0) >= 0.5, np.linalg.inv(A_f), 0
-while True:
-    answer += 1
-    forces = np.zeros(len(x_f))
-    forces[touches] = np.linalg.solve(Q_f[np.ix_(touches, touches)], -(d - Q_f @ w_f)[touches])
-    new = forces - (Q_f @ forces + d - Q_f @ w_f) > 0
-    if np.array_equal(new, touches):
-        break
-    touches = new
+# %% [markdown]
+# **3.5** (Program.) *Projected Gauss-Seidel* goes from node to node. At each it changes the force
+# $r_i \ge 0$ of this node alone, so that $u_i = 0$, or $r_i = 0$ if this would need tension. Take
+# four elements and $d = 0.07$ mm, start with $r = 0$, and make one sweep from left to right.
+
+# %% tags=["exercise"]
+answer = (..., ..., ...)  # three forces after one sweep [N]
+check("3.5", answer)
+
+# %% [markdown]
+# **3.6** (Pen and paper.) Which penalty stiffness lets the string of this chapter sink by 0.0003 mm
+# only, where it lies on the floor?
+
+# %% tags=["exercise"]
+answer = ...  # stiffness per length [N/mm^2]
+check("3.6", answer)
+
+# %% [markdown]
+# **3.7** (Think.) The ends of a string of 40 elements are at $d = 0.19$ mm. Its floor is raised to
+# a height $b$, so that $u_i \ge b$ while the ends stay. How large is the derivative of the minimum
+# of the energy by $b$, at $b = 0$?
+
+# %% tags=["exercise"]
+answer = ...  # derivative of the energy [N]
+check("3.7", answer)
+
+# %% [markdown]
+# **3.8** (Think.) Give the condition number of $A$ for $N = 1000$ to three digits, without forming
+# the matrix.
+
+# %% tags=["exercise"]
+answer = ...  # condition number [-]
+check("3.8", answer)
 
 # %%
-check("3.4", answer, lambda steps: 1 <= steps <= 5)
+table(3)
 
 # %% [markdown]
 # ## References
@@ -400,5 +394,4 @@ check("3.4", answer, lambda steps: 1 <= steps <= 5)
 # Next: [from bodies to the interface](chapter_4_from_bodies_to_the_interface.py).
 
 # %% tags=["remove-cell"]
-assert solve(hill_problem).solved
 plt.show()  # opens the figures where this runs as a script

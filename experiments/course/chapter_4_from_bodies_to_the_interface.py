@@ -10,6 +10,8 @@
 # minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
@@ -39,7 +41,10 @@ from contactopt import (
     solve,
 )
 from contactopt.problem.laws.tresca import Tresca
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -332,79 +337,84 @@ assert np.isclose(floating.s.min(), -4.0)  # the load, downwards
 # %% [markdown]
 # ## Exercises
 #
-# **4.1** (Pen and paper.) The block of this chapter has $33 \times 17$ nodes, and the top row is
-# held. How many free unknowns does the primal problem have? How many unknowns does the dual problem
-# with friction have?
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("4.1")` gives a hint, three times, and then the solution. `table(4)` shows what
+# you have done since the notebook was started.
+#
+# **4.1** (Pen and paper.) A mesh of the block has $41 \times 21$ nodes, and its top row is held.
+# How many free unknowns does the primal problem have? How many unknowns does the dual problem with
+# friction have?
 
 # %% tags=["exercise"]
-answer = ...  # (primal, dual)
-
-# %% [markdown] tags=["solution"]
-# $2 \cdot 33 \cdot 16 = 1056$ displacements are free. The dual has two force components at each of
-# the 33 nodes of the bottom, which makes 66.
-
-# %% tags=["solution"]
-answer = (1056, 66)
-
-# %%
-check("4.1", answer, (1056, 66))
+answer = (..., ...)  # unknowns of the primal problem, of the dual problem
+check("4.1", answer)
 
 # %% [markdown]
-# **4.2** (Pen and paper.) The block without a plate is 4 mm wide. The load on it is one vertical
+# **4.2** (Pen and paper.) A block without a plate is 4.6 mm wide. The load on it is one vertical
 # force at the distance $e$ from the middle. What is the largest $e$ for which the block does not
 # tip over?
 
 # %% tags=["exercise"]
-answer = ...  # mm
-
-# %% [markdown] tags=["solution"]
-# The floor can only push. So the resultant of its forces lies between the ends of the block, and
-# $e$ can be at most 2 mm. For a larger $e$ no forces balance the load, and the interface problem is
-# *infeasible*.
-
-# %% tags=["solution"]
-answer = 2.0
-
-# %%
-check("4.2", answer, 2.0)
+answer = ...  # distance from the middle [mm]
+check("4.2", answer)
 
 # %% [markdown]
-# **4.3** Solve the block under the lowered plate with Coulomb's law and $\mu = 0.4$. Use Tresca's
-# iteration of chapter 2, with the program above. Give the forces, one row $(r_n, r_t)$ for each
-# node. The certificate grades them.
+# **4.3** (Program.) Solve the block under the lowered plate with Coulomb's law and $\mu = 0.1$. Use
+# Tresca's iteration of chapter 2, with the program above. Give the forces, one row $(r_n, r_t)$ for
+# each node. The certificate grades them.
 
 # %% tags=["exercise"]
-answer = ...  # (33, 2) forces [N]
-
-# %% tags=["solution"]
-limit = cp.Parameter(len(x), nonneg=True, value=np.zeros(len(x)))
-y = cp.Variable(2 * len(x))
-cost = cp.quad_form(y, cp.psd_wrap(Q)) / 2 + q.ravel() @ y
-program = cp.Problem(cp.Minimize(cost), [y[::2] >= 0, cp.abs(y[1::2]) <= limit])
-for _ in range(12):
-    program.solve(solver=cp.CLARABEL)
-    limit.value = 0.4 * np.maximum(y.value[::2], 0)
-answer = y.value.reshape(-1, 2)
-
-# %%
-check("4.3", answer, InterfaceProblem(Q, q, 0.4))
+answer = ...  # 33 rows r_n, r_t [N]
+check("4.3", answer)
 
 # %% [markdown]
-# **4.4** Nitsche's energy is convex only if one matrix is positive definite on the free unknowns:
-# $K$ minus the matrix of the integral of $p(U)\,p(v) / \gamma$. Compute the smallest eigenvalue of
-# this matrix for $\gamma_0 = 0.1$ and for $\gamma_0 = 10$. Is it positive?
+# **4.4** (Think.) Nitsche's energy is convex only if one matrix is positive definite on the free
+# unknowns: $K$ minus the matrix of the integral of $p(U)\,p(v) / \gamma$. What is the smallest
+# $\gamma_0$ for which it is? (The matrix `fixed` above has the integral with its minus sign, for
+# $\gamma_0 = 10$.)
 
 # %% tags=["exercise"]
-answer = ...  # (True or False for 0.1, True or False for 10)
+answer = ...  # gamma_0 [-]
+check("4.4", answer)
 
-# %% tags=["solution"]
-at_ten = fixed[free][
-    :, free
-].toarray()  # it was assembled with gamma_0 = 10, and scales with 1 / gamma_0
-answer = tuple(bool(np.linalg.eigvalsh(K_free + at_ten * 10 / g)[0] > 0) for g in (0.1, 10.0))
+# %% [markdown]
+# **4.5** (Pen and paper.) An inner node stands on a spring of 3 N/mm. A second spring of 1.7 N/mm
+# joins it to the node that may touch the floor. Eliminate the inner node: how stiff is the other
+# one?
+
+# %% tags=["exercise"]
+answer = ...  # stiffness of the contact [N/mm]
+check("4.5", answer)
+
+# %% [markdown]
+# **4.6** (Pen and paper.) A body in three dimensions becomes 2.5 times as large, and its Young's
+# modulus 1.7 times as large. By which factor does $Q$ change?
+
+# %% tags=["exercise"]
+answer = ...  # factor of Q [-]
+check("4.6", answer)
+
+# %% [markdown]
+# **4.7** (Program.) A rigid beam stands on two points at $x = -1.2$ mm and $x = 2.1$ mm. A load of
+# 7 N presses it down at $x = 0.4$ mm. Write $V$ for the motion upwards and the rotation about $x =
+# 0$, and $s$. Find the two forces.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # forces of the left and of the right point [N]
+check("4.7", answer)
+
+# %% [markdown]
+# **4.8** (Think.) The block of exercise 4.2 carries 10 N at $e = 2.45$ mm, to the right of the
+# middle. No forces of the floor balance it. *Prove* it by a motion: each point rises by $a + \theta
+# x$, no corner ($x = \pm 2.3$ mm) goes into the floor, and the load does positive work. Why is this
+# a proof?
+
+# %% tags=["exercise"]
+answer = (..., ...)  # motion upwards [mm], rotation [-]
+check("4.8", answer)
 
 # %%
-check("4.4", answer, lambda given: tuple(given) == (False, True))
+table(4)
 
 # %% [markdown]
 # ## References

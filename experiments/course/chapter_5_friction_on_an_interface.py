@@ -9,6 +9,7 @@
 # You need chapters 2 and 4. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
 import time
 
 import cvxpy as cp
@@ -16,7 +17,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce, scenes, solve
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -282,73 +286,91 @@ assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, 
 # %% [markdown]
 # ## Exercises
 #
-# **5.1** (Pen and paper.) What is the smallest friction coefficient with which the sledge stands
-# still?
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("5.1")` gives a hint, three times, and then the solution. `table(5)` shows what
+# you have done since the notebook was started.
+#
+# **5.1** (Pen and paper.) A sledge is pressed down with 130 N and pulled with 23 N. What is the
+# smallest friction coefficient with which it stands still?
 
 # %% tags=["exercise"]
-answer = ...
-
-# %% [markdown] tags=["solution"]
-# Together the two runners carry 100 N, so friction can hold $100 \mu$ N. It has to hold 25 N. Hence
-# $\mu = 0.25$.
-
-# %% tags=["solution"]
-answer = 0.25
-
-# %%
-check("5.1", answer, 0.25)
+answer = ...  # friction coefficient [-]
+check("5.1", answer)
 
 # %% [markdown]
-# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the
-# back runner 20 N. The front runner stands on ice, with $\mu = 0.05$. The back runner stands on
-# stone, with $\mu = 0.5$. Write a linear program for the largest pull that the sledge withstands.
+# **5.2** (Pen and paper.) The load of a sledge stands far in front, so that the front runner
+# carries 82 N and the back runner 21 N. The front runner stands on ice, with $\mu = 0.06$. The back
+# runner stands on stone, with $\mu = 0.45$. What is the largest pull that the sledge withstands?
 
 # %% tags=["exercise"]
-answer = ...  # N
-
-# %% [markdown] tags=["solution"]
-# By hand: $0.05 \cdot 80 + 0.5 \cdot 20 = 14$ N.
-
-# %% tags=["solution"]
-pull, friction = cp.Variable(), cp.Variable(2)
-limits = np.array([0.05 * 80, 0.5 * 20])
-cp.Problem(cp.Maximize(pull), [cp.abs(friction) <= limits, pull == cp.sum(friction)]).solve(
-    solver=cp.CLARABEL
-)
-answer = float(pull.value)
-
-# %%
-check("5.2", answer, 14.0)
+answer = ...  # largest pull [N]
+check("5.2", answer)
 
 # %% [markdown]
-# **5.3** How many nodes of the block slip if $\mu = 0.2$? Count them in the answer of Newton's
-# method, `forces`.
+# **5.3** (Program.) How many nodes of the block slip if $\mu = 0.2$, and how many if $\mu = 0.1$?
 
 # %% tags=["exercise"]
-answer = ...
-
-# %% tags=["solution"]
-answer = int(np.sum((np.abs(forces[t]) > mu * forces[n] * (1 - 1e-9)) & (forces[n] > 0)))
-
-# %%
-check("5.3", answer, diagnose(problem, solve(problem)).local.slip)
+answer = (..., ...)  # slipping nodes with mu = 0.2, with mu = 0.1
+check("5.3", answer)
 
 # %% [markdown]
-# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to
-# the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for every step,
-# with the certificate as `"residual"`.) The cell below compares your factor with the one that
+# **5.4** (Program.) Measure the factor by which the certificate of Tresca's iteration falls from
+# one step to the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for
+# every step, with the certificate as `"residual"`.) Your factor is compared with the one that
 # `diagnose` predicts.
 
 # %% tags=["exercise"]
-answer = ...
+answer = ...  # factor in one step [-]
+check("5.4", answer)
 
-# %% tags=["solution"]
-history = [entry["residual"] for entry in solve(problem, "tresca", tol=1e-13).history]
-answer = (history[8] / history[4]) ** (1 / 4)
+# %% [markdown]
+# **5.5** (Pen and paper.) Newton's method above looks at $y = r - \rho u$. The map of Alart and
+# Curnier is $P = ([y_n]_+,$ the point of $|p_t| \le \mu [y_n]_+$ nearest to $y_t)$; at a solution
+# $r = P$. Compute $P$ for $r = (2.3, -1.5)$ N, $u = (0.1, 0.3)$ mm, $\rho = 2$ N/mm and $\mu =
+# 0.4$.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # normal component, tangential component [N]
+check("5.5", answer)
+
+# %% [markdown]
+# **5.6** (Think.) The map of De Saxcé projects $y = r - \rho\,(u + \mu |u_t|\, n)$ on the cone
+# $|p_t| \le \mu p_n$. Compute it for the numbers of exercise 5.5.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # normal component, tangential component [N]
+check("5.6", answer)
+
+# %% [markdown]
+# **5.7** (Program.) Find the forces of the block for $\mu = 0.35$ with a method of your own choice,
+# but not with `solve`. The certificate grades them.
+
+# %% tags=["exercise"]
+answer = ...  # 25 rows r_n, r_t [N]
+check("5.7", answer)
+
+# %% [markdown]
+# **5.8** (Think.) A sledge on two runners is pressed down with 110 N and pulled along with 31 N.
+# With $\mu = 0.26$ it slides. *Prove* it by a motion $(a, b)$, upwards and along the pull: no force
+# of the friction cones does negative work on it, and the load does positive work.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # up, along [-]
+check("5.8", answer)
+
+# %% [markdown]
+# **5.9** (Think.) Coulomb's law in the plane is a *linear complementarity problem* (LCP). With $r_t
+# = r_+ - r_-$ and $\sigma = |u_t|$, the unknowns $r_n, r_+, r_-, \sigma$ and the numbers $u_n,\;
+# u_t + \sigma,\; \sigma - u_t,\; \mu r_n - r_+ - r_-$ are not negative, and the product of each
+# pair is zero. Solve the LCP of the node of chapter 2, $Q = \begin{pmatrix} 1 & -1 \\ -1 & 2
+# \end{pmatrix}$ mm/N and $q = (-3, 5)$ mm, for $\mu = 0.6$.
+
+# %% tags=["exercise"]
+answer = (..., ..., ..., ...)  # r_n [N], r_plus [N], r_minus [N], sigma [mm]
+check("5.9", answer)
 
 # %%
-predicted = diagnose(problem, solve(problem)).local.tresca_rate
-check("5.4", answer, lambda rate: abs(rate / predicted - 1) < 0.05)
+table(5)
 
 # %% [markdown]
 # ## References

@@ -8,13 +8,17 @@
 # You need chapter 2. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, laws, models, reduce
 from contactopt.meshes.structured import tensor_mesh
-from contactopt.teaching import check
+
+sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -239,78 +243,87 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 #
 # ## Exercises
 #
-# **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4$ N/mm replaces the floor: it costs
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("7.1")` gives a hint, three times, and then the solution. `table(7)` shows what
+# you have done since the notebook was started.
+#
+# **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4.3$ N/mm replaces the floor: it costs
 # $f(u_n) = \tfrac12 \kappa \max(-u_n, 0)^2$. Its conjugate enters the dual problem as $f^*(-r_n)$.
-# What is $f^*(-r_n)$ for $r_n = 3$ N, in N mm?
+# What is $f^*(-r_n)$ for $r_n = 2.9$ N?
 
 # %% tags=["exercise"]
-answer = ...  # [N mm]
-
-# %% [markdown] tags=["solution"]
-# $f^*(-r_n) = \sup_u\,(-r_n u - \tfrac12 \kappa \max(-u, 0)^2)$. The supremum is at $u = -r_n /
-# \kappa$, and its value is $r_n^2 / (2 \kappa) = 9 / 8$. For $\kappa \to \infty$ it vanishes, and
-# what remains is $r_n \ge 0$.
-
-# %% tags=["solution"]
-answer = 9 / 8
-
-# %%
-check("7.1", answer, 9 / 8)
+answer = ...  # value of the conjugate [N mm]
+check("7.1", answer)
 
 # %% [markdown]
-# **7.2** (Pen and paper.) Someone proposes $r = (2, -1)$ N for the node of this chapter, $g = 1$ N.
-# Give $-D(r)$ in N mm, and decide with $u = Qr + q$ whether $r$ is the solution: 1 if it is, 0 if
-# not.
+# **7.2** (Program.) Give the three parts of the gap for the node of this chapter, $u = (0.1, 1.7)$
+# mm, $r = (2, -0.6)$ N and $g = 1$ N. Their sum is $P(u) - D(r)$.
 
 # %% tags=["exercise"]
-answer = ...  # (-D in N mm, 1 or 0)
-
-# %% [markdown] tags=["solution"]
-# $Qr = (3, -4)$, so that $-D = \tfrac12 r'Qr + q'r = \tfrac12 (6 + 4) + (-6 - 5) = -6$. Then $u = Qr
-# + q = (0, 1)$. All parts of the gap are zero: springs by construction, $r_n u_n = 0$, and $g|u_t| +
-# r_t u_t = 1 - 1$.
-
-# %% tags=["solution"]
-answer = (-6.0, 1)
-
-# %%
-check("7.2", answer, (-6.0, 1.0))
+answer = (..., ..., ...)  # springs, contact, friction [N mm]
+check("7.2", answer)
 
 # %% [markdown]
-# **7.3** Without solving anything: by how much may the energy of the springs, of the floor and of
-# friction still fall below that of $u = (0, 2)$ mm, if all you know is the admissible force $r =
-# (2, -0.5)$ N? Give $P(u) - D(r)$ in N mm.
+# **7.3** (Pen and paper.) By how much, at most, can the energy $P$ still fall below that of $u =
+# (0, 2.1)$ mm, if all you know is the admissible force $r = (2.1, -0.4)$ N?
 
 # %% tags=["exercise"]
-answer = ...  # [N mm]
-
-# %% tags=["solution"]
-tried, known = np.array([0.0, 2.0]), np.array([2.0, -0.5])
-energy = (tried - q) @ K @ (tried - q) / 2 + g * abs(tried[1])
-answer = energy + known @ Q @ known / 2 + q @ known
-
-# %%
-check("7.3", answer, 1.25)
+answer = ...  # bound [N mm]
+check("7.3", answer)
 
 # %% [markdown]
-# **7.4** Write the dual of Tresca's program for a floor that pulls, too: $u_n = 0$ instead of $u_n
-# \ge 0$, with $q = (1, 5)$ mm and $g = 1$ N. Give its forces.
+# **7.4** (Program.) Write the dual of Tresca's program for a floor that pulls, too: $u_n = 0$
+# instead of $u_n \ge 0$, with $q = (1, 5.2)$ mm and $g = 1.1$ N. Give its forces.
 
 # %% tags=["exercise"]
-answer = ...  # (r_n, r_t) in N
+answer = (..., ...)  # r_n, r_t [N]
+check("7.4", answer)
 
-# %% [markdown] tags=["solution"]
-# In $u_n = 0$ the term $r_n u_n$ is zero for every $r_n$. So the dual loses its constraint $r_n \ge
-# 0$, and the force may pull.
+# %% [markdown]
+# **7.5** (Program.) How large is the derivative of the minimum of $P$ by the friction bound $g$, at
+# $g = 0.83$ N? Which multiplier is it?
 
-# %% tags=["solution"]
-x = cp.Variable(2)
-cost = cp.quad_form(x, cp.psd_wrap(Q)) / 2 + np.array([1.0, 5.0]) @ x
-cp.Problem(cp.Minimize(cost), [cp.abs(x[1]) <= 1]).solve(solver=cp.CLARABEL)
-answer = x.value
+# %% tags=["exercise"]
+answer = ...  # derivative [mm]
+check("7.5", answer)
+
+# %% [markdown]
+# **7.6** (Program.) Find forces for the node of this chapter ($g = 1$ N) that are *not* the
+# solution, but whose gap with $u = (0, 1)$ mm is below 0.01 N mm. By the error bound they are near
+# the solution.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # r_n, r_t [N]
+check("7.6", answer)
+
+# %% [markdown]
+# **7.7** (Pen and paper.) The displacements of associated friction lie in the *dual cone* of the
+# forces: no force with $|r_t| \le \mu r_n$ does negative work on them. How large must $u_n$ be at
+# least, if $u_t = 1.3$ mm and $\mu = 0.35$?
+
+# %% tags=["exercise"]
+answer = ...  # smallest gap [mm]
+check("7.7", answer)
+
+# %% [markdown]
+# **7.8** (Program.) Take the node on the rail with $q = (0, 0, 1.4)$ mm. How large is the energy
+# that is needed at $\lambda = 17.3$ mm?
+
+# %% tags=["exercise"]
+answer = ...  # energy [N mm]
+check("7.8", answer)
+
+# %% [markdown]
+# **7.9** (Think.) Grooves make friction depend on its direction: slip costs $f(v) = \sqrt{(1.2\,
+# v_1)^2 + (0.5\, v_2)^2}$. Where its conjugate is zero, the forces are admissible. How large is the
+# largest friction force in the direction $(1, 1) / \sqrt 2$?
+
+# %% tags=["exercise"]
+answer = ...  # largest friction force [N]
+check("7.9", answer)
 
 # %%
-check("7.4", answer, (-2.0, -1.0))
+table(7)
 
 # %% [markdown]
 # ## References

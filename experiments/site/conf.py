@@ -7,9 +7,11 @@ and VS Code open from the same file. MathJax comes with sphinx-mathjax-offline: 
 from elsewhere, neither when they are built nor when they are read.
 """
 
+import os
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import generate
@@ -18,6 +20,8 @@ import museum
 
 import contactopt
 
+# the chapters, which run in processes of their own, import the exercises of the course
+os.environ["PYTHONPATH"] = os.pathsep.join([sys.path[1], os.environ.get("PYTHONPATH", "")])
 project, author = "contactopt", "The contactopt developers"
 copyright = author
 version = release = contactopt.__version__

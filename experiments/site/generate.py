@@ -21,6 +21,7 @@ import reference
 from reference import contents, index
 
 import contactopt.cli
+from experiments.course.nbgrader import solved
 
 ROOT = Path(__file__).parents[2]
 # the order in which a course would take them
@@ -164,21 +165,13 @@ def course(site: Path) -> Iterator[tuple[Path, str]]:
         for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))
     }
     for name, text in chapters.items():
-        yield from notebook("course", name, without_cells(text, "solution"))
-        solved = re.sub(
-            r"^# # (Chapter \d)", r"# # Solutions: \1", without_cells(text, "exercise"), flags=re.M
-        )
-        yield from notebook("course", f"solutions_{name}", solved, PYTHON)
+        yield from notebook("course", name, text)
+        answers = re.sub(r"^# # (Chapter \d)", r"# # Solutions: \1", solved(text), flags=re.M)
+        yield from notebook("course", f"solutions_{name}", answers, PYTHON)
     pages = [f"course/{name}" for name in chapters] + [
         f"course/solutions_{name}" for name in chapters
     ]
     yield Path("course.md"), (site / "course.md").read_text() + contents(pages, hidden=False)
-
-
-def without_cells(text: str, tag: str) -> str:
-    """A percent script without the cells that have this tag."""
-    cells = re.split(r"^(?=# %%)", text, flags=re.M)
-    return "".join(cell for cell in cells if cell and f'tags=["{tag}"]' not in cell.splitlines()[0])
 
 
 def command_line() -> str:
