@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from html import unescape
+from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -19,6 +20,7 @@ from contactopt.methods import METHODS
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "experiments" / "site"
+CHAPTERS = tuple((SITE.parent / "course").glob("chapter_*.py"))
 HOW_TOS = {*PAGES, "your_own_mesh"}
 LIMIT = 900.0  # s: three minutes on two idle cores, more where other tests run
 
@@ -223,11 +225,12 @@ COLUMNS = 80  # of a program on a page; tables of plug-ins have one line for eac
 
 
 def programs():
-    """The lines of the programs on pages: of pages by hand, tutorials and the gallery."""
+    """The programs on pages: of pages by hand, tutorials, chapters and the gallery."""
     fences = re.compile(r"```(?:python|toml|sh)\n(?!# in )(.*?)```", re.S)
     for path in SITE.glob("*.md"):
         yield from ((path.name, block) for block in fences.findall(path.read_text()))
-    for path in (SITE.parent / "tutorials").glob("*.py"):
+    scripts = (SITE.parent / "tutorials").glob("*.py"), CHAPTERS
+    for path in chain(*scripts):
         text = re.sub(r"^# ?", "", path.read_text(), flags=re.M)
         yield from ((path.name, block) for block in fences.findall(text))
         yield path.name, "\n".join(re.findall(r"^[^#].*", path.read_text(), re.M))
@@ -242,7 +245,7 @@ def test_programs_fit_a_page():
         (name, line) for name, text in found for line in text.splitlines() if len(line) > COLUMNS
     ]
     assert not long, long
-    pages = sorted(map(str, SITE.glob("*.md")))
+    pages = sorted(map(str, [*SITE.glob("*.md"), *CHAPTERS]))
     formatted = [sys.executable, "-m", "ruff", "format", "--isolated", "--check", "--line-length"]
     subprocess.run([*formatted, str(COLUMNS), *pages], check=True)
 
