@@ -158,6 +158,20 @@ def test_slides_fit_and_their_formulas_and_figures_are_drawn(built):
             assert not page.faults
 
 
+FIRST = "document.querySelector('#search-results li > a')?.getAttribute('href')"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to search with")
+@pytest.mark.parametrize("subject", ["certificate", "preconditioner", "mortar", "penalty"])
+def test_search_finds_a_subject_before_the_symbols(subject, built):
+    with Browser(built / "search.html") as page:
+        address = (built / "search.html").as_uri()
+        page.call("Page.navigate", url=f"{address}?q={subject}")
+        page.wait(FIRST)
+        assert "generated/api/" not in page.ask(FIRST)
+
+
 @pytest.fixture
 def reference(monkeypatch):
     monkeypatch.syspath_prepend(str(SITE))

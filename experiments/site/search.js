@@ -1,6 +1,9 @@
-// Pages about a subject come before the symbols of the reference.
+// Pages about a subject come before the reference, unless the query looks like a symbol.
 var Scorer = {
-  score: ([page, , , , score]) => (page.startsWith("generated/api/") ? score - 30 : score),
+  score: ([page, , , , score]) => {
+    const symbol = /[a-z][A-Z]|[_.]/.test(new URLSearchParams(location.search).get("q") ?? "");
+    return page.startsWith("generated/api/") && !symbol ? score - 30 : score;
+  },
   objNameMatch: 11,
   objPartialMatch: 6,
   objPrio: { 0: 15, 1: 5, 2: -5 },
