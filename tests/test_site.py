@@ -135,8 +135,9 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
 
 FITS = """all.map((slide, k) => {
   show(k);
-  const parts = [slide, ...slide.querySelectorAll("main > div")];
-  return parts.every((part) => part.scrollHeight <= part.clientHeight + 1);
+  const main = slide.querySelector("main");
+  const parts = [main, ...main.querySelectorAll("main > div")];
+  return parts.every((part) => part.scrollHeight <= main.clientHeight + 1);
 })"""
 
 
