@@ -11,6 +11,7 @@ import time
 import getfem as gf
 import numpy as np
 
+STEPS = 100  # of Newton's method
 given = np.load(sys.argv[1])
 start = time.process_time()
 E, nu = float(given["E"]), float(given["nu"])
@@ -44,8 +45,10 @@ model.add_initialized_data("augmentation", E / top)
 model.add_integral_contact_with_rigid_obstacle_brick(
     points, "u", "lambda_n", "gap", "augmentation", CONTACT, 1
 )
-model.solve("max_res", 1e-10, "max_iter", 100)
+steps, converged = model.solve("max_res", 1e-10, "max_iter", STEPS)
 seconds = time.process_time() - start
+if not converged:
+    sys.exit(f"Newton's method did not converge in {STEPS} steps and {seconds:.0f} s")
 places = multiplier.basic_dof_nodes()[0][multiplier.basic_dof_on_region(CONTACT)]
 order = np.argsort(places)
 np.savez(sys.argv[2], pressure=-model.variable("lambda_n")[order], seconds=seconds)
