@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Chapter 1. A spring, a node and a floor
 #
-# The smallest contact problem has one unknown. It already shows everything that this course is
-# about: an energy that is minimised under a constraint, a second problem in the contact forces, the
+# The smallest contact problem has one unknown. It already has all that every chapter of this course
+# has: an energy that is minimised under a constraint, a second problem in the contact forces, the
 # conditions that join the two, a program that a solver can read, and several ways to go wrong.
 #
 # You need derivatives, and the idea of a minimum under a constraint. The chapter takes 30 minutes
@@ -18,7 +18,9 @@ import numpy as np
 from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -47,7 +49,12 @@ def sketch(ax, u, r):
     ax.axhspan(-0.5, 0, color="0.8", lw=0)
     ax.axhline(0, color="k", lw=1)
     y = np.linspace(u, 3, 13)
-    ax.plot(np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]), y, "C0", lw=1.5)
+    ax.plot(
+        np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]),
+        y,
+        "C0",
+        lw=1.5,
+    )
     ax.plot([-0.6, 0.6], [3, 3], "k", lw=3)
     ax.plot(0, u, "o", ms=10, color="C0")
     for x, y0, y1, name, color in (
@@ -55,13 +62,23 @@ def sketch(ax, u, r):
         (-0.5, u - 0.6, u, f"$r$ = {r:.1f} N", "C1"),
     ):
         ax.annotate(
-            "", (x, y1), (x, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8}
+            "",
+            (x, y1),
+            (x, y0),
+            arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
         )
         ax.text(x + 0.08, (y0 + y1) / 2, name, color=color)
-    ax.annotate("", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
-    ax.text(1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center")
     ax.annotate(
-        "", (-1.3, 0.8), (-1.3, 0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8}
+        "", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"}
+    )
+    ax.text(
+        1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center"
+    )
+    ax.annotate(
+        "",
+        (-1.3, 0.8),
+        (-1.3, 0),
+        arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8},
     )
     ax.text(-1.22, 0.6, "$n$")
     ax.set(xlim=(-1.5, 2.2), ylim=(-0.7, 3.2), aspect="equal")
@@ -117,14 +134,19 @@ assert np.isclose(floor.dual_value, F - k * g0, atol=1e-4)
 def state(load):
     gap = max(g0 - load / k, 0.0)
     force = max(load - k * g0, 0.0)
-    fig, (left, right) = plt.subplots(1, 2, figsize=(6.0, 3.2), layout="constrained")
+    fig, (left, right) = plt.subplots(
+        1, 2, figsize=(6.0, 3.2), layout="constrained"
+    )
     sketch(left, gap, force)
     w = np.linspace(-1, 2, 200)
     right.plot(w, k * (w - g0) ** 2 / 2 + load * w, "C0")
     right.axvspan(-1, 0, color="0.85", lw=0)
     right.plot(gap, k * (gap - g0) ** 2 / 2 + load * gap, "o", color="C1", ms=9)
     right.set(
-        xlabel="gap $u$ [mm]", ylabel="energy [N mm]", title=f"load F = {load:.1f} N", ylim=(-5, 8)
+        xlabel="gap $u$ [mm]",
+        ylabel="energy [N mm]",
+        title=f"load F = {load:.1f} N",
+        ylim=(-5, 8),
     )
     return fig
 
@@ -198,7 +220,7 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 # The derivative of this function is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. For every
 # $\gamma$ but $\gamma = k$ it is zero exactly at the solution. Such a method is called
 # *consistent*. (The penalty method is not: its minimum is another point.) There is a price. The
-# function is convex only if $\gamma > k$. For a smaller $\gamma$ it has no minimum.
+# function is strictly convex if $\gamma > k$. For a smaller $\gamma$ it is concave and has no minimum.
 #
 # ## Proximal Galerkin: never below the floor
 #
@@ -241,16 +263,19 @@ sunk = -(F - k * g0) / (k + stiffness)
 
 gamma = 4.0
 v = cp.Variable()
-nitsche = cp.Minimize(  # E - r^2 / (2 gamma), written as one parabola so that cvxpy sees that it is convex
+# E - r^2 / (2 gamma), written as one parabola: so cvxpy sees that it is convex
+nitsche = cp.Minimize(
     (k - k**2 / gamma) / 2 * (v - g0) ** 2
     + F * (1 - k / gamma) * (v - g0)
     + cp.square(cp.pos(k * (v - g0) + F - gamma * v)) / (2 * gamma)
 )
 cp.Problem(nitsche).solve(solver=cp.CLARABEL)
 print(f"Nitsche: gap {v.value:.1e} mm, force {residual_force(v.value):.4f} N")
-print(f"proximal Galerkin after 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
+print(f"proximal Galerkin: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.loglog(stiffness / k, -sunk, "o-")
 left.set(
     xlabel=r"penalty stiffness $\kappa / k$ [-]",
@@ -258,9 +283,15 @@ left.set(
     title="penalty",
 )
 right.semilogy(range(1, 7), gaps, "s-", color="C1")
-right.set(xlabel="step [-]", ylabel="gap above the floor [mm]", title="proximal Galerkin")
+right.set(
+    xlabel="step [-]",
+    ylabel="gap above the floor [mm]",
+    title="proximal Galerkin",
+)
 
-assert np.isclose(v.value, 0.0, atol=1e-4) and np.isclose(residual_force(v.value), 3.0, atol=1e-3)
+assert np.isclose(v.value, 0.0, atol=1e-4) and np.isclose(
+    residual_force(v.value), 3.0, atol=1e-3
+)
 assert np.all(np.array(gaps) > 0) and np.isclose(forces[-1], 3.0, rtol=1e-2)
 assert np.isclose(sunk[-1] * stiffness[-1], -3.0, rtol=1e-4)
 
@@ -287,9 +318,14 @@ primal_without_spring = cp.Problem(cp.Minimize(-1.0 * gap))
 dual_without_spring = cp.Problem(cp.Minimize(0.0), [force == -1.0])
 for program in (primal_without_spring, dual_without_spring):
     program.solve(solver=cp.CLARABEL)
-print(f"primal: {primal_without_spring.status}, dual: {dual_without_spring.status}")
+print(
+    "primal:", primal_without_spring.status, "dual:", dual_without_spring.status
+)
 
-assert primal_without_spring.status == "unbounded" and dual_without_spring.status == "infeasible"
+assert (
+    primal_without_spring.status == "unbounded"
+    and dual_without_spring.status == "infeasible"
+)
 
 # %% [markdown]
 # ## Exercises

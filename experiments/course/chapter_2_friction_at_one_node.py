@@ -14,10 +14,17 @@ import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
+from contactopt import (
+    InterfaceProblem,
+    all_solutions,
+    natural_map_residual,
+    solve,
+)
 from contactopt.teaching import Slider
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -37,14 +44,21 @@ from experiments.course.grader import check, hint, table
 
 # %%
 k_vertical, k_inclined = 1.0, 2.0  # N/mm
-along = np.array([1.0, 1.0]) / np.sqrt(2)  # direction of the inclined spring: up and to the right
+along = np.array([1.0, 1.0]) / np.sqrt(
+    2
+)  # direction of the inclined spring: up and to the right
 K = k_vertical * np.diag([1.0, 0.0]) + k_inclined * np.outer(along, along)
 Q = np.linalg.inv(K)
 load = np.array([-3.0, 1.0])  # N: 3 N down, 1 N to the right
 q = np.array([1.0, 0.0]) + Q @ load  # the gap without load is 1 mm
 mu = 0.5  # friction coefficient
 print(
-    "K =", np.round(K, 6).tolist(), " Q =", np.round(Q, 6).tolist(), " q =", np.round(q, 6).tolist()
+    "K =",
+    np.round(K, 6).tolist(),
+    " Q =",
+    np.round(Q, 6).tolist(),
+    " q =",
+    np.round(q, 6).tolist(),
 )
 
 assert np.allclose(Q, [[1, -1], [-1, 2]]) and np.allclose(q, [-3, 5])
@@ -70,8 +84,18 @@ for tail, head, name, color in (
     ((-1.4, 0), (-1.4, 0.7), "$n$", "k"),
     ((-1.4, 0), (-0.75, 0), "$t$", "k"),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
-    ax.text((tail[0] + head[0]) / 2 + 0.06, (tail[1] + head[1]) / 2 + 0.08, name, color=color)
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
+    ax.text(
+        (tail[0] + head[0]) / 2 + 0.06,
+        (tail[1] + head[1]) / 2 + 0.08,
+        name,
+        color=color,
+    )
 ax.set(xlim=(-1.7, 2), ylim=(-0.6, 2.4), aspect="equal")
 _ = ax.axis("off")
 
@@ -112,25 +136,32 @@ _ = ax.axis("off")
 def primal(g):
     u = cp.Variable(2)
     floor = u[0] >= 0
-    cp.Problem(cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]).solve(
-        solver=cp.CLARABEL
-    )
+    cp.Problem(
+        cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]
+    ).solve(solver=cp.CLARABEL)
     return K @ (u.value - q)  # the contact force, from equilibrium
 
 
 def dual(g, Q=Q, q=q):
     r = cp.Variable(2)
     box = [r[0] >= 0, cp.abs(r[1]) <= g]
-    cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box).solve(
-        solver=cp.CLARABEL
-    )
+    cp.Problem(
+        cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box
+    ).solve(solver=cp.CLARABEL)
     return r.value
 
 
 for g in (0.0, 1.0, 2.0, 3.0):
-    print(f"bound {g} N: primal {np.round(primal(g), 4)}, dual {np.round(dual(g), 4)}")
+    print(
+        f"bound {g} N: primal",
+        np.round(primal(g), 4),
+        "dual",
+        np.round(dual(g), 4),
+    )
     assert np.allclose(primal(g), dual(g), atol=1e-4)
-assert np.allclose(dual(3.0), -K @ q, atol=1e-4)  # from 2 N on the node sticks: u = 0
+assert np.allclose(
+    dual(3.0), -K @ q, atol=1e-4
+)  # from 2 N on the node sticks: u = 0
 
 # %% [markdown]
 # ## Coulomb: the bound depends on the answer
@@ -146,7 +177,12 @@ for _ in range(30):
     r = dual(g)
     g = mu * r[0]
     history.append(r)
-print("Tresca's iteration:", np.round(history[:4], 3).tolist(), "...", np.round(r, 4))
+print(
+    "Tresca's iteration:",
+    np.round(history[:4], 3).tolist(),
+    "...",
+    np.round(r, 4),
+)
 
 problem = InterfaceProblem(Q, [q], mu)
 assert np.allclose(r, [2.0, -1.0], atol=1e-4)
@@ -174,9 +210,18 @@ def in_the_cone(coefficient):
     force = solve(InterfaceProblem(Q, [q], coefficient)).reactions[0]
     slip = (Q @ force + q)[1]
     fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
-    ax.fill([0, -coefficient * 4, coefficient * 4], [0, 4, 4], color="C0", alpha=0.15, lw=0)
+    ax.fill(
+        [0, -coefficient * 4, coefficient * 4],
+        [0, 4, 4],
+        color="C0",
+        alpha=0.15,
+        lw=0,
+    )
     ax.annotate(
-        "", (force[1], force[0]), (0, 0), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2}
+        "",
+        (force[1], force[0]),
+        (0, 0),
+        arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2},
     )
     ax.plot(*(-K @ q)[::-1], "kx")
     ax.text(-2.0, 0.7, "sticking force", ha="center")
@@ -187,12 +232,15 @@ def in_the_cone(coefficient):
         ylabel="normal force $r_n$ [N]",
     )
     ax.set_title(
-        rf"$\mu$ = {coefficient:.2f}: " + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks")
+        rf"$\mu$ = {coefficient:.2f}: "
+        + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks")
     )
     return fig
 
 
-Slider("friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2)
+Slider(
+    "friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2
+)
 
 # %% [markdown]
 # ## The convex relaxation: another law
@@ -209,9 +257,16 @@ Slider("friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2
 # %%
 f = cp.Variable(2)
 energy = cp.quad_form(f, cp.psd_wrap(Q)) / 2 + q @ f
-cp.Problem(cp.Minimize(energy), [cp.SOC(mu * f[0], f[1:])]).solve(solver=cp.CLARABEL)
+cp.Problem(cp.Minimize(energy), [cp.SOC(mu * f[0], f[1:])]).solve(
+    solver=cp.CLARABEL
+)
 lifted = Q @ f.value + q
-print(f"associated: force {np.round(f.value, 3)}, gap {lifted[0]:.3f} mm, slip {lifted[1]:.3f} mm")
+print(
+    "associated: force",
+    np.round(f.value, 3),
+    "gap and slip",
+    np.round(lifted, 3),
+)
 
 assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 
@@ -239,13 +294,21 @@ for _ in range(12):
 exact = all_solutions(InterfaceProblem(Q, [q], much))
 fig, ax = plt.subplots(figsize=(5, 3.2), layout="constrained")
 ax.plot(range(1, 13), history, "o-", label="Tresca's iteration")
-ax.axhline(exact[0].reactions[0, 0], color="k", ls="--", lw=1, label="the only solution")
+ax.axhline(
+    exact[0].reactions[0, 0],
+    color="k",
+    ls="--",
+    lw=1,
+    label="the only solution",
+)
 ax.set(xlabel="iteration [-]", ylabel="normal force [N]")
 ax.legend(frameon=False)
 
 assert len(exact) == 1 and np.allclose(exact[0].reactions, [[1.2, -1.8]])
 assert abs(history[-1] - 1.2) > 0.1  # it has not converged
-assert np.isclose(min(history), 1.0, atol=1e-4)  # it sticks in every second iteration
+assert np.isclose(
+    min(history), 1.0, atol=1e-4
+)  # it sticks in every second iteration
 assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 
 # %% [markdown]
@@ -262,17 +325,31 @@ assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 # in a cycle, although the solution is unique.
 
 # %%
-coupled, pulled, friction = np.array([[1.0, 0.99], [0.99, 1.0]]), np.array([-0.307, 0.71]), 0.7
+coupled, pulled, friction = (
+    np.array([[1.0, 0.99], [0.99, 1.0]]),
+    np.array([-0.307, 0.71]),
+    0.7,
+)
 f, sigma = cp.Variable(2), cp.Parameter(nonneg=True, value=0.9)
-energy = cp.quad_form(f, cp.psd_wrap(coupled)) / 2 + pulled @ f + friction * sigma * f[0]
-program, slips = cp.Problem(cp.Minimize(energy), [cp.SOC(friction * f[0], f[1:])]), []
+energy = (
+    cp.quad_form(f, cp.psd_wrap(coupled)) / 2
+    + pulled @ f
+    + friction * sigma * f[0]
+)
+program, slips = (
+    cp.Problem(cp.Minimize(energy), [cp.SOC(friction * f[0], f[1:])]),
+    [],
+)
 for _ in range(12):
     program.solve(solver=cp.CLARABEL)
     sigma.value = abs(float((coupled @ f.value + pulled)[1]))
     slips.append(sigma.value)
 (only,) = all_solutions(InterfaceProblem(coupled, [pulled], friction))
 right = (coupled @ only.reactions[0] + pulled)[1]
-print(f"slip of the only solution {right:.3f} mm; of the iteration", np.round(slips[-4:], 3))
+print(
+    f"slip of the only solution {right:.3f} mm; of the iteration",
+    np.round(slips[-4:], 3),
+)
 
 bottom = 1.0 - 2 * friction * 0.99 + friction**2
 assert friction * (friction - 0.99) / bottom < -1 and np.isclose(right, 1.0)
@@ -289,9 +366,8 @@ assert min(np.abs(np.array(slips[-4:]) - right)) > 0.1  # it has not converged
 wedged = InterfaceProblem(Q, [[0.1, -0.5]], 1.5)
 for found in all_solutions(wedged):
     state = Q @ found.reactions[0] + wedged.q[0]
-    print(
-        f"force {np.round(found.reactions[0], 4)}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm"
-    )
+    force = np.round(found.reactions[0], 4)
+    print(f"force {force}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm")
 
 assert len(all_solutions(wedged)) == 3
 assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
@@ -304,7 +380,7 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # |---|---|---|
 # | Tresca's iteration | the box program, again and again | $\mu$ times the coupling $\lvert Q_{nt} \rvert / Q_{nn}$ exceeds 1 while the node slips |
 # | cone program | associated friction | the node slips: then it is another law |
-# | Acary and Cadoux | the cone program with a shift, again and again | the factor below exceeds 1; for many nodes there is no proof of convergence |
+# | Acary and Cadoux | the cone program with a shift, again and again | the factor above is not between -1 and 1; for many nodes there is no proof of convergence |
 #
 # ## Exercises
 #

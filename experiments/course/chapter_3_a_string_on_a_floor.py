@@ -18,7 +18,9 @@ import numpy as np
 from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -48,13 +50,23 @@ for tail, head, name, color, at in (
     ((0, 0.25), (-0.09, 0.25), "$T$", "k", (-0.07, 0.265)),
     ((L, 0.25), (L + 0.09, 0.25), "$T$", "k", (L + 0.05, 0.265)),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
     ax.text(*at, name, color=color)
 for x_at, top, name, at in (
     (0.0, 0.25, "$d$", (0.012, 0.03)),
     (15 / 16, sag[15], "$u_i$", (0.95, 0.05)),
 ):
-    ax.annotate("", (x_at, top), (x_at, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
+    ax.annotate(
+        "",
+        (x_at, top),
+        (x_at, 0),
+        arrowprops={"arrowstyle": "<->", "color": "C2"},
+    )
     ax.text(*at, name, color="C2")
 ax.set(xlim=(-0.15, L + 0.15), ylim=(-0.075, 0.3))
 _ = ax.axis("off")
@@ -68,7 +80,7 @@ _ = ax.axis("off")
 
 # %%
 def string(N):
-    """Stiffness A [N/mm], weights w [N] and places x [mm] of the inner nodes."""
+    """Stiffness [N/mm], weights [N] and places [mm] of the inner nodes."""
     h = L / N
     A = T / h * (2 * np.eye(N - 1) - np.eye(N - 1, k=1) - np.eye(N - 1, k=-1))
     weight = np.full(N - 1, f * h)
@@ -105,15 +117,15 @@ q = d - Q @ weight
 # %%
 u = cp.Variable(len(x))
 floor = u >= 0
-cp.Problem(cp.Minimize(cp.quad_form(u - d, cp.psd_wrap(A)) / 2 + weight @ u), [floor]).solve(
-    solver=cp.CLARABEL
-)
+cp.Problem(
+    cp.Minimize(cp.quad_form(u - d, cp.psd_wrap(A)) / 2 + weight @ u), [floor]
+).solve(solver=cp.CLARABEL)
 
 r = cp.Variable(len(x))
 push = r >= 0
-cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [push]).solve(
-    solver=cp.CLARABEL
-)
+cp.Problem(
+    cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [push]
+).solve(solver=cp.CLARABEL)
 
 assert np.allclose(u.value, push.dual_value, atol=1e-5)
 assert np.allclose(r.value, floor.dual_value, atol=1e-3)
@@ -128,17 +140,21 @@ assert np.allclose(r.value, floor.dual_value, atol=1e-3)
 # $$ d = \frac{f a^2}{2 T}, \qquad a = \sqrt{2 T d / f} . $$
 #
 # On the floor the string is straight, so its tension carries nothing. There the floor carries
-# exactly the weight: $r_i = f h$.
+# exactly the weight: $r_i = f h$, and half of it at a node where the contact ends.
 
 
 # %%
 def exact(height, places):
     a = np.sqrt(2 * T * height / f)
-    return f / (2 * T) * np.maximum(a - np.minimum(places, L - places), 0) ** 2, a
+    return f / (2 * T) * np.maximum(
+        a - np.minimum(places, L - places), 0
+    ) ** 2, a
 
 
 truth, a = exact(d, x)
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.plot(x, u.value, "C0.", label="computed")
 left.plot(x, truth, "k-", lw=1, label="exact")
 left.set(xlabel="x [mm]", ylabel="gap [mm]")
@@ -161,7 +177,8 @@ def lowered(height):
     height = max(height, 1e-9)
     if height < f * L**2 / (8 * T):
         gap, touch = exact(height, line)
-        ax.set_title(f"height {height:.2f} mm: touches from {touch:.2f} to {L - touch:.2f} mm")
+        ends = f"{touch:.2f} to {L - touch:.2f} mm"
+        ax.set_title(f"height {height:.2f} mm: touches from {ends}")
     else:
         gap = height - f / (2 * T) * line * (L - line)
         ax.set_title(f"height {height:.2f} mm: hangs freely")
@@ -231,7 +248,9 @@ h = L / 40
 def penalty(kappa):
     touches = np.ones(len(x), bool)
     while True:
-        gap = np.linalg.solve(A + kappa * h * np.diag(touches), A @ np.full(len(x), d) - weight)
+        gap = np.linalg.solve(
+            A + kappa * h * np.diag(touches), A @ np.full(len(x), d) - weight
+        )
         if np.array_equal(gap < 0, touches):
             return gap
         touches = gap < 0
@@ -244,7 +263,9 @@ def proximal_galerkin(steps, alpha=0.1):
         for _ in range(100):
             gap = np.exp(psi)
             step = alpha * (A @ (gap - d) + weight) + h * (psi - last)
-            change = np.linalg.solve(alpha * A * gap + h * np.eye(len(x)), -step)
+            change = np.linalg.solve(
+                alpha * A * gap + h * np.eye(len(x)), -step
+            )
             psi = psi + change * min(
                 1.0, 2 / np.abs(change).max()
             )  # the exponential allows no large step
@@ -257,15 +278,27 @@ def proximal_galerkin(steps, alpha=0.1):
 stiffness = 10.0 ** np.arange(2, 7)
 depths = [-penalty(kappa).min() for kappa in stiffness]
 gap, errors = proximal_galerkin(25)
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.loglog(stiffness, depths, "o-")
 left.set(
-    xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]", ylabel="largest depth [mm]", title="penalty"
+    xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]",
+    ylabel="largest depth [mm]",
+    title="penalty",
 )
-right.semilogy(range(1, 26), errors, "s-", color="C1", label="against the exact string")
-right.set(xlabel="step [-]", ylabel="largest error of the gap [mm]", title="proximal Galerkin")
+right.semilogy(
+    range(1, 26), errors, "s-", color="C1", label="against the exact string"
+)
+right.set(
+    xlabel="step [-]",
+    ylabel="largest error of the gap [mm]",
+    title="proximal Galerkin",
+)
 
-assert np.isclose(depths[-1] * stiffness[-1], f, rtol=0.05)  # the springs carry the weight
+assert np.isclose(
+    depths[-1] * stiffness[-1], f, rtol=0.05
+)  # the springs carry the weight
 assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %% [markdown]
@@ -281,8 +314,13 @@ assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %%
 loose = cp.Variable(len(x))
-program = cp.Problem(cp.Minimize(cp.quad_form(loose, cp.psd_wrap(Q)) / 2 + q @ loose), [loose >= 0])
-program.solve(solver=cp.CLARABEL, tol_gap_abs=1e-3, tol_gap_rel=1e-3, tol_feas=1e-3)
+program = cp.Problem(
+    cp.Minimize(cp.quad_form(loose, cp.psd_wrap(Q)) / 2 + q @ loose),
+    [loose >= 0],
+)
+program.solve(
+    solver=cp.CLARABEL, tol_gap_abs=1e-3, tol_gap_rel=1e-3, tol_feas=1e-3
+)
 print(
     "nodes with r > 0:",
     int(np.sum(loose.value > 0)),

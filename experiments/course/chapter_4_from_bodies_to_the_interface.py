@@ -43,7 +43,9 @@ from contactopt import (
 from contactopt.problem.laws.tresca import Tresca
 from contactopt.teaching import Slider
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -60,9 +62,9 @@ from experiments.course.grader import check, hint, table
 
 # %%
 E, nu, lowered = 5.0, 0.3, 0.1  # MPa, -, mm
-mesh = MeshTri.init_tensor(np.linspace(-2, 2, 33), np.linspace(0, 2, 17)).with_boundaries(
-    {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2}
-)
+mesh = MeshTri.init_tensor(
+    np.linspace(-2, 2, 33), np.linspace(0, 2, 17)
+).with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2})
 basis = Basis(mesh, ElementVector(ElementTriP1()))
 K = linear_elasticity(*lame_parameters(E, nu)).assemble(basis)
 
@@ -73,7 +75,7 @@ U_top[top.all(["u^2"])] = -lowered
 x = mesh.p[0, bottom.nodal_ix]
 gap = x**2 / 20
 
-print(f"{basis.N} unknowns, {len(held)} held, {len(x)} nodes on the contact surface")
+print(f"{basis.N} unknowns, {len(held)} held, {len(x)} nodes may touch")
 
 assert np.abs(K - K.T).max() < 1e-12
 
@@ -83,14 +85,35 @@ ax.triplot(*mesh.p, mesh.t.T, color="C0", lw=0.4)
 line = np.linspace(-2.4, 2.4, 101)
 ax.fill_between(line, -0.5, -(line**2) / 20, color="0.8", lw=0)
 ax.plot([-2.2, 2.2], [2.03, 2.03], "k", lw=4)
-ax.annotate("", (0, 2.1), (0, 2.6), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+ax.annotate(
+    "",
+    (0, 2.1),
+    (0, 2.6),
+    arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2},
+)
 ax.text(0.1, 2.35, "0.1 mm", color="C3")
 for head, name in (((2.7, 0.6), "$n$"), ((3.3, 0.0), "$t$")):
-    ax.annotate("", head, (2.7, 0.0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        (2.7, 0.0),
+        arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8},
+    )
     ax.text(head[0] + 0.06, head[1] + 0.04, name)
-ax.annotate("", (0, -0.02), (0, -0.46), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2})
+ax.annotate(
+    "",
+    (0, -0.02),
+    (0, -0.46),
+    arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2},
+)
 ax.text(0.08, -0.42, "$r_n$", color="C1")
-_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), ylim=(-0.5, 2.7))
+_ = ax.set(
+    xlabel="x [mm]",
+    ylabel="y [mm]",
+    aspect="equal",
+    xlim=(-2.5, 3.6),
+    ylim=(-0.5, 2.7),
+)
 
 # %% [markdown]
 # ## Primal: all displacements
@@ -107,13 +130,13 @@ _ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), y
 U = cp.Variable(basis.N)
 floor = U[c_n] + gap >= 0
 primal = cp.Problem(
-    cp.Minimize(cp.quad_form(U, cp.psd_wrap(K)) / 2), [floor, U[held] == U_top[held]]
+    cp.Minimize(cp.quad_form(U, cp.psd_wrap(K)) / 2),
+    [floor, U[held] == U_top[held]],
 )
 primal.solve(solver=cp.CLARABEL)
 pressed = floor.dual_value
-print(
-    f"the floor carries {pressed.sum():.4f} N; {int(np.sum(pressed > 1e-4))} of {len(x)} nodes touch"
-)
+touching = int(np.sum(pressed > 1e-4))
+print(f"the floor carries {pressed.sum():.4f} N; {touching} nodes of {len(x)}")
 
 assert 3 < np.sum(pressed > 1e-4) < len(x)
 
@@ -148,7 +171,9 @@ q = (T @ U_0).reshape(-1, 2) + np.column_stack([gap, 0 * gap])
 S = np.linalg.inv(Q)
 others = np.setdiff1d(np.arange(len(free)), np.nonzero(T)[1])
 places = np.nonzero(T)[1]
-schur = K_free[np.ix_(places, places)] - K_free[np.ix_(places, others)] @ np.linalg.solve(
+schur = K_free[np.ix_(places, places)] - K_free[
+    np.ix_(places, others)
+] @ np.linalg.solve(
     K_free[np.ix_(others, others)], K_free[np.ix_(others, places)]
 )
 print(f"{len(free)} free unknowns became {len(Q)}")
@@ -178,7 +203,10 @@ assert np.allclose(S, schur)
 r_n = cp.Variable(len(x))
 push = r_n >= 0
 dual = cp.Problem(
-    cp.Minimize(cp.quad_form(r_n, cp.psd_wrap(Q[::2, ::2])) / 2 + q[:, 0] @ r_n), [push]
+    cp.Minimize(
+        cp.quad_form(r_n, cp.psd_wrap(Q[::2, ::2])) / 2 + q[:, 0] @ r_n
+    ),
+    [push],
 )
 dual.solve(solver=cp.CLARABEL)
 
@@ -196,7 +224,9 @@ assert answer.solved and np.allclose(answer.reactions[:, 0], pressed, atol=1e-4)
 
 # %% tags=["hide-input"]
 def further_down(depth):
-    without_contact = depth / lowered * (T @ U_0).reshape(-1, 2) + np.column_stack([gap, 0 * gap])
+    without_contact = depth / lowered * (T @ U_0).reshape(
+        -1, 2
+    ) + np.column_stack([gap, 0 * gap])
     forces = solve(InterfaceProblem(Q, without_contact, 0.0)).reactions[:, 0]
     order = np.argsort(x)
     fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
@@ -206,7 +236,12 @@ def further_down(depth):
     return fig
 
 
-Slider("the plate comes down by [mm]", np.linspace(0.02, 0.2, 10), further_down, start=4)
+Slider(
+    "the plate comes down by [mm]",
+    np.linspace(0.02, 0.2, 10),
+    further_down,
+    start=4,
+)
 
 # %% [markdown]
 # ## Nitsche's method with finite elements
@@ -240,7 +275,12 @@ def consistency(U, v, w):
 
 @BilinearForm
 def bracket(U, v, w):
-    return w.touches * (pressure(U) - gamma * U[1]) * (pressure(v) - gamma * v[1]) / gamma
+    return (
+        w.touches
+        * (pressure(U) - gamma * U[1])
+        * (pressure(v) - gamma * v[1])
+        / gamma
+    )
 
 
 @LinearForm
@@ -254,7 +294,9 @@ while step < 30:
     step += 1
     system = K + fixed + bracket.assemble(edge, touches=touches)
     nitsche = solve_linear(
-        *condense(system, distance.assemble(edge, touches=touches), x=U_top, D=held)
+        *condense(
+            system, distance.assemble(edge, touches=touches), x=U_top, D=held
+        )
     )
     field = edge.interpolate(nitsche)
     value = pressure(field) - gamma * (
@@ -276,7 +318,12 @@ ax.plot(
 )
 middle = np.asarray(edge.global_coordinates())[0].mean(axis=1)
 order = np.argsort(middle)
-ax.plot(middle[order], np.maximum(value, 0).mean(axis=1)[order], "C1.", label="Nitsche's bracket")
+ax.plot(
+    middle[order],
+    np.maximum(value, 0).mean(axis=1)[order],
+    "C1.",
+    label="Nitsche's bracket",
+)
 ax.set(xlabel="x [mm]", ylabel="pressure [MPa]")
 ax.legend(frameon=False)
 
@@ -284,7 +331,7 @@ assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 
 # %% [markdown]
 # Both methods find the same pressure, up to the error of the mesh. If $\gamma_0$ is too small, the
-# energy has no minimum, as in chapter 1 (exercise 4.4).
+# energy is not convex, as in chapter 1 (exercise 4.4).
 #
 # ## Friction with a given bound
 #
@@ -297,9 +344,9 @@ assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 bound = np.full(len(x), 0.02)  # N
 r = cp.Variable(2 * len(x))
 law = [r[::2] >= 0, cp.abs(r[1::2]) <= bound]
-cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q.ravel() @ r), law).solve(
-    solver=cp.CLARABEL
-)
+cp.Problem(
+    cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q.ravel() @ r), law
+).solve(solver=cp.CLARABEL)
 with_bound = InterfaceProblem(Q, q, Tresca(bound))
 
 assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
@@ -321,19 +368,21 @@ assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
 # contactopt finds the rigid motions by itself.
 
 # %%
-flat = MeshTri.init_tensor(np.linspace(-2, 2, 17), np.linspace(0, 2, 9)).with_boundaries(
-    {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2}
-)
+flat = MeshTri.init_tensor(
+    np.linspace(-2, 2, 17), np.linspace(0, 2, 9)
+).with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2})
 loads = (Traction("top", (0.0, -1.0)),)
 block = Part("block", flat, Material(E=E, nu=nu), loads=loads, contact="bottom")
 floating = reduce(Scene("block on a floor", block, Rigid("floor"), mu=0.5))
 resting = solve(floating)
+supported = resting.reactions[:, 0].sum()
 print(
-    f"{floating.V.shape[1]} rigid motions, status {resting.status}, normal force {resting.reactions[:, 0].sum():.6f} N"
+    floating.V.shape[1], "rigid motions,", resting.status, f"{supported:.6f} N"
 )
 
 assert floating.V.shape[1] == 3 and resting.solved
 assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
+assert np.isclose(floating.s.min(), -4.0)  # the load, downwards
 
 # %% [markdown]
 # ## Exercises

@@ -16,10 +16,19 @@ import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce, scenes, solve
+from contactopt import (
+    InterfaceProblem,
+    diagnose,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.teaching import Slider
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -53,22 +62,35 @@ ax.fill([0, 20, 20, 0], [0, 0, 40, 40], color="C0", alpha=0.25, lw=0)
 ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
 ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
 ax.plot([0, 20], [40.6, 40.6], "k", lw=4)
-ax.annotate("", (10, 42), (10, 54), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+ax.annotate(
+    "",
+    (10, 42),
+    (10, 54),
+    arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2},
+)
 ax.text(11.5, 47, "100 N", color="C3")
 for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
-    ax.annotate("", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"})
+    ax.annotate(
+        "", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"}
+    )
     ax.text(head[0] + 1, head[1] + 1, name)
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
 ax.text(3, 20, "block")
 ax.text(3, -14, "foundation")
-_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-26, 57))
+_ = ax.set(
+    xlabel="x [mm]",
+    ylabel="y [mm]",
+    aspect="equal",
+    xlim=(-2, 48),
+    ylim=(-26, 57),
+)
 
 # %% [markdown]
 # ## Primal and dual for a given bound
 #
 # First let the friction bound $g_i$ of every node be given. Then the solution is the minimum of an
 # energy. The *primal* problem has the displacements $u$ of the contact and the motion $\lambda$ of
-# the plate as its unknowns. With the stiffness $S = Q^{-1}$ it is
+# the plate as its unknowns. With the stiffness $S = Q^{-1}$ of the components that can move it is
 #
 # $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| . $$
 #
@@ -103,7 +125,11 @@ dual = cp.Problem(
 u, plate = cp.Variable(2 * k), cp.Variable(V.shape[1])
 S = np.linalg.inv(Q[np.ix_(moves, moves)])
 stretch = u - q - V @ plate
-energy = cp.quad_form(stretch[moves], cp.psd_wrap((S + S.T) / 2)) / 2 - s @ plate + g @ cp.abs(u[t])
+energy = (
+    cp.quad_form(stretch[moves], cp.psd_wrap((S + S.T) / 2)) / 2
+    - s @ plate
+    + g @ cp.abs(u[t])
+)
 primal = cp.Problem(cp.Minimize(energy), [u[n] >= 0, u[~moves] == q[~moves]])
 
 g.value = np.full(k, 0.5)
@@ -111,14 +137,16 @@ dual.solve(solver=cp.CLARABEL)
 primal.solve(solver=cp.CLARABEL)
 
 assert np.isclose(primal.value, -dual.value, rtol=1e-5)
-assert np.allclose(S @ (u.value - q - V @ plate.value)[moves], r.value[moves], atol=1e-2)
+assert np.allclose(
+    S @ (u.value - q - V @ plate.value)[moves], r.value[moves], atol=1e-2
+)
 
 # %% [markdown]
 # ## Method 1: Tresca's iteration
 #
 # Solve the dual for a bound $g$, set $g = \mu r_n$, and repeat. Each step is one quadratic program
-# (QP: a quadratic cost with linear constraints). The certificate falls by the same factor in every
-# step. It stops falling when it has reached the accuracy of the QP solver.
+# (QP: a quadratic cost with linear constraints). As soon as no node changes its state any more, the
+# certificate falls by about the same factor in every step. It stops falling when it has reached the accuracy of the QP solver.
 
 # %%
 g.value, road = np.zeros(k), []
@@ -149,7 +177,7 @@ def newton(rho=1.0, steps=20):
         pressed = np.maximum(r[n] - rho * u[n], 0) if step > 1 else np.ones(k)
         trial = r[t] - rho * u[t] if step > 1 else np.zeros(k)
         slips = (np.abs(trial) > mu * pressed) & (pressed > 0)
-        # rows of A r + B u = 0: one normal and one tangential equation for every node
+        # rows of A r + B u = 0: for every node a normal and a tangential one
         A, B = np.zeros((2 * k, 2 * k)), np.zeros((2 * k, 2 * k))
         for i in range(k):
             if pressed[i] == 0:
@@ -159,24 +187,32 @@ def newton(rho=1.0, steps=20):
                 A[2 * i + 1, 2 * i] = -mu * np.sign(trial[i])
             else:
                 B[2 * i, 2 * i] = B[2 * i + 1, 2 * i + 1] = 1
-        B[~moves], A[~moves] = 0, np.eye(2 * k)[~moves]  # no friction on the axis of symmetry
-        system = np.block([[A + B @ Q, B @ V], [V.T, np.zeros((V.shape[1],) * 2)]])
-        r, lam = np.split(np.linalg.solve(system, -np.concatenate([B @ q, s])), [2 * k])
+        B[~moves], A[~moves] = (
+            0,
+            np.eye(2 * k)[~moves],
+        )  # no friction on the axis of symmetry
+        system = np.block(
+            [[A + B @ Q, B @ V], [V.T, np.zeros((V.shape[1],) * 2)]]
+        )
+        r, lam = np.split(
+            np.linalg.solve(system, -np.concatenate([B @ q, s])), [2 * k]
+        )
         if natural_map_residual(problem, r.reshape(-1, 2), lam) < 1e-12:
             return r, step
     return r, steps
 
 
 forces, steps = newton()
-print(
-    f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces.reshape(-1, 2)):.0e}"
-)
+certificate = natural_map_residual(problem, forces.reshape(-1, 2))
+print(f"Newton: {steps} steps, certificate {certificate:.0e}")
 
-assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8)
+assert steps < 20 and np.allclose(
+    forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8
+)
 
 # %% [markdown]
 # Once the states are right, the next step is exact. Therefore Newton's method ends with an error of
-# the size of rounding. Tresca's iteration does not.
+# the size of rounding. Tresca's iteration comes closer step by step, as far as its QP solver allows.
 #
 # ## Method 3: a cone program with a shift
 #
@@ -193,8 +229,8 @@ assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ra
 # the contact force of the last iteration to the force of the spring. By repetition it removes the
 # error, although $\kappa$ is moderate.
 #
-# Now we compare five methods. Each is asked for a small certificate and for smaller and smaller
-# ones.
+# Now we compare five methods. Each is asked for a certificate of $10^{-2}$, and then for smaller and
+# smaller ones.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -235,7 +271,13 @@ def with_friction(coefficient):
     answer = solve(InterfaceProblem(Q, problem.q, coefficient, V, s))
     pressure, shear = (answer.reactions / problem.areas[:, None]).T
     fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
-    ax.plot(problem.coordinates[0], coefficient * pressure, "k--", lw=1, label=r"$\mu\, p$")
+    ax.plot(
+        problem.coordinates[0],
+        coefficient * pressure,
+        "k--",
+        lw=1,
+        label=r"$\mu\, p$",
+    )
     ax.plot(problem.coordinates[0], -shear, "C1.-", label="friction, inwards")
     ax.set(
         xlabel="x [mm]",
@@ -247,7 +289,9 @@ def with_friction(coefficient):
     return fig
 
 
-Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3)
+Slider(
+    "friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3
+)
 
 # %% [markdown]
 # Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the
@@ -275,14 +319,24 @@ motions = np.array(
 )  # both runners move up, or sideways
 pulled = np.array([-100.0, 25.0])  # N: the load in these two motions
 for coefficient in (0.2, 0.3):
-    sledge = InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), coefficient, motions, pulled)
+    sledge = InterfaceProblem(
+        np.zeros((4, 4)), np.zeros((2, 2)), coefficient, motions, pulled
+    )
     print(f"mu = {coefficient}: {solve(sledge).status}")
 
 assert (
-    str(solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled)).status)
+    str(
+        solve(
+            InterfaceProblem(
+                np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled
+            )
+        ).status
+    )
     == "infeasible"
 )
-assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, pulled)).solved
+assert solve(
+    InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, pulled)
+).solved
 
 # %% [markdown]
 # ## Exercises

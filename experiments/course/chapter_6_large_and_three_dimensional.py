@@ -29,14 +29,17 @@ from contactopt import (
 from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.teaching import Slider
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
 #
-# A rigid plate presses a square rubber block on a foundation with 100 N. The system has two planes
-# of symmetry, so a quarter of it is enough. It has a fourth of the unknowns, and the same answer.
+# A rigid plate presses a square rubber block on a foundation with 100 N. Two planes of symmetry cut
+# the system into four equal quarters, and one of them is enough. It has about a fourth of the
+# unknowns, and the same answer.
 #
 # The normal $n$ points out of the foundation, upwards. The two tangents $t_1$ and $t_2$ lie in the
 # surface, along $x$ and $y$. Every contact has three components in the order $(n, t_1, t_2)$: the
@@ -54,12 +57,22 @@ ax.bar3d(-20, -20, 0, 40, 40, 40, color="C0", alpha=0.10, shade=False, zorder=1)
 ax.bar3d(
     0, 0, 0, 20, 20, 40, color="C0", alpha=0.45, shade=False, zorder=2
 )  # the quarter that is modelled
-ax.quiver(10, 10, 68, 0, 0, -25, color="C3", lw=2, arrow_length_ratio=0.3, zorder=3)
+ax.quiver(
+    10, 10, 68, 0, 0, -25, color="C3", lw=2, arrow_length_ratio=0.3, zorder=3
+)
 ax.text(13, 10, 58, "100 N", color="C3", zorder=3)
-for way, name in (((0, 0, 30), "$n$"), ((30, 0, 0), "$t_1$"), ((0, 30, 0), "$t_2$")):
-    ax.quiver(48, -48, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3)
+for way, name in (
+    ((0, 0, 30), "$n$"),
+    ((30, 0, 0), "$t_1$"),
+    ((0, 30, 0), "$t_2$"),
+):
+    ax.quiver(
+        48, -48, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3
+    )
     ax.text(48 + 1.2 * way[0], -48 + 1.2 * way[1], 1.2 * way[2], name, zorder=3)
-ax.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", box_aspect=(1, 1, 0.8))
+ax.set(
+    xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", box_aspect=(1, 1, 0.8)
+)
 ax.view_init(elev=22, azim=-58)
 
 # %% [markdown]
@@ -99,23 +112,29 @@ ax.view_init(elev=22, azim=-58)
 
 # %%
 def pulled(degrees):
-    """One node on its own: pressed down by 1 mm and pulled 3 mm in a direction, that angle from the
-    first tangent.
+    """One node on its own: pressed down by 1 mm and pulled 3 mm, in the
+    direction with that angle from the first tangent.
     """
     angle = np.deg2rad(degrees)
-    return InterfaceProblem(np.eye(3), [[-1.0, 3 * np.cos(angle), 3 * np.sin(angle)]], 0.5)
+    return InterfaceProblem(
+        np.eye(3), [[-1.0, 3 * np.cos(angle), 3 * np.sin(angle)]], 0.5
+    )
 
 
 one, bound = pulled(0.0), 0.5
 Q, q = one.Q, one.q[0]
 
 u = cp.Variable(3)
-primal_energy = cp.quad_form(u - q, np.linalg.inv(Q)) / 2 + bound * cp.norm(u[1:])
+primal_energy = cp.quad_form(u - q, np.linalg.inv(Q)) / 2 + bound * cp.norm(
+    u[1:]
+)
 cp.Problem(cp.Minimize(primal_energy), [u[0] >= 0]).solve(solver=cp.CLARABEL)
 
 r = cp.Variable(3)
 disc = cp.norm(r[1:]) <= bound
-cp.Problem(cp.Minimize(cp.quad_form(r, Q) / 2 + q @ r), [r[0] >= 0, disc]).solve(solver=cp.CLARABEL)
+cp.Problem(
+    cp.Minimize(cp.quad_form(r, Q) / 2 + q @ r), [r[0] >= 0, disc]
+).solve(solver=cp.CLARABEL)
 print(f"u = {np.round(u.value, 4)} mm, r = {np.round(r.value, 4)} N")
 
 assert np.allclose(r.value, [1.0, -0.5, 0.0], atol=1e-4)
@@ -138,7 +157,11 @@ def polygon(facets):
     ax.plot(np.cos(angle), np.sin(angle), "k", lw=1, label="circle")
     corners = (2 * np.arange(facets + 1) + 1) * half
     ax.plot(np.cos(corners), np.sin(corners), "C1", label=f"{facets} facets")
-    ax.set(aspect="equal", xlabel=r"$r_1 / (\mu r_n)$ [-]", ylabel=r"$r_2 / (\mu r_n)$ [-]")
+    ax.set(
+        aspect="equal",
+        xlabel=r"$r_1 / (\mu r_n)$ [-]",
+        ylabel=r"$r_2 / (\mu r_n)$ [-]",
+    )
     ax.set_title(f"up to {100 * (1 - np.cos(half)):.1f} % less friction")
     ax.legend(frameon=False, loc="center")
     return fig
@@ -152,7 +175,8 @@ Slider("facets [-]", [3, 4, 6, 8, 12, 16, 32], polygon, start=3)
 
 # %%
 program = {
-    name: models.tresca(one, facets=facets) for name, facets in (("circle", None), ("8 facets", 8))
+    name: models.tresca(one, facets=facets)
+    for name, facets in (("circle", None), ("8 facets", 8))
 }
 for name, each in program.items():
     each.parameters["g"].value = np.array([0.5])
@@ -175,18 +199,25 @@ assert np.linalg.norm(program["8 facets"].variables["r"].value[1:]) < 0.47
 scene = scenes.flat_punch(3, mu=0.3, elements=8)
 problem = reduce(scene)
 answer = solve(problem)
-shear, pressure = np.linalg.norm(answer.reactions[:, 1:], axis=1), answer.reactions[:, 0]
+shear, pressure = (
+    np.linalg.norm(answer.reactions[:, 1:], axis=1),
+    answer.reactions[:, 0],
+)
 slips = shear > (1 - 1e-6) * 0.3 * pressure
 x, y = problem.coordinates[:2]
 
 fig, ax = plt.subplots(figsize=(4.6, 3.8), layout="constrained")
-dots = ax.scatter(x, y, c=pressure / problem.areas, s=110, marker="s", alpha=0.6)
-ax.quiver(x, y, *answer.reactions[:, 1:].T, color="black", width=0.005, zorder=3)
+dots = ax.scatter(
+    x, y, c=pressure / problem.areas, s=110, marker="s", alpha=0.6
+)
+ax.quiver(
+    x, y, *answer.reactions[:, 1:].T, color="black", width=0.005, zorder=3
+)
 ax.plot(x[slips], y[slips], "rx", ms=5, label="slips", zorder=4)
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
 ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 fig.colorbar(dots, label="pressure [MPa]")
-print(f"{problem.contacts} contacts, {int(slips.sum())} slip, certificate {answer.residual:.0e}")
+print(f"{int(slips.sum())} of {problem.contacts} slip, {answer.residual:.0e}")
 
 assert answer.solved and 0 < slips.sum() < len(slips)
 
@@ -222,14 +253,17 @@ assert answer.solved and 0 < slips.sum() < len(slips)
 # %%
 products = {}
 for elements in (4, 6, 8):
-    implicit = reduce(scenes.flat_punch(3, mu=0.3, elements=elements), Q="implicit")
+    implicit = reduce(
+        scenes.flat_punch(3, mu=0.3, elements=elements), Q="implicit"
+    )
     products[elements] = []
     for name in ("none", "neumann"):
-        history = solve(implicit, "newton", linear="krylov", preconditioner=name).history
+        history = solve(
+            implicit, "newton", linear="krylov", preconditioner=name
+        ).history
         products[elements].append(history[-1]["products"] / len(history))
-    print(
-        f"{elements} elements: {products[elements][0]:.0f} products without, {products[elements][1]:.0f} with"
-    )
+    without, with_it = products[elements]
+    print(f"{elements} elements: {without:.0f} without, {with_it:.0f} with")
 
 fig, ax = plt.subplots(figsize=(5, 3.2), layout="constrained")
 ax.plot(
@@ -260,8 +294,12 @@ assert products[8][1] < 1.6 * products[4][1]
 # %%
 rubber, R, P = Material(E=5.0, nu=0.3), 400.0, 100.0
 hertz = hertz_point(P, R, contact_modulus(rubber))
-grid = (np.arange(64) + 0.5) * 2.5 * hertz.half_width / 64 - 1.25 * hertz.half_width
-sphere = Rigid("sphere", gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R), force={"z": -P})
+grid = (
+    np.arange(64) + 0.5
+) * 2.5 * hertz.half_width / 64 - 1.25 * hertz.half_width
+sphere = Rigid(
+    "sphere", gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R), force={"z": -P}
+)
 ball = Scene(
     "sphere",
     sphere,
@@ -281,8 +319,12 @@ line = np.linspace(0, 1.3 * hertz.half_width, 200)
 ax.plot(line, hertz.pressure(line), "k", lw=1, label="Hertz")
 ax.set(xlabel="distance from the axis [mm]", ylabel="pressure [MPa]")
 ax.legend(frameon=False)
+peak = p.max() / hertz.peak
 print(
-    f"{flat.contacts} contacts, {round_answer.products} products, peak {p.max() / hertz.peak:.4f} of Hertz"
+    flat.contacts,
+    "contacts,",
+    round_answer.products,
+    f"products, {peak:.4f} of Hertz",
 )
 
 assert round_answer.solved and abs(p.max() / hertz.peak - 1) < 5e-3
@@ -306,10 +348,10 @@ wrong = InterfaceProblem(
     np.diag(np.diag(Q)), problem.q, 0.3, problem.V, problem.s
 )  # the diagonal in place of Q
 other = solve(wrong)
-difference = np.abs(other.reactions - answer.reactions).max() / answer.reactions.max()
-print(
-    f"with the diagonal in place of Q the forces are wrong by {100 * difference:.0f} % of the largest"
+difference = (
+    np.abs(other.reactions - answer.reactions).max() / answer.reactions.max()
 )
+print(f"the diagonal in place of Q: {difference:.0%} of the largest force")
 
 assert difference > 0.1
 

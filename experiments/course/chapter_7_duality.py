@@ -14,10 +14,21 @@ import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, Material, Part, Scene, Support, laws, models, reduce
+from contactopt import (
+    InterfaceProblem,
+    Material,
+    Part,
+    Scene,
+    Support,
+    laws,
+    models,
+    reduce,
+)
 from contactopt.meshes.structured import tensor_mesh
 
-sys.path.extend([".", "../.."])  # the folder of the repository, where the exercises are
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]
@@ -79,7 +90,8 @@ for program in (forces, displacements):
     print(program)
 r, u = forces.variables["r"].value, displacements.variables["u"].value
 print("forces", np.round(r, 4), "N; displacements", np.round(u, 4), "mm")
-print(f"P = {displacements.problem.value:.5f}, D = {-forces.problem.value:.5f} N mm")
+P, D = displacements.problem.value, -forces.problem.value
+print(f"P = {P:.5f}, D = {D:.5f} N mm")
 
 assert np.isclose(displacements.problem.value, -forces.problem.value, atol=1e-5)
 assert np.allclose(displacements.multipliers["reaction"], r, atol=1e-4)
@@ -102,8 +114,18 @@ for tail, head, name, color in (
     ((u[1] - 0.12, 0.1), (u[1] - 0.12 + 0.7 * r[1], 0.1), "$r_t$", "C1"),
     ((0, 0.6), (u[1], 0.6), "$u_t$", "C0"),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
-    ax.text((tail[0] + head[0]) / 2 + 0.08, (tail[1] + head[1]) / 2 + 0.1, name, color=color)
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
+    ax.text(
+        (tail[0] + head[0]) / 2 + 0.08,
+        (tail[1] + head[1]) / 2 + 0.1,
+        name,
+        color=color,
+    )
 ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.85, 0.95), aspect="equal")
 _ = ax.axis("off")
 
@@ -135,13 +157,18 @@ _ = ax.axis("off")
 
 # %%
 axis = np.linspace(0, 1, 9)
-sides = {"low": lambda x: x[1] == x[1].min(), "high": lambda x: x[1] == x[1].max()}
+sides = {
+    "low": lambda x: x[1] == x[1].min(),
+    "high": lambda x: x[1] == x[1].max(),
+}
 upper = tensor_mesh(axis, axis).with_boundaries(sides)
 lower = tensor_mesh(axis, axis - 1).with_boundaries(sides)
 pressed = (Support("high", {"x": 0.01, "y": -0.02}),)
 blocks = (
     Part("upper", upper, Material(5.0, 0.3), pressed, contact="low"),
-    Part("lower", lower, Material(50.0, 0.3), (Support("low"),), contact="high"),
+    Part(
+        "lower", lower, Material(50.0, 0.3), (Support("low"),), contact="high"
+    ),
 )
 pair = reduce(Scene("two blocks", *blocks, mu=0.3))
 C, start, bound = pair.Q, pair.q.ravel(), 2e-3  # N per node
@@ -158,7 +185,10 @@ def admissible(force):
 def parts_of_the_gap(force):
     moved = (C @ force + start).reshape(-1, 2)
     moved[:, 0] = np.maximum(moved[:, 0], 0)
-    stretch, (f_n, f_t) = moved.ravel() - start - C @ force, force.reshape(-1, 2).T
+    stretch, (f_n, f_t) = (
+        moved.ravel() - start - C @ force,
+        force.reshape(-1, 2).T,
+    )
     friction = bound * np.abs(moved[:, 1]) + f_t * moved[:, 1]
     return stretch @ stiffness @ stretch / 2, f_n @ moved[:, 0], friction.sum()
 
@@ -173,9 +203,11 @@ for _ in range(150):
     errors.append((force - best) @ C @ (force - best) / 2)
     force = admissible(force - (C @ force + start) / np.linalg.norm(C, 2))
 gap = np.sum(gaps, axis=1)
-print(f"after {len(gap)} steps: gap {gap[-1]:.1e} N mm, error {errors[-1]:.1e} N mm")
+print(f"{len(gap)} steps: gap {gap[-1]:.1e} N mm, error {errors[-1]:.1e} N mm")
 
-assert np.all(np.array(gaps) >= -1e-12) and np.all(gap >= np.array(errors) - 1e-10)
+assert np.all(np.array(gaps) >= -1e-12) and np.all(
+    gap >= np.array(errors) - 1e-10
+)
 assert gap[-1] < 0.02 * gap[0]
 
 # %% tags=["hide-input"]
@@ -184,9 +216,17 @@ ax.semilogy(gap, "k", lw=2)
 ax.semilogy(errors, "C3--")
 ax.text(75, 3e-6, "gap, mostly of contact")
 ax.text(100, 2.5e-8, "error", color="C3")
-for name, values, at in zip(("springs", "", "friction"), np.transpose(gaps), (95, 0, 140)):
+for name, values, at in zip(
+    ("springs", "", "friction"), np.transpose(gaps), (95, 0, 140)
+):
     ax.semilogy(np.maximum(values, 1e-12), lw=1, color="0.6")
-    ax.annotate(name, (at, values[at]), (-30, -20), textcoords="offset points", color="0.4")
+    ax.annotate(
+        name,
+        (at, values[at]),
+        (-30, -20),
+        textcoords="offset points",
+        color="0.4",
+    )
 ax.set(xlabel="step [-]", ylabel="energy [N mm]", ylim=(1e-9, None))
 _ = ax.margins(x=0)
 
@@ -210,10 +250,14 @@ _ = ax.margins(x=0)
 for way in (1.0, 10.0, 100.0, 1000.0):
     z = cp.Variable(3)
     at = z + np.array([way, -way, 1.0])
-    missing = cp.Problem(cp.Minimize(cp.sum_squares(z) / 2), [at[0] >= cp.norm(at[1:])])
+    missing = cp.Problem(
+        cp.Minimize(cp.sum_squares(z) / 2), [at[0] >= cp.norm(at[1:])]
+    )
     missing.solve(solver=cp.CLARABEL)
     print(f"lambda {way:6g} mm: energy {missing.value:.2e} N mm")
-    assert np.isclose(missing.value, (np.hypot(way, 1) - way) ** 2 / 4, rtol=0.1)
+    assert np.isclose(
+        missing.value, (np.hypot(way, 1) - way) ** 2 / 4, rtol=0.1
+    )
 
 # %% [markdown]
 # With a positive definite $Q$ and *without* rigid motions this cannot happen. Nothing restricts the

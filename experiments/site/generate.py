@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import jupytext
+import lectures
 import museum
 import reference
 from reference import contents, index
@@ -43,6 +44,7 @@ ACCURACY = (
     "facing_surfaces",
     "load_cycle",
     "calculix",
+    "second_reading",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
@@ -78,6 +80,7 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     yield from notebook("gallery", "gallery", gallery())
     yield from course(site)
     yield Path("museum.md"), museum.index(site)
+    yield Path("lecturers.md"), lectures.index(site)
     yield from reference.plug_in_pages(site)
     yield Path("command_line.md"), command_line()
     yield from reference.room_pages(ROOT)
