@@ -33,7 +33,7 @@ NAMES = {
     "method.rho": r"penalty factor $\rho$ [-]",
     "problem.coupling": r"Dundurs' constant $\beta$ [-]",
     "method.factor": "penalty factor [-]",
-    "problem.upper_nu": r"Poisson's ratio $\nu$, upper body [-]",
+    "problem.upper_nu": r"Poisson's ratio $\nu$ [-]",
 }
 
 

@@ -184,7 +184,7 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
-    """Draw median times of successes against size, with the exponent p of the larger sizes.
+    """Draw median times of successes against size, with the exponent of the larger sizes n.
 
     The eight fastest at their largest sizes have colours and names.
     """
@@ -196,7 +196,7 @@ def time_against_size(
     found.sort(key=lambda own: (-own[1][-1], own[2][-1]))
     for rank, (full, x, y) in enumerate(found):
         exponent, label = fitted_exponent(x, y), short_label(full, labels)
-        label += "" if np.isnan(exponent) else f" {exponent:.1f}"
+        label += "" if np.isnan(exponent) else f" $n^{{{exponent:.1f}}}$"
         ax.loglog(x, y, marker=MARKS[rank % len(MARKS)], label=label, **_look(rank))
         if rank < len(COLOURS):
             ends.append((x[-1], y[-1], label, COLOURS[rank]))
@@ -245,10 +245,10 @@ def stability_map(
         ax.set_title(short_label(name), fontsize=LETTERS, pad=3)
         last = number + columns >= len(parts)
         ax.set_xlabel(NAMES.get(x, x) if last else "")
-        ax.set_ylabel(NAMES.get(y, y) if number % columns == 0 else "")
         _thresholds(ax, rows, x, y, grid)
     for ax in axes[len(parts) :]:
         ax.set_axis_off()
+    figure.supylabel(NAMES.get(y, y), fontsize=LETTERS)
     handles = {line.get_label(): line for ax in axes for line in ax.get_lines()}
     if handles:
         look = {"loc": "outside lower center", "ncols": 1, "frameon": False, "fontsize": LETTERS}

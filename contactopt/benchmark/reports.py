@@ -62,7 +62,7 @@ LEFT_OUT = ("key", "label", "history")  # of a report's table
 TABLE_FILES = ("csv", "parquet")
 MOST_LINES = 2000  # of a table that is kept as text
 PAGE = "benchmarks.html"
-SHADES = 40
+SHADES = 56
 
 
 @dataclass(frozen=True)

@@ -199,7 +199,7 @@ def figure(bench: Bench, sweep: list[dict[str, Any]]) -> Any:
             points = [(row["factor"], row[f"{component}, L2"]) for row in converged(sweep, law)]
             axes[0].loglog(*zip(*points), mark, color=colour, mfc="white" if i else colour)
         axes[0].plot([], [], mark, color=GREY, mfc="white" if i else GREY, label=component)
-    axes[0].plot([], [], color="0.7", label="same law here")
+    axes[0].plot([], [], color="0.7", label="same law in contactopt")
     for law, colour in zip(DECADES, (BLUE, ORANGE)):
         lost = [row for row in sweep if row["contact"] == law and row["end"] != "converged"]
         for axis, key in zip(axes[1:], ("iterations", "seconds")):
