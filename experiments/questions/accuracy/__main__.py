@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.figures.style import GREY, MARKS, add_legend, draw_lines, paper_axes
+from contactopt.benchmark.figure_style import set_ticks
+from contactopt.figures.style import GREY, MARKS, add_legend, draw_lines, paper_axes, symbols
 from experiments.questions.accuracy.corner_orders import CASES, GRADED, UNIFORM, orders
 from experiments.questions.accuracy.measured import (
     FRICTION,
@@ -28,8 +29,9 @@ def draw_orders(errors: dict[str, dict[str, np.ndarray]]) -> Any:
     figure, (ax,) = paper_axes()
     lines = []
     for mesh, n in (("uniform", UNIFORM), ("graded", GRADED[:-1])):
-        lines += [(f"{name}, {mesh}", n, found[mesh]) for name, found in errors.items()]
+        lines += [(symbols(f"{name}, {mesh}"), n, found[mesh]) for name, found in errors.items()]
     draw_lines(ax, lines, ["o-"] * len(errors) + ["s--"] * len(errors))
+    set_ticks(ax.xaxis)
     ax.set(
         xlabel="elements across the half-width $n$ [-]",
         ylabel="error of the approach [length], unit force",
