@@ -64,6 +64,14 @@ class RunOptions:
     quantity: str | None = _option(
         str, "NAME", "the quantity of the accuracy; NAME:PAIR is that of one pair of surfaces"
     )
+    read: tuple[str, ...] = _option(
+        tuple,
+        "NAME",
+        "quantities that are read from the solution, such as von_mises:BODY:BOUNDARY, each with the"
+        " error that its one mesh lets expect",
+        (),
+        in_file=False,
+    )
     adaptive: bool = _option(
         bool,
         "",

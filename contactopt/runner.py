@@ -25,7 +25,7 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
-from contactopt.readings.quantities import approach
+from contactopt.readings.quantities import approach, quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
@@ -138,6 +138,8 @@ def run(
     name = options.method or default_method(options.settings)
     method = find_method(name, **options.settings)
     method.backends(states[-1].dim)  # refused before any work if one of them cannot be used
+    for quantity in options.read:
+        quantity_of_states(quantity, states)
     restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
     limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
     how = _how(options, method, start, restart, note)
@@ -151,6 +153,11 @@ def run(
         if solved is None or team is not None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
+        if options.read:
+            from contactopt.accuracy.indicators import read_once  # with the room of derivatives
+
+            with _clock(result.summary["seconds"], "quantities"):
+                result.summary["quantities"] = {one: read_once(solved, one) for one in options.read}
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note, restart)
     except MemoryError as error:

@@ -245,3 +245,44 @@ max_unknowns = 10000
 time_limit = 1e-6
 max_memory = 3
 """
+
+
+@pytest.mark.parametrize(
+    ("scene", "quantity"),
+    [
+        ("press-fit", "von_mises:hub"),
+        ("cylinder-2d", "pressure"),
+        ("pin-in-bush", "von_mises:bush"),
+    ],
+)
+def test_one_mesh_reads_a_quantity_with_its_error(scene, quantity):
+    coarse = run(scene, read=(quantity, "energy"))
+    found = coarse.summary["quantities"]
+    fine = run(scene, read=(quantity,), elements=3 * coarse.scene.elements)
+    exact = fine.summary["quantities"][quantity]["value"]
+    error = abs(found[quantity]["value"] / exact - 1)
+    assert 0 < error <= found[quantity]["error"] <= 10 * error
+    assert found["energy"]["error"] < 0.01
+
+
+def test_what_one_mesh_cannot_tell_is_not_invented(capsys, tmp_path):
+    out = str(tmp_path / "out")
+    line = ["run", "hertz-half-space", "--elements", "16", "--no-figures", "--out", out]
+    assert main([*line, "--read", "approach", "pressure"]) == 0
+    printed = capsys.readouterr().out
+    assert "approach" in printed and printed.count("its relative error on this mesh: unknown") == 2
+    with pytest.raises(InputError, match="no elastic body 'wheel'"):
+        run("press-fit", read=("von_mises:wheel",))
+    with pytest.raises(InputError, match="load path"):
+        run("press-fit", read=("friction_work",))
+
+
+def test_the_summary_has_one_line_for_each_pair(capsys, tmp_path):
+    line = ["run", "stack", "--no-figures", "--out", str(tmp_path / "out")]
+    main(line)
+    printed = capsys.readouterr().out.splitlines()
+    pairs = [line for line in printed if line.startswith("contact '")]
+    names = json.loads((tmp_path / "out/summary.json").read_text())["pairs"]
+    assert len(pairs) == len(names) > 1
+    for words, pair in zip(pairs, names.values(), strict=True):
+        assert f"{pair['stick']} stick" in words and "largest pressure" in words

@@ -8,12 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from contactopt.accuracy.estimate import read
 from contactopt.accuracy.marking import spread
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.interface import sensitivity
 from contactopt.derivatives.states import Duals
 from contactopt.errors import InputError
-from contactopt.readings.quantities import Quantity
+from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
 
@@ -100,6 +101,34 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
         errors = tuple(inside + share for inside, share in zip(errors, added))
         between = float(sum(share.sum() for share in added))
     return ElementErrors(value, errors, norm, between)
+
+
+def read_once(solved: Solved, name: str) -> dict[str, float | None]:
+    """Read a quantity from a solution, with the error that this one mesh lets expect.
+
+    Parameters
+    ----------
+    solved : The solved scene.
+    name : Of contactopt.readings.quantities.
+
+    Returns
+    -------
+    "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
+
+    Raises
+    ------
+    InputError : For a quantity that the scene does not have.
+    """
+    quantity = find_quantity(name, solved.reduction.scene)
+    reading = read(quantity, solved)
+    size = np.inf
+    elastic = [part for part in solved.reduction.scene.parts if part.elastic]
+    if solved.path is None and all(part.meshed for part in elastic):
+        errors = element_errors(solved, quantity, reading.value)
+        size = np.inf if errors.unsigned else errors.size
+    size += reading.uncertainty
+    known = np.isfinite(size) and reading.value != 0 and not reading.missing
+    return {"value": reading.value, "error": size / abs(reading.value) if known else None}
 
 
 def along_path(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:

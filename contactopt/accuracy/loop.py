@@ -20,7 +20,7 @@ from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
 from contactopt.readings.peaks import Peak, Reading
-from contactopt.readings.quantities import Quantity, find_quantity
+from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse
 from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
@@ -75,16 +75,11 @@ def refine(
     """
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     scene = states[-1]
-    asked = find_quantity(quantity, scene)
+    asked = quantity_of_states(quantity, states)
     if asked.nodal:
         raise InputError(
             f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as"
             " in 'pressure@X,Y'."
-        )
-    if asked.column and len(states) == 1:
-        raise InputError(
-            f"the {quantity} is that of a load path, and scene '{scene.name}' has one state; give"
-            " it steps, or ask for another quantity."
         )
     options = _in_time(options or Options(), accuracy)
     search: Everywhere | Locally

@@ -115,12 +115,20 @@ def _print_result(result: Any, out: str) -> None:
         f"largest pressure {s['max_pressure']:.6g} {stress}"
     )
     for name, words in resultant_words(s).items():
-        print(f"force on the upper body of '{name}': {words} {force}")
+        pair = s["pairs"][name]
+        print(
+            f"contact '{name}': force on the upper body {words} {force}; largest pressure"
+            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
+            f" {pair['slip']} slip"
+        )
     if s["contact_half_width"] is not None:
         print(
             f"contact half-width {s['contact_half_width']:.6g} {length}, "
             f"stick half-width {s['stick_half_width']:.6g} {length}"
         )
+    for name, found in s.get("quantities", {}).items():
+        error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
+        print(f"{name} {found['value']:.6g}; its relative error on this mesh: {error}")
     for remark in s["remarks"]:
         print(f"note: {remark}")
     if result.estimate is not None:

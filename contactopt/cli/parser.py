@@ -150,6 +150,8 @@ def _run(run: argparse.ArgumentParser) -> None:
             what = f"{what}: {', '.join(NAMES[name])}"
         if told["kind"] is bool:
             run.add_argument(flag, action="store_true", default=None, help=what)
+        elif told["kind"] is tuple and name not in NAMES:
+            run.add_argument(flag, nargs="+", metavar=told["value"], help=what)
         elif told["kind"] is tuple:
             pictures.add_argument(
                 flag, nargs="+", choices=NAMES[name], metavar=told["value"], help=what

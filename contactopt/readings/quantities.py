@@ -21,7 +21,7 @@ errors, gradients, fits and the command line know of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -89,6 +89,19 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
         named = ", ".join(own for own, (form, _) in ROWS.items() if form == "[:PAIR]")
         raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {named}.")
     return make(name, rest, scene)
+
+
+def quantity_of_states(name: Any, states: Sequence[Scene]) -> Quantity:
+    """As `find_quantity`, for a scene or the states of its load path: InputError also for a
+    quantity of paths where there is one state only.
+    """
+    found = find_quantity(name, states[-1])
+    if found.column and len(states) == 1:
+        raise InputError(
+            f"the {name} is that of a load path, and scene '{states[-1].name}' has one state; give"
+            " it steps, or ask for another quantity."
+        )
+    return found
 
 
 def seeds_of(quantity: Any, state: State) -> Seeds:
