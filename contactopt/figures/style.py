@@ -94,11 +94,14 @@ def dress(ax: Any, spines: bool = False, letters: float = LETTERS) -> None:
 
 
 def add_legend(ax: Any) -> None:
-    """A legend above axes, where it is off all lines, in as many columns as there is room for; none
-    for one line alone.
+    """A legend above our own axes, where it is off all lines, in as many columns as there is room
+    for, and in other people's axes, which may have a title, where it is best; none for one line.
     """
     labels, letters = ax.get_legend_handles_labels()[1], ax.xaxis.label.get_size()
     if len(labels) < 2:
+        return
+    if letters != LETTERS:
+        ax.legend(frameon=False)
         return
     room = ax.figure.get_figwidth() * 72 * ax.get_position().width / (0.55 * letters)
     sizes = [len(re.sub(r"\\\w+|\$", "", label)) + 5 for label in labels]  # in characters
