@@ -318,10 +318,11 @@ def report(options: argparse.Namespace) -> int:
     folders = [path for path in given if path.is_dir() and any(path.glob("rows.*"))]
     if folders and len(folders) == len(options.names) and not options.run:
         for folder in folders:
-            print(f"report: {report_campaign(folder, others=options.merge)}")
+            page = report_campaign(folder, others=options.merge, figures=options.figures)
+            print(f"report: {page}")
         return 0
-    if options.merge:
-        raise InputError("--merge adds rows to the folder of a campaign; name this folder first.")
+    if options.merge or options.figures:
+        raise InputError("--merge and --figures are for the folder of a campaign; name it first.")
     paths = sorted(Path(options.experiments).glob("*.toml"))
     page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
     print(f"reports in {page.parent}, all of them in {page}")

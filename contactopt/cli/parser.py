@@ -254,4 +254,6 @@ def _report(report: argparse.ArgumentParser) -> None:
     )
     what = "add the rows of another campaign, also of another machine: a folder or a rows.csv"
     report.add_argument("--merge", action="append", default=[], metavar="FILE", help=what)
+    what = "also write its figures in these formats"
+    report.add_argument("--figures", nargs="+", default=[], choices=NAMES["figures"], help=what)
     report.add_argument("--jobs", type=int, metavar="N", help=JOBS)
