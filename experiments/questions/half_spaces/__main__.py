@@ -10,7 +10,6 @@ TAMAAS this Python is used if it has Tamaas. Set OMP_NUM_THREADS=1.
 from __future__ import annotations
 
 from experiments.questions.half_spaces.exact import cattaneo_rows, hertz_rows
-from experiments.questions.half_spaces.models import chart_rows, draw_speed
 from experiments.questions.half_spaces.rough import (
     friction_rows,
     rough_rows,
@@ -73,10 +72,6 @@ judges both answers. The time to make the model of Tamaas is not counted. The ti
 problem here stands beside the time of the solve.
 
 {tamaas}
-
-## Speed against accuracy, products against size
-
-{chart}
 """
 
 
@@ -87,15 +82,8 @@ TABLES = {
     "rough": rough_rows,
     "friction": friction_rows,
     "tamaas": tamaas_rows,
-    "chart": chart_rows,
 }
 
 
 if __name__ == "__main__":
-    measure(
-        "half_spaces",
-        "Half-spaces: exactness, cost, and Tamaas",
-        TEXT,
-        TABLES,
-        lambda tables: {"speed": draw_speed(tables["chart"], tables["wavy"])},
-    )
+    measure("half_spaces", "Half-spaces: exactness, cost, and Tamaas", TEXT, TABLES)

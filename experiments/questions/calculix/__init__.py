@@ -1,1 +1,0 @@
-"""Does CalculiX find the same contact forces on the same mesh?"""

@@ -1,1 +1,0 @@
-"""Meshes that do not match: exactness and accuracy."""
