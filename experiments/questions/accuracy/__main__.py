@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.figure_style import set_ticks
-from contactopt.figures.style import GREY, MARKS, add_legend, draw_lines, paper_axes, symbols
-from experiments.questions.accuracy.corner_orders import CASES, GRADED, UNIFORM, orders
+from contactopt.figures.style import GREY, MARKS, add_legend, paper_axes
 from experiments.questions.accuracy.measured import (
     FRICTION,
     KINDS,
@@ -23,20 +21,6 @@ from experiments.questions.accuracy.measured import (
 )
 from experiments.questions.accuracy.sheared import SHEARS, sheared
 from experiments.report import figures_alone, save_figures, stored, write
-
-
-def draw_orders(errors: dict[str, dict[str, np.ndarray]]) -> Any:
-    figure, (ax,) = paper_axes()
-    lines = []
-    for mesh, n in (("uniform", UNIFORM), ("graded", GRADED[:-1])):
-        lines += [(symbols(f"{name}, {mesh}"), n, found[mesh]) for name, found in errors.items()]
-    draw_lines(ax, lines, ["o-"] * len(errors) + ["s--"] * len(errors))
-    set_ticks(ax.xaxis)
-    ax.set(
-        xlabel="elements across the half-width $n$ [-]",
-        ylabel="error of the approach [length], unit force",
-    )
-    return figure
 
 
 def draw_effectivity(rows: list[dict[str, Any]]) -> Any:
@@ -123,21 +107,6 @@ the cycle costs.
 
 {{cattaneo}}
 
-## Orders of convergence
-
-An elastic square punch is pressed on a body of its own material. The exponents of the stress at its
-corner come from `contactopt.analytic.corner`. The orders are means over the two finest halvings of
-uniform meshes, or over the finest halving of graded ones (nodes at (i/n)^{grading} from the
-corner).
-
-On symmetric problems the error of the approach under a given force is the square of the error in
-the energy norm. The norm on graded meshes is read in this way. With friction the problem is not
-symmetric, because the dual problem slips the other way. Once the meshes are fine enough, the force
-should converge with the sum of the exponents of mu and of -mu. The column of the theory has twice
-the exponent of mu.
-
-{{orders}}
-
 ## A block for a half-space
 
 How large must a block be to stand for a half-space? The table has the deviation from a block of
@@ -160,17 +129,13 @@ if only pressure and width are asked for.
 
 def main() -> None:
     if figures_alone():
-        errors = {name: orders(name)[1] for name in CASES}
         drawn = {"effectivity": draw_effectivity(stored("accuracy", "effectivity"))}
-        return save_figures("accuracy", drawn | {"orders": draw_orders(errors)})
+        return save_figures("accuracy", drawn)
     table = [hertz(name, elements) for name in KINDS for elements in (SMALL, MODEST)]
     effective = all_effectivities()
-    found = {name: orders(name) for name in CASES}
     sizes, factor = finite_sizes()
-    columns = ("contact", "mesh", "error", "order", "theory", "difference")
     text = TEXT.format(
         judged=judged(effective),
-        grading=2.5,
         size_elements=32,
         factor=factor,
     )
@@ -180,15 +145,9 @@ def main() -> None:
         "stick": [stick(kind, mu) for kind in KINDS.values() for mu in FRICTION],
         "locking": [locking(nu, mu) for nu, mu in LOCKING],
         "cattaneo": [sheared(dim, shear) for dim, shears in SHEARS.items() for shear in shears],
-        "orders": [
-            {key: row[key] for key in columns} for rows, _ in found.values() for row in rows
-        ],
         "finite": sizes,
     }
-    figures = {
-        "effectivity": draw_effectivity(effective),
-        "orders": draw_orders({name: errors for name, (_, errors) in found.items()}),
-    }
+    figures = {"effectivity": draw_effectivity(effective)}
     write("accuracy", "Accuracy and what it costs", text, tables, figures)
 
 
