@@ -4,22 +4,26 @@
     hint("1.1")             gives the next hint; after the third the solution
     table(1)                shows the state of every exercise of a chapter
 
-An exercise is a record in `exercises_N.py`, with N the number of its chapter; its question stands
-in the chapter. The right answer is computed by the record, and never stands in a notebook.
+The question of an exercise stands in its chapter N, its hints and its solution in
+`exercises_N.toml`, and what grades the answer in `exercises_N.py`. The right answer is computed
+there, and never stands in a notebook.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from experiments.course.feedback import Numbers, Right, Verdict, as_numbers, draw, wrong
 
+FOLDER = Path(__file__).parent
 LEVELS = {1: "pen and paper", 2: "program", 3: "think"}
 
 
@@ -28,21 +32,21 @@ class Exercise:
     """One exercise.
 
     number    chapter.number
-    level     1 to 3, in LEVELS
-    asks      what the answer holds, with units
     right     computes the right answer: numbers, or one of the kinds of `feedback`
     mistakes  answers that are typically wrong, or functions that compute them; and what to tell
               about each of them, or the kind of error that `feedback` finds by itself
+    level     1 to 3, in LEVELS
+    asks      what the answer holds, with units
     hints     three, each says more
     solution  lines that a student can run in the chapter; they end with the answer
     """
 
     number: str
-    level: int
-    asks: str
     right: Callable[[], Any]
     mistakes: tuple[tuple[Any, str], ...]
-    hints: tuple[str, str, str]
+    level: int
+    asks: str
+    hints: list[str]
     solution: str
 
 
@@ -61,8 +65,9 @@ PROGRESS: dict[str, Progress] = {}
 @cache
 def exercises(chapter: int) -> dict[str, Exercise]:
     """The exercises of a chapter by their numbers."""
-    records = import_module(f"experiments.course.exercises_{chapter}").EXERCISES
-    return {record.number: record for record in records}
+    texts = tomllib.loads((FOLDER / f"exercises_{chapter}.toml").read_text(encoding="utf-8"))
+    graded = import_module(f"experiments.course.exercises_{chapter}").GRADED
+    return {number: Exercise(number, *graded[number], **text) for number, text in texts.items()}
 
 
 def exercise(number: str) -> Exercise:
