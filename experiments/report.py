@@ -27,6 +27,16 @@ def environment() -> str:
     )
 
 
+def template(script: str) -> str:
+    """The text of a question's report: NAME.md beside NAME.py, report.md in a folder of that name.
+
+    {table} stands in it for a table, and other names in braces for what `str.format` puts there.
+    """
+    path = Path(script)
+    stem = "report" if path.name == "__main__.py" else path.stem
+    return path.with_name(f"{stem}.md").read_text(encoding="utf-8")
+
+
 def markdown(rows: list[dict[str, Any]]) -> str:
     """A table; floats with four significant digits."""
 

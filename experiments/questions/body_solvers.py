@@ -22,7 +22,7 @@ from contactopt.bodies.solvers.constants import RTOL
 from contactopt.bodies.solvers.multigrid import conjugate_gradients, nodal_blocks, rigid_motions
 from contactopt.bodies.solvers.system import System
 from contactopt.figures.style import COLOURS, label_ends, paper_axes
-from experiments.report import figures_alone, save_figures, stored, write
+from experiments.report import figures_alone, save_figures, stored, template, write
 
 PLAIN = "pyamg's defaults"
 ELEMENTS = {  # across the contact half-width
@@ -152,25 +152,7 @@ def draw(rows: list[dict[str, Any]]) -> Any:
     return figure
 
 
-TEXT = """Which solver of a body's linear system is the fastest? The body is the foundation of
-`punch-3d`. Its hexahedra grow by 1.3 away from the contact, and it is held on three sides. One
-load is random on the unknowns of the contact. Multigrid and the defaults of pyamg ({versions})
-iterate to a relative accuracy of 1e-10. It is measured by (r' B r)^1/2 with the V-cycle B for
-the one, and by the length of r for the other. The table has processor seconds of one thread, and
-the memory that the solver keeps, without the matrix. "complexity" is the number of entries of all
-levels over those of the matrix. "residual" is |b - A x| / |b|.
-
-{large}{{rows}}
-
-**Growth.** The table has exponents of the number of unknowns, fitted to the three largest sizes of
-each solver.
-
-{{growth}}
-
-"pyamg's defaults" has the same blocks and rigid motions, and takes every neighbour for a strong
-one. Flat elements then make its iterations grow with the mesh. `multigrid` joins only nodes that
-are close to each other, measured by the size of the mesh around them.
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     if figures_alone():

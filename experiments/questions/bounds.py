@@ -35,7 +35,7 @@ from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
-from experiments.report import measure
+from experiments.report import measure, template
 
 LAWS = (("frictionless", 0.0), ("tresca", 10.0), ("coulomb", 0.3))
 COARSE, FINER = {2: 6, 3: 3}, {2: 2, 3: 1}  # elements along an edge, and halvings of the reference
@@ -326,49 +326,7 @@ def figures(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
     return {"bounds": figure}
 
 
-TEXT = """
-Is the guaranteed bound of the error never violated, how much larger than the error is it, and
-what does it cost? Where the exact solution is not known, quadratic displacements on elements of a
-quarter of the size, in space of half the size, take its place.
-
-- In 87 cases no error exceeds its bound, and no interval of a quantity misses the reference.
-- In the plane, with matching nodes, the bound of the energy norm is 1.01 to 1.41 times the error
-  for linear displacements and 1.9 to 3.7 times for quadratic ones. With mortar it is 1.3 to 1.5
-  and 3.0 to 4.1 times, on tetrahedra 3.0 to 4.2 times. The median of all is 2.0, and 15 are above
-  3.
-- The bound of the approach or of the normal force is 1.6 to 10 times the error in 18 of 20 cases
-  in the plane. Twice it is more, where the error is small by chance. In space it is 14 and 32
-  times the error.
-- The bound costs 0.5 to 0.7 times the solve for quadratic displacements, but 2 to 3 times for
-  linear ones, whose solve is cheapest. On the long tetrahedra of the square punch with linear
-  displacements the bound holds, but says nothing: it is larger than the solution.
-- Solvers that stop in time save up to 23 percent of whole solves by iteration, and nothing that
-  can be measured in a search, where each solve begins at the last answer. Assembly and factors
-  are most of the time.
-- Coulomb's friction is treated as Tresca's with the bound that the pressure of the solution
-  gives. The column `kappa` is twice the friction coefficient over the threshold below which
-  `contactopt diagnose` says that the solution is unique. The bound is proved where it is less
-  than one, and then grows by 1 / (1 - kappa)^1/2. It is seldom less than one here; the errors are
-  within the bounds nevertheless.
-
-## The cases
-
-`ratio` is the bound over the error. `mesh`, of which `joint` is a part, `contact`, `friction` and
-`moved` are the parts of the bound, as in `contactopt.accuracy.bound`; all are norms of energy.
-A negative bound of a quantity would say that its interval misses the reference.
-
-{bounds}
-
-## Cost
-
-{costs}
-
-## Solvers that stop in time
-
-A search for an accuracy stops its solvers at a residual of a tenth of the accuracy, at most 1e-5.
-
-{stopping}
-"""
+TEXT = template(__file__)
 TITLE = "Guaranteed bounds of the error"
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from contactopt import scenes, solve
 from contactopt.bodies.calculix_deck import FACTOR, deck
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.style import add_legend, paper_axes
-from experiments.report import measure
+from experiments.report import measure, template
 
 SCENES: list[tuple[str, dict[str, Any]]] = [
     ("punch-2d", {"elements": 16}),
@@ -93,36 +93,7 @@ def run(text: str) -> tuple[np.ndarray, int, float]:
     return np.array(rows, dtype=float), iterations, seconds
 
 
-TEXT = """Does CalculiX find the same contact forces as contactopt on the same mesh? `contactopt
-export SCENE --to calculix` writes a deck with the nodes, elements, supports, plates and loads of a
-scene. CalculiX (its solver is called ccx) runs it unchanged. Both codes have the same linear
-elements. They differ in the contact: ccx has a penalty of K = factor E / h between surfaces, where
-h is the size of a face, and contactopt has none.
-
-**Contact forces** is the largest difference of a nodal force on either body, over the largest such
-force. The forces of ccx are A u - f, from its displacements u with seven digits, the stiffness A
-and the loads f. **Displacements** is the largest difference over the largest displacement. CPU
-seconds are those of one run. Those of contactopt have the meshes, the assembly, the solve to a
-certificate of 1e-10, and the displacements. Those of ccx have the start of its process, and the
-reading and writing of files.
-
-## A penalty trades accuracy for convergence
-
-The flat punch in the plane. The difference falls as 1 / factor, and with a factor of 1e6 it is as
-small as the digits that ccx prints allow: two independent codes agree. But ccx then repeats and
-cuts its increments of the load, and may find no answer, as with 1e5. contactopt has no factor to
-choose:
-
-{factors}
-
-## Other scenes
-
-The factor is that of `contactopt export`. The surfaces of `punch-2d` and `punch-3d` are flat. Those
-of `cylinder-2d` and `press-fit` are round. There ccx measures gaps between polygons, and
-contactopt between the true surfaces.
-
-{scenes}
-"""
+TEXT = template(__file__)
 
 
 def draw(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:

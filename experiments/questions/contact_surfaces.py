@@ -18,7 +18,7 @@ from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
 from experiments.questions.preconditioners import condition, iterations
-from experiments.report import write
+from experiments.report import template, write
 
 POISSON, HEIGHT, GROWTH = 0.3, 1.0, 1.3
 RATIOS = (1e-4, 1.0, 1e4)  # stiffness of the lower body over that of the upper one
@@ -172,26 +172,7 @@ def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, objec
     return row
 
 
-TEXT = """Does the preconditioner `laplacian` work on contact surfaces of any shape? Two stubs stand
-on each other along a surface. gmsh meshed this surface with triangles, and each stub has a column
-of tetrahedra over each triangle. In the plane a pin sits in a bush. The table has condition numbers
-of the whole operator, with normal and tangential components together. It also has the iterations of
-conjugate gradients from a random right-hand side to 1e-8. `deflated` means that constant and linear
-motions are solved for exactly. The only number that was fitted to stubs is ALONG
-(`contactopt/methods/preconditioners/constants.py`), and it was fitted on the disc.
-
-1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number
-   {most:.1f}. No surface takes more than {steps} iterations. On the disc the condition numbers are
-   {disc}.
-2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most
-   {plainsteps} iterations. Without any preconditioner, conjugate gradients take up to {none}.
-3. The ratio of the stiffnesses of the two bodies, from 1e-4 to 1e4, changes a condition number by
-   at most {spread:.0f} %.
-4. From the coarsest to the finest mesh, the deflated condition number changes by a factor of
-   {least:.2f} to {largest:.2f}.
-
-{{rows}}
-"""
+TEXT = template(__file__)
 
 
 def report(rows: list[dict]) -> str:

@@ -21,7 +21,7 @@ from contactopt.bodies import elements
 from contactopt.figures.style import BLUE, GREY, ORANGE, label_ends, paper_axes
 from contactopt.meshes.structured import patch, rename, simplices, tensor_mesh
 from contactopt.readings.edges import contact_edge
-from experiments.report import figures_alone, save_figures, stored, write
+from experiments.report import figures_alone, save_figures, stored, template, write
 
 RUBBER, RADIUS = Material(5.0, 0.3), 50.0  # MPa; of the sphere, in contact half-widths
 SIZE = {2: 30_000.0, 3: 20.0}  # of the body, in contact half-widths
@@ -256,38 +256,7 @@ def findings(rows: list[dict], ripple: list[dict]) -> str:
     return "\n".join(said)
 
 
-TEXT = """Which elements should you take? A rigid sphere presses on a half-space without friction,
-with E = 5 MPa and nu = .3. The scenes are axisymmetric or in 3D. The axisymmetric body is 30,000
-contact radii large. The body in 3D is a quarter model of 20 contact radii, and its approach is not
-compared.
-
-Q stands for quadrilaterals or hexahedra. P stands for the same elements cut into triangles or
-tetrahedra. The number behind the letter is the degree of the displacement. n is the number of
-elements across the contact half-width, and all other elements are in proportion. Errors are
-relative to the exact values. The time is that of the processor with one core, from finished meshes
-to the certified solution.
-
-{findings}
-
-**Cost of an accuracy.** The table has the number of unknowns (and the seconds) from which on the
-error stays below the target. Between two runs a power law is assumed. The sign - means that these
-meshes do not reach the target.
-
-{cheapest}
-
-**Ripple.** The ripple is the standard deviation of the error of the nodal pressures within .6 of
-the contact radius, over the peak pressure.
-
-{ripple}
-
-**The figure** shows the error against the displacement unknowns. The dotted lines are 1 % and .1 %.
-Blue squares are quadrilaterals and hexahedra, and red triangles are triangles and tetrahedra.
-Dashed lines and hollow marks are degree 1, and solid ones are degree 2.
-
-**All runs.**
-
-{runs}
-"""
+TEXT = template(__file__)
 
 
 def main(across: dict[tuple[int, int], tuple[int, ...]] = ACROSS) -> None:

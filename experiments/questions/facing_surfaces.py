@@ -18,7 +18,7 @@ from contactopt.analytic import Reference, contact_modulus, hertz_line, hertz_po
 from contactopt.bodies.elements import FACES
 from contactopt.coupling.faces import Faces, cross, faces_of
 from contactopt.coupling.mortar import mortar
-from experiments.report import markdown, write
+from experiments.report import markdown, template, write
 
 PAIRS = 1000
 SHAPES, MESHES = ("roller", "ball", "pin"), 30
@@ -351,32 +351,7 @@ def meshes(count: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     return worst, missed or [{"shape": "none"}]
 
 
-TEXT = """Does every contact keep the area of its faces, whatever the gap between two surfaces is
-beside the size of their facets? {count} random pairs of surfaces: linear and quadratic faces,
-triangles and quadrilaterals, even, graded and random ones, turned, moved, and in units from 1e-6 to
-1e6. The gap is 1e-4 to 1e3 facets. One surface covers the other, or is parallel and shifted. *area*
-is the relative error of the sum of the areas of all contacts. *share* is that of the area of one
-contact. *uniform pressure* is the error of the nodal forces that a uniform pressure exerts, over
-the mean one: the patch test.
-
-{{pairs}}
-
-Do meshes that nobody prepared give Hertz's and Persson's pressures? A roller and a ball on a block,
-and a pin in a hole, each from {meshes} pairs of meshes: Gmsh's methods, seeds, sizes (8 to 20
-facets on the half-width of contact), triangles or quadrilaterals, files of order 1 or 2, the round
-body above or below. *peak at a node* is the largest force over area. *peak* and *half-width* are
-read off all contacts: p^2 is a polynomial in x^2. *reading* is the error of reading the exact
-pressure in this way.
-
-{{meshes}}
-
-The meshes on which a peak is off by more than 1.5 %, or a half-width by more than 2 %:
-
-{{missed}}
-
-Linear triangles leave a pressure that goes up and down from node to node where their pattern does,
-on either side of the exact one. So a single node may miss where the contact as a whole does not.
-"""
+TEXT = template(__file__)
 
 
 def main(count: int, each: int, quick: bool) -> None:

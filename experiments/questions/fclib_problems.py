@@ -18,7 +18,7 @@ import numpy as np
 
 from contactopt import InputError, InterfaceProblem, Solution, fclib, siconos_residual, solve
 from experiments.peers.siconos_numerics import siconos
-from experiments.report import markdown, write
+from experiments.report import markdown, template, write
 
 DEFAULT, OTHERS = "auto", ("proximal", "nsgs", "admm")
 TOL = 1e-8
@@ -114,31 +114,7 @@ def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-TEXT = """Cold start, certificate 1e-8, one BLAS thread, processor seconds of the solve alone,
-medians of three (one where a solve takes more than {long:g} s). "Siconos' residual" is the
-published measure, which depends on units. The last columns are the seconds of Siconos' solvers in
-the same run, on the problem without units; - where they do not claim 1e-8 in {limit:g} s. The
-shifted geometric means (1 ms) compare the default method with the best of these solvers for each
-file.
-
-{{means}}
-
-## The default method
-
-At most {limit:g} s a file.
-
-{{folders}}
-
-{{default}}
-
-## Other methods
-
-At most {short:g} s a file.
-
-{{methods}}
-
-{{others}}
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     folders = sys.argv[1:]

@@ -18,7 +18,7 @@ from contactopt.benchmark.families.packings import packing
 from contactopt.figures.style import draw_lines, paper_axes
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import measure, stored
+from experiments.report import measure, stored, template
 
 TIGHT, LOOSE = 1e-10, 1e-4  # tolerances of the cone solver
 ROUNDS, STILL = 100, 1e-8  # of a fixed point; its last change
@@ -259,55 +259,7 @@ def sides_figure(table: list[dict[str, Any]]) -> Any:
     return picture
 
 
-TEXT = """Simulators replace Coulomb's law by laws that are easier to solve. How far from Coulomb's
-solution do they end? Each law is a program of about ten lines over the same Q, and it is solved to
-a tolerance of {tight:g}. The problems are a block on an incline that holds, one that slides, a
-stack of three blocks whose lowest face slides, a pile of spheres, and an elastic punch. The
-reference has the certificate of Coulomb's law.
-
-- Contacts that slip lift off under the associated law, by mu times the slip: up to 22 % of the
-  largest displacement. Springs in the contacts do not cure it. The stiffer they are, the nearer the
-  answer comes to the associated law, whose distance to Coulomb's is up to 20 %.
-- Contacts that stick under Coulomb's law creep under the regularised law, the compliant law and the
-  barrier, in proportion to the parameter: by 1 % to 2 % at .01 and by .01 % to .02 % at .0001.
-- Forces lie outside the cone where each component of friction is bounded by itself, by up to 20 %
-  of the largest force, and where the bound comes from an answer without friction, by up to 16 %.
-  The distance of the barrier stays at 8 % however thin it is, because its bound lags.
-- A polygon of four sides is up to 17 % away, and one of 32 sides up to .4 %. The error depends on
-  the direction of the slip: it vanishes where the slip points to a corner.
-- The solver's error at a tolerance of {loose:g} is at most .3 % everywhere. The errors of the
-  associated law, of four to sixteen sides and of the lagging bound are larger than it. The
-  regularised law comes below it with a parameter of .001 or less.
-
-What the parameter stands for:
-
-- **associated**: the forces in Coulomb's cones minimise the energy, as in cone complementarity.
-- **square around the disc**: each of two components of friction is bounded by itself.
-- **polygon**: the disc is an inscribed polygon; the parameter is its number of sides.
-- **regularised**: friction is -mu r_n u_t / sqrt(|u_t|^2 + v^2), as in penalty codes; the parameter
-  is v over the unit of displacement.
-- **compliant**: the associated law with springs in the contacts; the parameter is the compliance
-  of a spring over the contact's own.
-- **barrier**: a logarithmic barrier holds the bodies apart, friction is regularised, and its bound
-  is that of the answer without friction; the parameter is the factor of the barrier.
-
-**The worst of all problems.** The distance is that of the forces in the energy of Q, relative to
-Coulomb's. Creep is the largest slip of a contact that sticks under Coulomb's law. Lift-off is the
-largest opening of a contact that carries a force there. Overlap is the largest penetration. They
-are divided by the largest displacement that the forces make. The force outside the cone is divided
-by the largest force. The solver error is the distance between the law's answers at the tolerances
-{loose:g} and {tight:g}.
-
-{{worst}}
-
-**All rows.**
-
-{{rows}}
-
-**The figures** show the largest distance and the largest creep against the parameter, and the
-distance of the polygons against the number of their sides. A distance below {small:g} is drawn
-there.
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     measure(

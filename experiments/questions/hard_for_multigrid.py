@@ -13,7 +13,7 @@ from skfem import MeshHex
 
 from contactopt import Material, Part, Scene, Support, Traction
 from contactopt.solving.solve_scene import Options, solve_scene
-from experiments.report import measure
+from experiments.report import measure, template
 
 LIMIT = 60.0  # s for each solve
 # name -> elements along the sides and in height, width over height, Poisson's ratio, gradation
@@ -25,22 +25,7 @@ SCENES = {
     "graded to the contact": ((16, 16), 1.0, 0.3, 3.0),
 }
 
-TEXT = """Two elastic blocks of bricks are pressed and pushed on each other, mu = 0.3; their nodes
-do not match. On some of them the V-cycles of multigrid converge slowly. Nobody can see this in the
-size of a mesh, so that the estimated costs name the coupled way, which iterates with multigrid, as
-the cheapest. It is left for the next best way as soon as its own first cycles show that it will
-cost more. `auto` says so in a note.
-
-- Where multigrid does what is expected of it, it is kept.
-- Elsewhere `auto` costs what the best way costs, and what was spent until the coupled way was left.
-- Without the change of the way, `auto` would cost what `multigrid` does.
-
-CPU seconds of one run each, with the set-up. A way was ended after {limit:g} s of its solve. These
-are seconds of the clock: other programs had a share of the machine, and a run that was ended may
-have had less of them.
-
-{{times}}
-"""
+TEXT = template(__file__)
 
 
 def block(name: str, base: float, shape: Any, **more: Any) -> Part:

@@ -30,7 +30,7 @@ from contactopt import (  # noqa: E402
     solve,
 )
 from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
-from experiments.report import write  # noqa: E402
+from experiments.report import template, write  # noqa: E402
 
 COUNT = 250  # problems in the plane, and as many in space
 QUICK = 25
@@ -140,17 +140,7 @@ def summary(rows: list[dict[str, object]]) -> list[dict[str, object]]:
     return table
 
 
-TEXT = """Is a body found that nothing but friction holds? A rigid paraboloid or an elastic body is
-pressed on an elastic block, along the block's normal or inside the friction cone about it.
-Directions, meshes, materials, units and the friction coefficient, from {least:g} to {most:g}, are
-random. The default method solves {count} problems in the plane and as many in space to a
-certificate of {tol:g}. Times are CPU seconds of one thread, the least of {repeats} solves.
-
-{{rows}}
-
-The table `problems.csv` lists every problem. Another number of problems is given as in
-`python -m experiments.questions.held_by_friction {quick}`.
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT

@@ -20,7 +20,7 @@ from contactopt import scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.style import draw_lines, paper_axes
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import figures_alone, merged, save_figures, stored, write
+from experiments.report import figures_alone, merged, save_figures, stored, template, write
 
 SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch
 FRICTION = (0.1, 0.2, 0.3, 0.4, 0.5)
@@ -106,28 +106,7 @@ def draw(rows: list[dict]) -> Any:
     return figure
 
 
-TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d
-with `elements` elements across the half-width of the punch. It is solved from a cold start to a
-certificate of 1e-8. Both bodies are solved by multigrid.
-
-There are two ways. `coupled` is Newton's method on displacements and contact forces at once.
-`products` is Newton's method that takes products with Q, and each of these products solves with
-both bodies. V-cycles are the steps of multigrid. The column counts those of both bodies together,
-without the V-cycles inside products. Set-up is the assembly and the making of the multigrid
-hierarchies. Every run has a process of its own with one BLAS thread, and the memory is the peak of
-this process. Other programs had a share of the two cores. Compare CPU times, therefore, and not
-wall times.
-
-{sizes}
-
-- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over
-  all sizes at mu = .5).
-- CPU time of the frictional problem over that of one linear solve with both bodies (a product with
-  Q at 1e-8), set-up included in both, at mu = .5: {ratios}.
-- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to
-  {most}, over all sizes and mu.
-- CPU time of `products` over that of `coupled`, set-up included: {faster}.
-"""
+TEXT = template(__file__)
 
 
 def report(rows: list[dict]) -> str:

@@ -13,7 +13,7 @@ from contactopt.figures.style import COLOURS, label_ends, paper_axes
 from contactopt.solving.follow import follow
 from contactopt.solving.paths import PathResult
 from experiments.questions.accuracy.sheared import exact_loss, loop_area
-from experiments.report import REPORTS, figures_alone, save_figures, stored, write
+from experiments.report import REPORTS, figures_alone, save_figures, stored, template, write
 
 SHEAR = 45.0  # .9 mu force
 STEPS = (1, 2, 4, 8, 16, 32)
@@ -88,28 +88,7 @@ def draw_growing(rows: list[dict]) -> Any:
     return figure
 
 
-TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared
-to and fro by .9 of the friction bound. At every step the energies balance to rounding: external
-work = elastic energy + friction work + error of the steps.
-
-![film](film.gif)
-
-**How many states does a cycle need?** The scene is in plane strain with T = .9 mu P. The table
-compares the loss over the closed cycle, from the first +T on, with the exact one. The friction work
-is right even with few steps from turn to turn, because slip goes one way between turns. The area of
-the loop becomes worse with few states, because it is drawn through them.
-
-{cycles}
-
-**Growing contact of dissimilar bodies.** A rigid sphere is pressed on an elastic half-space (nu =
-.3). With friction the stick zone is a fixed share c/a of the contact, and one large step misses
-this share by far. The load grows to 100 N in such a way that the contact radius grows evenly. There
-are 160 elements across the last radius. c/a is the mean over the last eighth of the increments. The
-error is about of first order in the increment, because a point that stops slipping within a step
-keeps the displacement that it had at the start of the step.
-
-{increments}
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     (REPORTS / "load_cycle").mkdir(parents=True, exist_ok=True)

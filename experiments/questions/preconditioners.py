@@ -22,7 +22,7 @@ from contactopt.methods.preconditioners import (
     restricted,
     smooth_motions,
 )
-from experiments.report import figures_alone, save_figures, stored, write
+from experiments.report import figures_alone, save_figures, stored, template, write
 
 SIZES = (17, 33, 65, 129, 257, 513, 1025)
 DENSE = 260  # contacts up to which condition numbers are computed
@@ -206,57 +206,7 @@ def draw(rows: list[dict], sizes: tuple[int, ...]) -> Any:
     return figure
 
 
-TEXT = """How many iterations do linear systems with Q take, if Q is known by its products only? The
-paper (A. Lotfi, section 5.2) claims a condition number that grows like log^2 N with the number N of
-contacts. The best preconditioner here does not grow. PCG stands for preconditioned conjugate
-gradients.
-
-1. `neumann`, with the smooth motions deflated (solved for exactly), needs at most {worst_2d} PCG
-   iterations in 2D and {worst_3d} in 3D, whatever the number of contacts. Without a preconditioner
-   there are {none_2d} at {last} contacts.
-2. On a contact zone that is a part of the surface, the inverse of the block G_AA of the model is as
-   good as on the whole surface. The rows and columns of P, which the paper takes, are not.
-3. All preconditioners become worse if Poisson's ratio nu comes near .5. Short tangential waves then
-   lock in bilinear elements, and the models of Q do not contain this. (At nu = .49 the eigenvectors
-   of the smallest eigenvalues are alternating tangential forces.)
-
-**2D.** A punch, 4 wide and 4 high and held at its top, stands on a foundation of 16 x 8 that is
-clamped below. Both are in plane strain with E = 5 and nu = .3. The nodes are evenly spaced on the
-whole contact line, and the meshes grow by 1.15 away from it. P21 and P22 are equations (25) and
-(26) of the paper. `neumann` is the square root of the Laplacian, by the cosine transform.
-"deflated" means that two translations, tilt and stretch are solved for exactly. PCG runs from a
-random right-hand side to 1e-8, with normal and tangential components together.
-
-{{sizes}}
-
-**Other bodies**, with 129 contacts. The entries are condition numbers, with the PCG iterations in
-brackets. In the last row the spacing grows by 1.05 from node to node, and is 5 times smaller at the
-ends than in the middle.
-
-{{bodies}}
-
-**3D.** The bodies are the same (foundation 16 x 16 x 8, growth 1.3, the punch held at its top in
-every direction), with n x n contacts on the whole contact surface. P21 is summed along both
-directions, which is the P31 of the paper. Nine smooth motions are deflated. From 33 x 33 contacts
-on, Q is known by its products only, and the bodies are solved by multigrid. There only the best
-preconditioner is measured.
-
-{{surface}}
-
-Other stiffness ratios, and a graded surface whose spacing is 5 times smaller at the ends, with 169
-contacts:
-
-{{ratios}}
-
-**A zone in the middle of the surface** (129 and 13 x 13 contacts). The table has the condition
-number on the active contacts. One way takes the rows and columns of P. The other way takes the
-inverse of the block G_AA of the model, by an inner PCG that needs no body.
-
-{{zones}}
-
-Another report measures what a whole frictional solve costs, over one linear solve of the bonded
-bodies: [the price of friction](../cost_ratio/report.md).
-"""
+TEXT = template(__file__)
 
 
 def drawn(line: list[dict], surface: list[dict]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from contactopt.bodies.launch import mpiexec
 from contactopt.bodies.ranks import Kept, Team, serve, spread, world
 from contactopt.scenes.slices import sliced
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
-from experiments.report import write
+from experiments.report import template, write
 
 TOL = 1e-8
 # case -> dimension, elements across the contact half-width, options
@@ -196,43 +196,7 @@ def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     }
 
 
-TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the
-bodies of a scene among N processes, which are called ranks. Each process assembles its bodies and
-solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on the
-interfaces travel.
-
-## Two bodies of equal size on two ranks
-
-The times are those of reduction and solution to a residual of 1e-8, with the set-up and with one
-BLAS thread. The *critical path* is the longest chain of work that waits for other work. It is
-measured in CPU seconds, by clocks that the messages carry. Other programs influence it only as far
-as programs take caches and memory from each other. *Efficiency* is the time of one process over
-twice that of two ranks. The wall times are those of the same run. They also contain what the ranks
-sleep between two looks for a message, and the share of the cores that other programs take.
-
-{efficiency}
-
-The aim is 75 % in every case. The time that is lost on the critical path is that of the steps on
-the interface. Rank 0 makes these steps alone while the other rank waits: the model of Q in the
-preconditioner, the dense system, the coupling of the surfaces.
-
-
-## What travels
-
-A punch stands on a foundation that is cut into slices tied to each other. Each rank has one body,
-and there are more ranks than cores. The higher foundation has more unknowns within its slices and
-the same interfaces. With factors, a product with Q takes one order to each rank, and its reply. An
-array Q is made once, and then the steps send nothing.
-
-{traffic}
-
-With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration
-such as conjugate gradients) send an order for each operation on them, and receive scalar products
-and displacements on the interface:
-
-
-{coupled}
-"""
+TEXT = template(__file__)
 
 
 def work(out: str) -> None:

@@ -32,7 +32,7 @@ from contactopt.benchmark import testset  # noqa: E402
 from contactopt.benchmark.testset.invariants import invariants  # noqa: E402
 from contactopt.errors import BackendError, InputError  # noqa: E402
 from contactopt.problem.contact_status import contact_status  # noqa: E402
-from experiments.report import write  # noqa: E402
+from experiments.report import template, write  # noqa: E402
 
 TOL, USUAL = 1e-12, 1e-8
 FIRST = ("newton", "proximal", "acary_cadoux")
@@ -184,23 +184,7 @@ def compute(name: str, tier: str, again: bool) -> None:
             store(path, {row.name: known[row.name] for row in of_set if row.name in known})
 
 
-TEXT = """Which answers do two methods give to the problems of
-[the test set](../../experiments/site/test_set.md) that share no kernel? The first is Newton's
-method, the proximal loop, or the fixed point on cones. The second is Lemke's method, nonsmooth
-Gauss-Seidel or ADMM, the answers of the last two made exact by Newton's steps on the states of the
-contacts that they found.
-
-{{families}}
-
-*Confirmed* problems have two answers with certificates of at most {tol:g}. The distance of two
-answers is that of their forces over the first one's. Where forces are redundant, they are not
-unique, and the distance of displacements, over those that the forces make, says more. The
-certificate alone judges an answer there. Problems without a solution have a proof. The table
-`missing.csv` lists every problem that is neither confirmed nor proved to have no solution.
-`contactopt problems show NAME` prints what is stored of a problem.
-
-Stored are {stored} of {all} problems: {tiers}.
-"""
+TEXT = template(__file__)
 
 
 def report(name: str) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from contactopt import InterfaceProblem, Solution, solve
 from contactopt.linear.operators import dense
 from experiments.questions.coulomb_check import violations
+from experiments.report import template
 
 METHODS = ("auto", "auto", "newton", "proximal", "nsgs")
 TOL, SLACK = 1e-8, 20.0  # the check's own conditions are combinations of the certificate's
@@ -236,30 +237,7 @@ def judge(seed: int) -> tuple[str, str, str]:
     return name, "solved", ""
 
 
-TEXT = """Does contactopt ever call an answer solved that is wrong? This report looks for such
-answers. It solves {cases} random problems (seeds 0 to {last}). The families of problems take turns,
-and so do the methods: {methods}. Forces and lengths are in units from 1e-12 to 1e12. The
-certificate asked for is {tol:g}, with at most 100 iterations or 1 s.
-
-A *lie* is one of the following:
-
-- an answer called solved that violates Coulomb's conditions at some contact by more than {slack:g}
-  times the tolerance (`experiments/questions/coulomb_check.py` checks this without the
-  certificate);
-- an answer called solved to a problem that was made without a solution;
-- an answer called solved that differs from the only contact forces there are by more than
-  {forces:g} of the largest force;
-- a problem with a solution that is called infeasible.
-
-In one family a plate is held by contacts that move with it as one. There a solution exists if and
-only if |s_t| <= max mu |s_n|. Every {units}th case of a family is solved again with forces and
-lengths times {scales}. If the status changes, or if the answer changes where only one is right,
-this counts as a lie too.
-
-Lies: {lies}.
-
-{{table}}
-"""
+TEXT = template(__file__)
 
 
 def report(results: list[tuple[str, str, str]]) -> None:

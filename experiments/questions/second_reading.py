@@ -22,7 +22,7 @@ from contactopt import (
     solve,
 )
 from contactopt.methods.preconditioners.circulant import seminorm
-from experiments.report import write
+from experiments.report import template, write
 
 SHIFT = np.array([[0.001, -0.0003]])  # from a solution to a start near it [N]
 NODE = np.linalg.inv([[4.0, -1.5], [-1.5, 1.0]])  # compliance of the node of tutorial 4 [mm/N]
@@ -114,27 +114,7 @@ CLAIMS: tuple[tuple[str, str, Callable[[], float], Callable[[float], bool]], ...
      relaxed_force, lambda x: x < 1e-6),
 )  # fmt: skip
 
-TEXT = """Are the sentences of the pages true? The pages of the site that are written by hand, the
-tutorials, the chapters of the course and the programs of the gallery were read once more, sentence
-by sentence.
-
-- Formulas were derived again on paper: potentials and their derivatives, signs of multipliers,
-  Schur complements, the slopes of the fixed points, Nitsche's and the entropic energies, the law of
-  waves on a half-plane, Cattaneo's tractions, Masing's rule and the loss of a cycle, the derivative
-  of the natural map, and the statics of the gallery.
-- Sentences with *always*, *never*, *exactly*, *only* or *if* were held against cases at the border
-  of their hypothesis: singular Q, plates, nodes that stick, parallel directions, no load.
-- Numbers that pages take from a report were compared with the report.
-
-Most claims have an assertion beside them, or a room of the museum with its test. The table has
-claims that had neither, with a number that decides each. These sentences were false, and were
-mended: the sign of s; the traction of the middle that sticks; that every method finds the solution
-near which it starts; that Q is definite beside rigid bodies; the memory of a convolution; the
-number of entries of the sparse circulant; that methods always converge, or always fail, under
-strong friction; and that associated friction has Coulomb's forces only where nothing slips.
-
-{rows}
-"""
+TEXT = template(__file__)
 
 
 def main() -> None:

@@ -19,7 +19,7 @@ from contactopt.benchmark.families.packings import packing
 from contactopt.benchmark.families.random_frames import rigid_bodies
 from contactopt.methods import constants, find_method
 from contactopt.methods.nested import Nested
-from experiments.report import write
+from experiments.report import template, write
 
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
@@ -173,17 +173,7 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
     return rows
 
 
-TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one
-at a time: how many problems are certified (residual at most 1e-8, at most {limit}
-iterations), and the processor time over that with the value itself. Of shares near one the
-distance from one is halved and doubled. The problems: {elastic} of elastic bodies (`punch-2d`
-and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies,
-{packing} packings of rigid bodies with a sparse Q, {products} of elastic bodies known by
-products with Q, {bodies} of bodies that are solved by iteration, {halves} of half-spaces; one
-run each, one thread; the same run twice differs by up to {noise:.0%}.
-
-{{rows}}
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     if sys.argv[1:]:

@@ -16,38 +16,10 @@ import numpy as np
 
 from experiments.questions.search_for_wrong_answers.compare import Verdict, judge
 from experiments.questions.search_for_wrong_answers.families import FAMILIES
+from experiments.report import template
 
 SCENES = 300  # ten of them suffice for a first look
-TEXT = """Is an answer right whose certificate is right? This report solves random scenes (seeds
-{first} to {last}) in two ways that share neither mesh nor coupling, and compares what they say. The
-first way has structured meshes whose nodes match, or is an exact solution. The second has
-unstructured meshes of Gmsh, read from its files, with a mortar coupling carried by either side; or
-a model in space for one in the plane, finite elements for a half-space, the shape of a mesh for a
-function of the gap. The second way is also turned or mirrored, written in other units and with
-other numbers of nodes and elements, and the sides of its contacts are exchanged.
-
-Each way is solved on three meshes, each about twice as fine as the one before (1.4 times in space).
-The error of the finest is estimated by the range of the three values, or by Richardson's
-extrapolation where that says more. Two ways *disagree* if their values are further apart than the
-sum of both estimates. They are then compared once more on finer meshes, and at last on these with
-quadratic displacements: linear elements lock in thin lips, and their levels may differ less than
-they err.
-Forces, their centre and reach, energy, a smooth measure of the area of contact, a mean and the
-largest pressure where it is finite, friction, the share of the force that sticks, displacements and
-stresses at points inside are compared. The second way is also compared with itself, not moved, on
-one mesh: there the two may differ by {sharp:g} of the quantity's size. A scene that stops or is not
-solved counts as a disagreement. Coulomb friction may leave several solutions. Where methods find
-two of them, each certified, two ways that say two things are both right.
-
-Disagreements: {count} of {scenes} scenes. Several solutions, of which the ways found two: {many}.
-
-{listed}
-
-The width in the table is the median over all quantities of both estimates together, relative to the
-size of the quantity: a wrong answer that is closer than this is not seen.
-
-{{table}}
-"""
+TEXT = template(__file__)
 
 
 def verdicts(first: int, last: int) -> Iterator[tuple[Verdict, float]]:

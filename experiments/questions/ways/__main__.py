@@ -24,29 +24,13 @@ from contactopt.bodies.assembled import Work
 from contactopt.bodies.solvers import solvers_there
 from contactopt.coupling.costs import COSTS, FORM_OF, terms
 from experiments.questions.ways.unprepared import FAMILIES, Case, cases, scene, warm
-from experiments.report import stored, write
+from experiments.report import stored, template, write
 
 LIMIT = 60.0  # CPU seconds after which a way is given up
 SHORT, REPEATS = 0.5, 2  # the least of so many runs counts if the first one takes less seconds
 WITHIN = 1.3  # times the best way that a good choice takes
 
-TEXT = """Which way to the solution is the cheapest, and does contactopt take it? There are three
-ways: a dense Q, products with Q by the factors of both bodies, or bodies and contact at once by
-multigrid (`coupled`). The scenes are two bodies on meshes by Gmsh, on structured meshes whose nodes
-are shaken and renumbered, and on regular ones. mu is 0.3, and the default method solves them to a
-certificate of 1e-8. Times are CPU seconds of one run, with the set-up and with one thread of BLAS;
-other programs had a share of the machine. A way was given up after {limit} s.
-
-{findings}
-
-The costs in `contactopt/coupling/costs.py` were fitted to the times of another family of scenes.
-Their upper bodies have another shape, stiffness and gradation. The scenes by which the choice is
-judged:
-
-{{judges}}
-
-`auto` is what contactopt takes by itself.
-"""
+TEXT = template(__file__)
 
 FITTED = """
 The prices, how far the estimates are off on the scenes to which they were fitted, and the times

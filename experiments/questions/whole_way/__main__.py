@@ -36,7 +36,7 @@ from experiments.questions.whole_way.ours import (
     tamaas,
 )
 from experiments.questions.whole_way.peers import CODES, hertz_line
-from experiments.report import measure, stored
+from experiments.report import measure, stored, template
 
 LARGE, SMALL = 1e4, 20.0  # bodies of graded and of uniform meshes over the half-width
 TOLERANCES = tuple(10.0**-power for power in range(1, 9))
@@ -193,75 +193,7 @@ def map_figure(table: list[Row]) -> Any:
     return picture
 
 
-TEXT = """How much accuracy does a second buy, from the mesh to the answer? The scenes have exact
-answers: Hertz's contacts at a point and along a line, Cattaneo's sheared contacts, Spence's punch
-with friction, and a smooth flat punch. Errors are relative to the exact value. Times are CPU
-seconds of one thread; they include the mesh, the bodies, the solve and, where there is one, the
-loop over the contact zone. A run shorter than {short:g} s is the median of three.
-
-- Where a half-space can do the scene, nothing with a mesh comes near. Hertz's peak pressure is
-  right to .009 % after .06 s on 64 x 64 points. The best mesh needs 2.2 s for about as much.
-- Tamaas finds the same peak and half-width on the same points. Its solve is faster up to 32 points
-  a side, and slower from 64 on.
-- On the rough surface both see the same contact area, and Tamaas takes 5 to 13 times as long. The
-  area depends on the grid: that of 512 points a side is 2 % larger than that of {finest}, and that
-  of 256 points 7 %.
-- The other finite-element codes agree with Hertz on our meshes, with an error that falls by four
-  with each halving. On 16 elements GetFEM takes .11 s, our graded mesh .22 s with its loop over the
-  contact zone, Kratos 1.2 s and CalculiX 1.5 s; on 32 elements GetFEM 1.2 s, ours .7 s, and the
-  others 7.9 s.
-- Codes that follow the displaced surfaces see more than Hertz did. At a peak pressure of .9 % of
-  the modulus CalculiX's peak converges to .2 % below Hertz's (`FLATTER = 1` in `peers.py`). The
-  peers are therefore compared at a hundredth of that strain.
-- A uniform mesh spends 1.8 s on an error of the peak of .5 %. A graded one has .24 % after .1 s.
-- Quadratic displacements are more accurate for the peak. Linear ones are more accurate for the
-  half-width, and for the stick width of Spence's punch with as many unknowns.
-- On graded linear meshes the peak of the point contact does not converge: its error stays between
-  .05 % and .09 % from 16 to 64 elements. That of the line contact falls by four with each halving.
-- The adaptive search is slower than a mesh that was graded by hand, because it pays for all of its
-  meshes and estimates.
-- The implicit form takes 1.5 to 1.9 times as long as the explicit one on meshes of this size.
-- The mesh alone decides once the certificate is 1e-4 or better, on all meshes. At 1e-3 the solver
-  still matters from eight elements on, and at 1e-1 the peak is wrong by 5 % to 86 %.
-
-What the ways are:
-
-- **uniform**: all elements are alike, and the body is {small:g} half-widths large.
-- **graded**: elements grow away from the contact, and the body is {large:g} half-widths large.
-- **adaptive**: the mesh is refined where the peak pressure needs it; `size` is the target.
-- **explicit, implicit**: Q as an array, and by its products, on graded linear meshes.
-- **space**: a quarter of the body in three dimensions, which the axisymmetric model simplifies.
-- **half-space**: no mesh at all; `size` is the number of points along a side.
-- **Tamaas**: another code on the same points. Its time is that of its solve alone.
-- **CalculiX, GetFEM, Kratos**: other finite-element codes on the nodes and elements of our graded
-  linear block. They are given the contact zone, which our ways find in a loop over meshes, and they
-  prescribe the depth of the indenter, not its force. CalculiX takes contact by a penalty, and the
-  other two by augmented Lagrangians.
-
-The rough surface has waves down to a 64th of its side. There is no exact answer: the share of the
-points that touch is compared with that of {finest} x {finest} points.
-
-Not compared on these scenes: bodies that are solved by iteration together with the contact.
-
-**The fronts.** These runs are beaten by no other in both time and error.
-
-{{fronts}}
-
-**All runs.** `size` is the number of elements across the half-width unless said otherwise.
-
-{{rows}}
-
-**Tolerance and mesh.** Hertz's point contact on graded linear meshes, solved by `nsgs`, which stops
-where it keeps the tolerance. The error of the mesh alone is that of a solution with a certificate
-of 1e-11 or better. The tolerance matters where the solver changes the peak by more than a tenth of
-that error.
-
-{{tolerances}}
-
-**The figures** show the errors of the point contact and of the line contact against the time, and
-the error of the peak in percent over tolerance and mesh. A star says that the tolerance matters
-there. The way `adaptive`, half-spaces and other codes are dashed.
-"""
+TEXT = template(__file__)
 
 if __name__ == "__main__":
     measure(
