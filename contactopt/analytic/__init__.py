@@ -7,14 +7,12 @@ friction    rigid flat punches and Hertz's geometry with Coulomb friction betwee
             materials (spence, panels)
 mindlin     Cattaneo-Mindlin: tangential loading, unloading, cyclic loss
 conforming  a pin in a hole with clearance (Persson), the press fit (Lame)
-corner      exponents of the stress at the edge of an elastic punch
 
 Half-spaces are elastic, isotropic, homogeneous; strains and slopes small. Any consistent units.
 InputError tells of arguments that are out of range.
 """
 
 from contactopt.analytic.conforming import pin_in_hole, press_fit
-from contactopt.analytic.corner import Corner, corner, edge_stick_threshold
 from contactopt.analytic.friction import (
     flat_punch_axisymmetric_friction,
     flat_punch_line_friction,
@@ -39,14 +37,11 @@ from contactopt.analytic.reference import Reference, contact_modulus, dundurs, t
 from contactopt.analytic.spence import stick_ratio
 
 __all__ = [
-    "Corner",
     "Reference",
     "contact_modulus",
-    "corner",
     "cycle_loss_line",
     "cycle_loss_point",
     "dundurs",
-    "edge_stick_threshold",
     "flat_punch_axisymmetric",
     "flat_punch_axisymmetric_bonded",
     "flat_punch_axisymmetric_friction",
