@@ -52,11 +52,13 @@ class Painter {
       if (top > bottom) continue;
       const bz = pz[b] + towards - az, cz = pz[c] + towards - az, zx = (bz * cy - cz * by) / area, zy = (cz * bx - bz * cx) / area;
       const av = (values[a] - low) * step, bv = (values[b] - values[a]) * step, cv = (values[c] - values[a]) * step, vx = (bv * cy - cv * by) / area, vy = (cv * bx - bv * cx) / area;
-      const light = lit ? 0.62 + 0.38 / Math.sqrt(1 + zx * zx + zy * zy) : 1, ends = [[0, 0, bx, by], [bx, by, cx, cy], [cx, cy, 0, 0]];
+      const light = lit ? 0.62 + 0.38 / Math.sqrt(1 + zx * zx + zy * zy) : 1;
       for (let y = top; y <= bottom; y++) {
         const down = y + 0.5 - ay;
         let left = Infinity, right = -Infinity;
-        for (const [x1, y1, x2, y2] of ends) if ((y1 <= down) !== (y2 <= down)) { const x = x1 + ((down - y1) * (x2 - x1)) / (y2 - y1); left = Math.min(left, x); right = Math.max(right, x); }
+        if ((down >= 0) !== (down >= by)) left = right = (down * bx) / by;  // where the sides of the triangle cross the line
+        if ((down >= 0) !== (down >= cy)) { const x = (down * cx) / cy; left = Math.min(left, x); right = Math.max(right, x); }
+        if ((down >= by) !== (down >= cy)) { const x = bx + ((down - by) * (cx - bx)) / (cy - by); left = Math.min(left, x); right = Math.max(right, x); }
         const from = Math.max(0, Math.ceil(ax + left - 0.5001)), to = Math.min(width - 1, Math.floor(ax + right - 0.4999));
         for (let x = from, k = y * width + from; x <= to; x++, k++) {
           const across = x + 0.5 - ax, z = az + zx * across + zy * down;

@@ -455,7 +455,7 @@ performance.mark("drawn");
 new ResizeObserver(requestDraw).observe(view);
 for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
 if (data.words) return;
-await new Promise((then) => setTimeout(then, 30));  // the picture is on the screen before the charts are made
+await new Promise((then) => requestAnimationFrame(() => setTimeout(then)));  // the picture is on the screen before the charts are made
 await plotly();
 drawContact();
 drawPath();
