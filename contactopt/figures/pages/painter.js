@@ -15,9 +15,16 @@ function palette(colours, bands = false) {  // 256 colours as bytes, between the
 class Painter {
   constructor(canvas) { this.canvas = canvas; this.context = canvas.getContext("2d", {willReadFrequently: true}); }
 
-  begin() {  // an empty picture, as large as the canvas is on the screen
-    const dense = Math.min(window.devicePixelRatio || 1, 2), width = Math.max(1, Math.round(this.canvas.clientWidth * dense)), height = Math.max(1, Math.round(this.canvas.clientHeight * dense));
-    if (!this.image || width !== this.width || height !== this.height) {
+  wanted() {  // pixels per pixel of the page, width and height of the canvas as it is on the screen
+    const dense = Math.min(window.devicePixelRatio || 1, 2);
+    return [dense, ...[this.canvas.clientWidth, this.canvas.clientHeight].map((length) => Math.max(1, Math.round(length * dense)))];
+  }
+
+  fits() { const [, width, height] = this.wanted(); return width === this.width && height === this.height; }
+
+  begin() {  // an empty picture, as large as the canvas is
+    const [dense, width, height] = this.wanted();
+    if (!this.fits()) {
       Object.assign(this, {width, height, depth: new Float32Array(width * height), owner: new Int32Array(width * height), image: this.context.createImageData(width, height)});
       this.pixels = new Uint32Array(this.image.data.buffer);
       Object.assign(this.canvas, {width, height});

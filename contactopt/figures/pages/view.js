@@ -452,7 +452,7 @@ listen();
 stateWords();
 show(now.box);
 performance.mark("drawn");
-new ResizeObserver(requestDraw).observe(view);
+new ResizeObserver(() => { if (!painter.fits()) requestDraw(); }).observe(view);  // it also calls at once
 for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
 if (data.words) return;
 await new Promise((then) => requestAnimationFrame(() => setTimeout(then)));  // the picture is on the screen before the charts are made
