@@ -24,7 +24,8 @@ RESERVED = {
     *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)),
 }
 LONGEST_NAME = 100  # characters
-OF_BODIES = ("coupling.mortar", "bodies.rigid", "meshes.mesh_repair")  # modules that warn of bodies
+# modules whose warnings are of bodies
+OF_BODIES = ("coupling.mortar", "bodies.rigid", "meshes.mesh_repair", "meshes.mesh_refinement")
 
 
 def check_number(

@@ -68,10 +68,13 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
     dim = _place(path, groups)[0]
     names: list[Any] = [*groups.names(dim)] or [None]
     own = {group: _numbers(groups.members.get((group, dim), {})) for group in names}
-    for group in sorted(names, key=lambda name: -len(own[name])):
-        whole = (other for other in found if np.isin(own[group], own[other]).all())
-        if (larger := next(whole, None)) is not None:
-            how = "the same as" if len(own[group]) == len(own[larger]) else "a part of"
+    order = sorted(names, key=lambda name: -len(own[name]))
+    for number, group in enumerate(order):
+        whole = (other for other in order[:number] if np.isin(own[group], own[other]).all())
+        sizes = {other: len(own[other]) for other in whole}
+        larger = next((o for o in sizes if o in found or sizes[o] == len(own[group])), None)
+        if larger is not None:
+            how = "the same as" if sizes[larger] == len(own[group]) else "a part of"
             refused.append(f"group {group!r} is {how} {larger!r}")
             continue
         try:

@@ -160,4 +160,7 @@ function ticks(low, high, most) {  // round numbers between two numbers
   return Array.from({length: Math.max(0, Math.min(count, 50))}, (_, i) => (first + i) * step);
 }
 
-const short = (value) => String(Number(value.toPrecision(6))).replace("-", "\u2212");
+function short(value) {  // as on an axis: 70000000 is 7e7
+  const rounded = Number(value.toPrecision(6));
+  return (Math.abs(rounded) < 1e6 ? String(rounded) : rounded.toExponential().replace("e+", "e")).replace("-", "\u2212");
+}
