@@ -129,6 +129,7 @@ class _Swept:
         self.problem, self.good = problem, good
         self.r = np.array((start or at_rest(problem))[0], order="C")
         self.count, self.before, self.change = constants.SWEEPS, np.inf, np.inf
+        self.share = 1.0  # of each local change, which becomes smaller where sweeps go in a circle
 
     def points(self, budget: float) -> Iterator[Iterate]:
         """Points that sweeps reach if they converge within a number of multiplications.
@@ -148,7 +149,9 @@ class _Swept:
                 rest = self.count / 2 * self.rounds()
                 if not spent + rest * cost <= constants.BEYOND * budget:
                     break
-            self.before, self.change = self.change, sweeps(self.r, self.count)
+            self.before, self.change = self.change, sweeps(self.r, self.count, self.share)
+            if self.change > constants.CIRCLE * self.before:
+                self.share *= constants.LESS
             spent, self.count = spent + self.count * cost, 2 * self.count
             if self.change <= self.good:
                 yield self.r.copy(), np.zeros(0)

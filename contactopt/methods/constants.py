@@ -17,6 +17,7 @@ SWEEPS = 8  # in the first round of them
 LOCAL = 40.0  # multiplications that a local problem is worth
 BEYOND = 3.0  # times that number which sweeps may cost that converge
 FEWEST_SWEEPS = 60  # for which there must be room
+CIRCLE, LESS = 0.7, 0.9  # sweeps whose change falls by less take this share of it from then on
 SWEPT, LOOSELY_SWEPT = 1e-14, 1e-10  # change of a sweep over the forces that ends them
 NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically
 PATIENCE = 6  # Newton steps without progress
