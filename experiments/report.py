@@ -30,7 +30,8 @@ def environment() -> str:
 def template(script: str) -> str:
     """The text of a question's report: NAME.md beside NAME.py, report.md in a folder of that name.
 
-    {table} stands in it for a table, and other names in braces for what `str.format` puts there.
+    {table} stands in it for the table of that name. A text in which a question puts numbers by
+    `str.format` has {{table}} instead.
     """
     path = Path(script)
     stem = "report" if path.name == "__main__.py" else path.stem
