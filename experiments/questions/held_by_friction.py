@@ -7,18 +7,13 @@ contacts slip away from one that sticks, and where that one lies is a median of 
 
 from __future__ import annotations
 
-import os
+import sys
+import time
+from dataclasses import replace
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
 
-import sys  # noqa: E402
-import time  # noqa: E402
-from dataclasses import replace  # noqa: E402
-
-import numpy as np  # noqa: E402
-
-from contactopt import (  # noqa: E402
+from contactopt import (
     InterfaceProblem,
     Material,
     Part,
@@ -29,8 +24,8 @@ from contactopt import (  # noqa: E402
     reduce_bodies,
     solve,
 )
-from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
-from experiments.report import template, write  # noqa: E402
+from contactopt.meshes.structured import rename, tensor_mesh
+from experiments.report import template, write
 
 COUNT = 250  # problems in the plane, and as many in space
 QUICK = 25

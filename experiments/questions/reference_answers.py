@@ -11,28 +11,23 @@ on the states (open, stick, slip) that they found, which `exact` here does with 
 
 from __future__ import annotations
 
-import os
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+import numpy as np
+import scipy.sparse as sp
 
-import argparse  # noqa: E402
-import json  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Iterator  # noqa: E402
-from contextlib import suppress  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Any  # noqa: E402
-
-import numpy as np  # noqa: E402
-import scipy.sparse as sp  # noqa: E402
-
-from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve  # noqa: E402
-from contactopt.benchmark import testset  # noqa: E402
-from contactopt.benchmark.testset.invariants import invariants  # noqa: E402
-from contactopt.errors import BackendError, InputError  # noqa: E402
-from contactopt.problem.contact_status import contact_status  # noqa: E402
-from experiments.report import template, write  # noqa: E402
+from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
+from contactopt.benchmark import testset
+from contactopt.benchmark.testset.invariants import invariants
+from contactopt.errors import BackendError, InputError
+from contactopt.problem.contact_status import contact_status
+from experiments.report import template, write
 
 TOL, USUAL = 1e-12, 1e-8
 FIRST = ("newton", "proximal", "acary_cadoux")
