@@ -14,7 +14,6 @@ INNER = 0.3  # share of the half-width from which on the squared pressure on a l
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
 # nodes to which the square of the pressure is fitted around a peak, by dimension
 FITTED = {2: 5, 3: 13}
-POORER = 3.0  # times the uncertainty of a narrower fit at which fits beside an axis stop widening
 NEIGHBOURS = {2: 5, 3: 9}  # nodes among which a local maximum is the largest, itself among them
 MOST_PEAKS = 8  # local maxima that are looked at
 # least uncertainty of an edge that is read between nodes, over the distance of the nodes

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.chart import ON_PLANE
-from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS, POORER
+from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
 from contactopt.readings.patches import least
 
 
@@ -143,19 +143,20 @@ def _fitted_top(
     an axis, because u_z / h^2 of their nodes grows there like log m, which the nodes of the contact
     surface, held at its gap, cannot follow. It is of first order, but smooth enough for a narrow
     fit to follow it. Beside an axis the value is therefore that of the widest of fits, each twice
-    as wide as the one before, up to the first that is POORER times as uncertain as a narrower one:
-    wide ones mend a smooth pressure, and one that is not smooth stops them. A fit to m times as many
-    contacts is sqrt(m) times less uncertain than its contacts scatter.
+    as wide as the one before, until it changes by more than it did the last time: what the rings
+    spoil fades with the width, and what the pressure lacks of an ellipse grows. A fit to m times as
+    many contacts is sqrt(m) times less uncertain than its contacts scatter.
     """
     count, widest = FITTED[problem.dim], 0
     if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
         widest = len(_surroundings(problem)[1])
     first = made = _fit_to(count, problem, pressure, usable, top)
-    best, least_doubt = replace(made, uncertainty=made.value), np.inf
-    while np.isfinite(made.uncertainty) and made.uncertainty <= POORER * least_doubt:
+    best, change = replace(made, uncertainty=made.value), np.inf
+    while np.isfinite(made.uncertainty) and abs(made.value - best.value) <= change:
+        if count > FITTED[problem.dim]:
+            change = abs(made.value - best.value)
         share = FITTED[problem.dim] / count
-        best = replace(made, uncertainty=made.uncertainty * share**0.5)
-        least_doubt, count = min(least_doubt, made.uncertainty), 2 * count
+        best, count = replace(made, uncertainty=made.uncertainty * share**0.5), 2 * count
         if count > widest:
             break
         made = _fit_to(count, problem, pressure, usable, top)
