@@ -58,7 +58,7 @@ def classics() -> list[Classic]:
         return np.asarray(x**2 / 2)
 
     block = (1.25, 8, 5, 1), (1.4, 6, 4, 2)
-    two = (1.2, 8, 4, 1), (1.2, 5, 4, 2)
+    two = (1.2, 8, 4, 1), (1.2, 6, 3, 2)
     corner = (1.5, 5, 4, 1), (1.6, 4, 3, 2)
     far = (1.8, 5, 4, 1), (2.0, 4, 3, 2)
     beta = dundurs(None, UNIT)[1]
@@ -102,7 +102,7 @@ def classics() -> list[Classic]:
         Classic("flat disc on block", _flat(DISC, 0.0, 2.0), ("approach",), corner, {}),
         Classic("flat strip on block", _flat(PLANE, 0.0, 2.0), ("approach",), corner, {}),
         Classic("Spence's disc, mu = .3", _flat(DISC, 0.3, 1e3), ("stick",), far, _ratio(disc)),
-        Classic("Spence's strip, mu = .3", _flat(PLANE, 0.3, 1e4), ("stick",), far, _ratio(line)),
+        Classic("Spence's strip, mu = .3", _flat(PLANE, 0.3, 5e3), ("stick",), far, _ratio(line)),
         Classic(
             "receding layer",
             lambda growth, elements: receding(LOADED, 5.0, 1.0, growth),
@@ -131,15 +131,15 @@ def classics() -> list[Classic]:
             "Cattaneo's cylinders, mu = .5",
             lambda growth, elements: scenes.cattaneo(2),
             ("stick",),
-            ((0, 8, 3, 1), (0, 6, 3, 2)),
+            ((0, 5, 3, 1), (0, 3, 3, 2)),
             _ratio(scenes.cattaneo(2).reference),
         ),
     ]
 
 
-def rows_of(classic: Classic) -> list[dict[str, Any]]:
-    """Both ways to all quantities of a scene."""
-    found = []
+def measured(number: int) -> list[dict[str, Any]]:
+    """The rows of one of the classics, by its number: both ways to all of its quantities."""
+    classic, found = classics()[number], []
     for growth, base, levels, degree in classic.ways:
         way = Way(classic.scene(growth, base), base, levels, degree)
         found.append((way, *follow_way(way, classic.quantities)))
