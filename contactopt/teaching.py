@@ -1,6 +1,4 @@
-"""What the notebooks of the course share: exercises that grade themselves, and figures with a
-slider.
-"""
+"""Figures with a slider, for notebooks that teach."""
 
 from __future__ import annotations
 
@@ -9,57 +7,6 @@ import io
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
-
-import numpy as np
-
-from contactopt.problem import InterfaceProblem, natural_map_residual
-
-# relative error of a number that still counts as right: three digits from pen and paper
-CLOSE = 1e-3
-# residual of forces that still counts as right: what a cone solver reaches without further settings
-CERTIFIED = 1e-4
-
-
-def check(exercise: str, answer: Any, right: Any) -> bool | None:
-    """Grade an answer to an exercise, given by its number, and print the verdict.
-
-    Parameters
-    ----------
-    exercise, answer : The number of the exercise, and the reader's answer; `...` says that there is
-        none yet.
-    right : An InterfaceProblem: the answer holds contact forces (k, dim), and the certificate of
-        the problem judges them. A number or an array: the answer has to agree to three digits. A
-        function: it is given the answer and says True or False.
-
-    Returns
-    -------
-    Whether the answer is right; None where there is none yet.
-    """
-    if answer is ...:
-        print(f"Exercise {exercise}: not answered yet.")
-        return None
-    verdict = _judge(answer, right)
-    print(f"Exercise {exercise}: {'right.' if verdict else 'not right yet.'}")
-    return verdict
-
-
-def _judge(answer: Any, right: Any) -> bool:
-    if callable(right):
-        return bool(right(answer))
-    try:
-        given = np.asarray(answer, dtype=float)
-    except (TypeError, ValueError):  # no numbers at all
-        return False
-    if isinstance(right, InterfaceProblem):
-        return (
-            given.size == right.q.size
-            and natural_map_residual(right, given.reshape(right.q.shape)) <= CERTIFIED
-        )
-    exact = np.asarray(right, dtype=float)
-    size = float(np.abs(exact).max(initial=0.0))
-    return given.shape == exact.shape and bool(
-        np.allclose(given, exact, rtol=CLOSE, atol=CLOSE * size)
-    )
 
 
 class Slider:

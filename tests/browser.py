@@ -89,9 +89,9 @@ class Browser:
         while True:
             message = json.loads(await self.socket.read_message())
             if message.get("method") == "Runtime.exceptionThrown":
-                self.faults.append(
-                    message["params"]["exceptionDetails"]["exception"].get("description", "?")
-                )
+                details = message["params"]["exceptionDetails"]
+                thrown = details.get("exception", {}).get("description")
+                self.faults.append(thrown or details["text"])
             if message.get("method") in ("Log.entryAdded", "Runtime.consoleAPICalled"):
                 entry = message["params"].get(
                     "entry",

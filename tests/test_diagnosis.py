@@ -343,6 +343,8 @@ def test_a_small_certificate_of_wrong_forces_is_remarked():
     wrong = abs(answer.reactions[0, 0] - 1) / np.abs(answer.reactions).max()
     assert answer.solved and 0.01 < wrong < report.local.error < 10 * wrong
     assert "other forces far away fit nearly as well" in str(report)
+    assert "nearly not unique" in answer.notes[-1]  # and only where the condition is large
+    assert not solve(InterfaceProblem(wedge.Q, [[-3.0, 5.0]], 0.5), "tresca", tol=1e-2).notes
     turned = InterfaceProblem(wedge.Q * 1e-6, wedge.q * 1e-3, wedge.mu)
     other = diagnose(turned, solve(turned)).local
     assert other.condition == pytest.approx(report.local.condition, rel=0.1)

@@ -29,6 +29,7 @@ PAGES = (
     "your_solver",
     "figures_for_a_paper",
     "from_calculix",
+    "take_home",
 )
 BLOCK = re.compile(r"```(python|toml|sh|text)\n(.*?)```", re.S)
 
@@ -46,7 +47,7 @@ def test_a_page_runs_as_it_stands(name, tmp_path, monkeypatch, capsys):
         elif kind == "python":
             exec(compile(text, f"{name}.md", "exec"), names)
         elif kind == "sh":
-            for line in text.splitlines():
+            for line in text.replace("\\\n", "").splitlines():
                 assert main(line.split()[1:]) == 0, capsys.readouterr().err
     if name == "experiment_files":
         report = Path("out/bench/friction/report.md").read_text()

@@ -12,7 +12,6 @@ from contactopt.problem.laws import Bilateral, Coulomb, Orthotropic
 
 PROGRAMS = (
     "normal",
-    "displacements",
     "penalised",
     "bilateral",
     "tangential",
@@ -99,20 +98,9 @@ def test_given_tangential_forces_enter_the_normal_program(problem):
     assert np.allclose(m["gap"], state(problem, r, m["approach"])[0], atol=1e-6)
 
 
-def test_forces_and_displacements_are_dual(problem):
-    forces, gaps = solved(models.normal(problem)), solved(models.displacements(problem))
-    assert forces.problem.value == pytest.approx(-gaps.problem.value, rel=1e-6)
-    assert np.allclose(gaps.multipliers["reaction"], forces.variables["r_n"].value, atol=1e-5)
-    assert np.allclose(gaps.variables["u"].value, forces.multipliers["gap"], atol=1e-5)
-    if len(problem.s):
-        assert np.allclose(
-            gaps.variables["lambda"].value, forces.multipliers["approach"], atol=1e-5
-        )
-
-
 def test_displacements_need_a_compliance_that_can_be_inverted():
     with pytest.raises(InputError, match="singular"):
-        models.displacements(InterfaceProblem(np.diag([0.0, 1.0]), np.ones((1, 2)), 0.1))
+        models.normal(InterfaceProblem(np.diag([0.0, 1.0]), np.ones((1, 2)), 0.1), form="primal")
 
 
 def test_penalised_contact_is_a_spring_and_becomes_contact(problem):
@@ -270,7 +258,7 @@ def refined(program, **given):
     return program
 
 
-PAIRS = [(name, None) for name in PROGRAMS if name != "displacements"] + [
+PAIRS = [(name, None) for name in PROGRAMS] + [
     ("tangential", 7),
     ("tresca", 7),
     ("associated", 7),
@@ -333,13 +321,12 @@ def test_orthotropic_friction_has_a_primal_form_too():
 
 def test_unknown_form_is_refused():
     for name in PROGRAMS:
-        if name != "displacements":
-            with pytest.raises(InputError, match=r"'dual' .* or 'primal'"):
-                getattr(models, name)(one_contact((0.8, 1.0), 1.0), form="mixed")
+        with pytest.raises(InputError, match=r"'dual' .* or 'primal'"):
+            getattr(models, name)(one_contact((0.8, 1.0), 1.0), form="mixed")
 
 
 @pytest.mark.parametrize("form", ["dual", "primal"])
-@pytest.mark.parametrize("name", [name for name in PROGRAMS if name != "displacements"])
+@pytest.mark.parametrize("name", PROGRAMS)
 def test_program_shows_its_mathematics(name, form, problem):
     program = getattr(models, name)(problem, form=form)
     assert str(program).startswith("min ") and "subject to" in str(program)

@@ -7,10 +7,12 @@ import subprocess
 import sys
 import time
 from html import unescape
+from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from browser import CHROMIUM, Browser
 from test_how_tos import PAGES
 
 import contactopt
@@ -18,6 +20,7 @@ from contactopt.methods import METHODS
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "experiments" / "site"
+CHAPTERS = tuple((SITE.parent / "course").glob("chapter_*.py"))
 HOW_TOS = {*PAGES, "your_own_mesh"}
 LIMIT = 900.0  # s: three minutes on two idle cores, more where other tests run
 
@@ -130,6 +133,46 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
     assert (built / "_static" / "mathjax" / "tex-chtml.js").exists()
 
 
+FITS = """all.map((slide, k) => {
+  show(k);
+  const main = slide.querySelector("main");
+  const parts = [main, ...main.querySelectorAll("main > div")];
+  return parts.every((part) => part.scrollHeight <= main.clientHeight + 1);
+})"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the slides with")
+def test_slides_fit_and_their_formulas_and_figures_are_drawn(built):
+    files = sorted((built / "lectures").glob("*.html"))
+    assert len(files) == 12
+    for file in files:
+        with Browser(file, 1280, 720) as page:
+            page.wait("window.ready")
+            assert page.ask("all.length") >= 8 and all(page.ask(FITS))
+            assert page.ask("document.querySelectorAll('main mjx-container').length") > 5
+            assert page.ask("document.querySelectorAll('mjx-merror').length") == 0
+            pictures = page.ask(
+                "[...document.querySelectorAll('figure img')].map((i) => i.naturalWidth)"
+            )
+            assert pictures and min(pictures) > 100
+            assert not page.faults
+
+
+FIRST = "document.querySelector('#search-results li > a')?.getAttribute('href')"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to search with")
+@pytest.mark.parametrize("subject", ["certificate", "preconditioner", "mortar", "penalty"])
+def test_search_finds_a_subject_before_the_symbols(subject, built):
+    with Browser(built / "search.html") as page:
+        address = (built / "search.html").as_uri()
+        page.call("Page.navigate", url=f"{address}?q={subject}")
+        page.wait(FIRST)
+        assert "generated/api/" not in page.ask(FIRST)
+
+
 @pytest.fixture
 def reference(monkeypatch):
     monkeypatch.syspath_prepend(str(SITE))
@@ -191,6 +234,35 @@ def test_python_on_pages_written_by_hand_runs(path, capsys, tmp_path, monkeypatc
     for code in re.findall(r"```python\n(.*?)```", path.read_text(), re.S):
         exec(compile(code, path.name, "exec"), {})
         assert "solved" in capsys.readouterr().out
+
+
+COLUMNS = 80  # of a program on a page; tables of plug-ins have one line for each entry
+
+
+def programs():
+    """The programs on pages: of pages by hand, tutorials, chapters and the gallery."""
+    fences = re.compile(r"```(?:python|toml|sh)\n(?!# in )(.*?)```", re.S)
+    for path in SITE.glob("*.md"):
+        yield from ((path.name, block) for block in fences.findall(path.read_text()))
+    scripts = (SITE.parent / "tutorials").glob("*.py"), CHAPTERS
+    for path in chain(*scripts):
+        text = re.sub(r"^# ?", "", path.read_text(), flags=re.M)
+        yield from ((path.name, block) for block in fences.findall(text))
+        yield path.name, "\n".join(re.findall(r"^[^#].*", path.read_text(), re.M))
+    for path in (SITE.parent / "gallery").glob("*.py"):
+        yield path.name, path.read_text().split('"""', 2)[2]
+
+
+def test_programs_fit_a_page():
+    found = list(programs())
+    assert len(found) > 80
+    long = [
+        (name, line) for name, text in found for line in text.splitlines() if len(line) > COLUMNS
+    ]
+    assert not long, long
+    pages = sorted(map(str, [*SITE.glob("*.md"), *CHAPTERS]))
+    formatted = [sys.executable, "-m", "ruff", "format", "--isolated", "--check", "--line-length"]
+    subprocess.run([*formatted, str(COLUMNS), *pages], check=True)
 
 
 def test_what_is_written_by_hand_belongs_to_a_method():

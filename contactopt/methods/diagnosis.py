@@ -60,7 +60,7 @@ import scipy.linalg as la
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.methods.cone import Relaxation
-from contactopt.methods.driver import solve
+from contactopt.methods.driver import MUCH, solve
 from contactopt.problem import (
     InterfaceProblem,
     Solution,
@@ -76,7 +76,6 @@ from contactopt.problem.contact_status import contact_status
 CERTIFIED, DISTINCT = 1e-8, 1e-6
 # an eigenvalue with relatively less imaginary part is real; a smaller one is rounding
 REAL, ZERO = 1e-7, 1e-10
-MUCH = 1e-3  # relative error of forces that deserves a remark
 
 
 @dataclass(frozen=True)

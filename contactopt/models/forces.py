@@ -55,20 +55,6 @@ def normal(problem: InterfaceProblem, form: str = "dual") -> Program:
     return Program(program, {"r_n": r}, {"r_t": r_t}, {"gap": lambda: dual(push)} | readers)
 
 
-def displacements(problem: InterfaceProblem) -> Program:
-    """Contact without friction in displacements: `normal` in its primal form.
-
-    Parameters
-    ----------
-    problem : Any interface problem.
-
-    Returns
-    -------
-    The program, as `normal` with form="primal" returns it.
-    """
-    return primal.normal(problem)
-
-
 @stated
 def penalised(problem: InterfaceProblem, stiffness: float = 1e3, form: str = "dual") -> Program:
     """min r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n + |r_n|^2 / (2 kappa)   subject to  r_n >= 0,

@@ -9,7 +9,7 @@ One block per contact node, normal component first. r is the force on the upper 
 compression; u is the relative displacement plus the initial gap, so that u_n is the gap that
 remains. In the paper's letters R_n = -r_n and w_n - d = -u_n. V holds the rigid motions that
 nothing but contact resists, of plates under a total force and of bodies without enough supports:
-lambda is how far each of them goes, s collects minus what r must balance.
+lambda is how far each of them goes, and s are the loads along them, which r must balance.
 """
 
 from __future__ import annotations

@@ -1,20 +1,27 @@
 # %% [markdown]
 # # Chapter 1. A spring, a node and a floor
 #
-# The smallest contact problem has one unknown. It already shows everything that this course is
-# about: an energy that is minimised under a constraint, a second problem in the contact forces, the
+# The smallest contact problem has one unknown. It already has all that every chapter of this course
+# has: an energy that is minimised under a constraint, a second problem in the contact forces, the
 # conditions that join the two, a program that a solver can read, and several ways to go wrong.
 #
 # You need derivatives, and the idea of a minimum under a constraint. The chapter takes 30 minutes
 # with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -42,7 +49,12 @@ def sketch(ax, u, r):
     ax.axhspan(-0.5, 0, color="0.8", lw=0)
     ax.axhline(0, color="k", lw=1)
     y = np.linspace(u, 3, 13)
-    ax.plot(np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]), y, "C0", lw=1.5)
+    ax.plot(
+        np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]),
+        y,
+        "C0",
+        lw=1.5,
+    )
     ax.plot([-0.6, 0.6], [3, 3], "k", lw=3)
     ax.plot(0, u, "o", ms=10, color="C0")
     for x, y0, y1, name, color in (
@@ -50,13 +62,23 @@ def sketch(ax, u, r):
         (-0.5, u - 0.6, u, f"$r$ = {r:.1f} N", "C1"),
     ):
         ax.annotate(
-            "", (x, y1), (x, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8}
+            "",
+            (x, y1),
+            (x, y0),
+            arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
         )
         ax.text(x + 0.08, (y0 + y1) / 2, name, color=color)
-    ax.annotate("", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
-    ax.text(1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center")
     ax.annotate(
-        "", (-1.3, 0.8), (-1.3, 0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8}
+        "", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"}
+    )
+    ax.text(
+        1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center"
+    )
+    ax.annotate(
+        "",
+        (-1.3, 0.8),
+        (-1.3, 0),
+        arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8},
     )
     ax.text(-1.22, 0.6, "$n$")
     ax.set(xlim=(-1.5, 2.2), ylim=(-0.7, 3.2), aspect="equal")
@@ -112,14 +134,19 @@ assert np.isclose(floor.dual_value, F - k * g0, atol=1e-4)
 def state(load):
     gap = max(g0 - load / k, 0.0)
     force = max(load - k * g0, 0.0)
-    fig, (left, right) = plt.subplots(1, 2, figsize=(6.0, 3.2), layout="constrained")
+    fig, (left, right) = plt.subplots(
+        1, 2, figsize=(6.0, 3.2), layout="constrained"
+    )
     sketch(left, gap, force)
     w = np.linspace(-1, 2, 200)
     right.plot(w, k * (w - g0) ** 2 / 2 + load * w, "C0")
     right.axvspan(-1, 0, color="0.85", lw=0)
     right.plot(gap, k * (gap - g0) ** 2 / 2 + load * gap, "o", color="C1", ms=9)
     right.set(
-        xlabel="gap $u$ [mm]", ylabel="energy [N mm]", title=f"load F = {load:.1f} N", ylim=(-5, 8)
+        xlabel="gap $u$ [mm]",
+        ylabel="energy [N mm]",
+        title=f"load F = {load:.1f} N",
+        ylim=(-5, 8),
     )
     return fig
 
@@ -193,7 +220,7 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 # The derivative of this function is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. For every
 # $\gamma$ but $\gamma = k$ it is zero exactly at the solution. Such a method is called
 # *consistent*. (The penalty method is not: its minimum is another point.) There is a price. The
-# function is convex only if $\gamma > k$. For a smaller $\gamma$ it has no minimum.
+# function is strictly convex if $\gamma > k$. For a smaller $\gamma$ it is concave and has no minimum.
 #
 # ## Proximal Galerkin: never below the floor
 #
@@ -236,16 +263,19 @@ sunk = -(F - k * g0) / (k + stiffness)
 
 gamma = 4.0
 v = cp.Variable()
-nitsche = cp.Minimize(  # E - r^2 / (2 gamma), written as one parabola so that cvxpy sees that it is convex
+# E - r^2 / (2 gamma), written as one parabola: so cvxpy sees that it is convex
+nitsche = cp.Minimize(
     (k - k**2 / gamma) / 2 * (v - g0) ** 2
     + F * (1 - k / gamma) * (v - g0)
     + cp.square(cp.pos(k * (v - g0) + F - gamma * v)) / (2 * gamma)
 )
 cp.Problem(nitsche).solve(solver=cp.CLARABEL)
 print(f"Nitsche: gap {v.value:.1e} mm, force {residual_force(v.value):.4f} N")
-print(f"proximal Galerkin after 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
+print(f"proximal Galerkin: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.loglog(stiffness / k, -sunk, "o-")
 left.set(
     xlabel=r"penalty stiffness $\kappa / k$ [-]",
@@ -253,9 +283,15 @@ left.set(
     title="penalty",
 )
 right.semilogy(range(1, 7), gaps, "s-", color="C1")
-right.set(xlabel="step [-]", ylabel="gap above the floor [mm]", title="proximal Galerkin")
+right.set(
+    xlabel="step [-]",
+    ylabel="gap above the floor [mm]",
+    title="proximal Galerkin",
+)
 
-assert np.isclose(v.value, 0.0, atol=1e-4) and np.isclose(residual_force(v.value), 3.0, atol=1e-3)
+assert np.isclose(v.value, 0.0, atol=1e-4) and np.isclose(
+    residual_force(v.value), 3.0, atol=1e-3
+)
 assert np.all(np.array(gaps) > 0) and np.isclose(forces[-1], 3.0, rtol=1e-2)
 assert np.isclose(sunk[-1] * stiffness[-1], -3.0, rtol=1e-4)
 
@@ -282,85 +318,98 @@ primal_without_spring = cp.Problem(cp.Minimize(-1.0 * gap))
 dual_without_spring = cp.Problem(cp.Minimize(0.0), [force == -1.0])
 for program in (primal_without_spring, dual_without_spring):
     program.solve(solver=cp.CLARABEL)
-print(f"primal: {primal_without_spring.status}, dual: {dual_without_spring.status}")
+print(
+    "primal:", primal_without_spring.status, "dual:", dual_without_spring.status
+)
 
-assert primal_without_spring.status == "unbounded" and dual_without_spring.status == "infeasible"
+assert (
+    primal_without_spring.status == "unbounded"
+    and dual_without_spring.status == "infeasible"
+)
 
 # %% [markdown]
 # ## Exercises
 #
-# Replace `...` by your answer, and run the cell and the one below it, which grades your answer. The
-# first two exercises need pen and paper only.
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("1.1")` gives a hint, three times, and then the solution. `table(1)` shows what
+# you have done since the notebook was started. The first three need pen and paper only.
 #
-# **1.1** (Pen and paper.) A spring of stiffness 4 N/mm holds a node 0.5 mm above the floor. A load
-# of 5 N pulls it down. How large are the gap and the contact force?
+# **1.1** (Pen and paper.) A spring of stiffness 4.4 N/mm holds a node 0.6 mm above the floor. A
+# load of 6.5 N pulls it down. How large are the gap and the contact force?
 
 # %% tags=["exercise"]
 answer = (..., ...)  # gap [mm], force [N]
-
-# %% [markdown] tags=["solution"]
-# The spring would let the node sink by $5/4 = 1.25$ mm, which is more than 0.5 mm. So the node
-# touches the floor, $u = 0$, and the contact force is $r = F - k g_0 = 5 - 2 = 3$ N.
-
-# %% tags=["solution"]
-answer = (0.0, 3.0)
-
-# %%
-check("1.1", answer if ... not in answer else ..., (0.0, 3.0))
+check("1.1", answer)
 
 # %% [markdown]
 # **1.2** (Pen and paper.) For which load does the node of exercise 1.1 just touch the floor?
 
 # %% tags=["exercise"]
-answer = ...  # N
-
-# %% [markdown] tags=["solution"]
-# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too. A contact
-# whose gap and force are both zero is called *weakly active*.
-
-# %% tags=["solution"]
-answer = 4 * 0.5
-
-# %%
-check("1.2", answer, 2.0)
+answer = ...  # load [N]
+check("1.2", answer)
 
 # %% [markdown]
-# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this
-# chapter ($k = 2$ N/mm, $g_0 = 1$ mm) *up*, with $F = -5$ N. Write the primal program in cvxpy. How
+# **1.3** (Pen and paper.) How large is the compliance $Q$ of a spring of 2.3 N/mm in m/N?
+
+# %% tags=["exercise"]
+answer = ...  # compliance [m/N]
+check("1.3", answer)
+
+# %% [markdown]
+# **1.4** (Program.) Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of
+# this chapter ($k = 2$ N/mm, $g_0 = 1$ mm) *up* with 5.3 N. Write the primal program in cvxpy. How
 # large is the force of the ceiling?
 
 # %% tags=["exercise"]
-answer = ...  # N, positive
-
-# %% [markdown] tags=["solution"]
-# The multiplier of $u \le 2$ is the force of the ceiling. By hand: $-E'(2) = -(2 \cdot 1 - 5) = 3$
-# N.
-
-# %% tags=["solution"]
-w = cp.Variable()
-ceiling = w <= 2
-cp.Problem(cp.Minimize(k * (w - g0) ** 2 / 2 - 5 * w), [w >= 0, ceiling]).solve(solver=cp.CLARABEL)
-answer = float(ceiling.dual_value)
-
-# %%
-check("1.3", answer, 3.0)
+answer = ...  # force of the ceiling [N]
+check("1.4", answer)
 
 # %% [markdown]
-# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks only 0.01 mm
-# into the floor? Give its stiffness as a multiple of the stiffness $k$ of the spring.
+# **1.5** (Program.) How stiff must the penalty spring be, so that the node of this chapter sinks
+# only 0.007 mm into the floor? Give its stiffness as a multiple of the stiffness $k$ of the spring.
 
 # %% tags=["exercise"]
 answer = ...  # kappa / k [-]
+check("1.5", answer)
 
-# %% [markdown] tags=["solution"]
-# The depth is $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ mm. This gives $\kappa = 298$
-# N/mm, which is 149 times the stiffness of the spring.
+# %% [markdown]
+# **1.6** (Program.) The *method of multipliers* repairs the penalty. It starts with $r = 0$. In
+# each step it minimises $E(u) + \tfrac{1}{2\kappa} [\,r - \kappa u\,]_+^2$, and then takes $[\,r -
+# \kappa u\,]_+$ as its new $r$. How large is $r$ after two steps with $\kappa = 5$ N/mm, for the
+# node of this chapter?
 
-# %% tags=["solution"]
-answer = (3 / 0.01 - k) / k
+# %% tags=["exercise"]
+answer = ...  # force after two steps [N]
+check("1.6", answer)
+
+# %% [markdown]
+# **1.7** (Program.) Nitsche's function consists of two parabolas. Give its second derivatives for
+# $\gamma = 2.7$ N/mm, first where $r \lt \gamma u$, then where $r > \gamma u$. Both are positive,
+# as $\gamma > k$.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # second derivative without contact, with contact [N/mm]
+check("1.7", answer)
+
+# %% [markdown]
+# **1.8** (Program.) By which factor does the gap of the proximal Galerkin method change from one
+# step to the next, late in the iteration, with the step size $\alpha = 0.4$?
+
+# %% tags=["exercise"]
+answer = ...  # ratio of two gaps [-]
+check("1.8", answer)
+
+# %% [markdown]
+# **1.9** (Think.) A spring of 3 N/mm holds an upper node 0.5 mm above a floor of its own. From this
+# node a second spring of 1.5 N/mm holds a lower node, 0.2 mm above another floor. Both gaps are
+# those without load. A load of 4 N pulls the lower node down. Find the forces of both floors.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # forces on the upper and on the lower node [N]
+check("1.9", answer)
 
 # %%
-check("1.4", answer, 149.0)
+table(1)
 
 # %% [markdown]
 # ## References

@@ -8,12 +8,24 @@
 # You need chapter 1. The chapter takes 40 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
-from contactopt.teaching import Slider, check
+from contactopt import (
+    InterfaceProblem,
+    all_solutions,
+    natural_map_residual,
+    solve,
+)
+from contactopt.teaching import Slider
+
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -32,14 +44,21 @@ from contactopt.teaching import Slider, check
 
 # %%
 k_vertical, k_inclined = 1.0, 2.0  # N/mm
-along = np.array([1.0, 1.0]) / np.sqrt(2)  # direction of the inclined spring: up and to the right
+along = np.array([1.0, 1.0]) / np.sqrt(
+    2
+)  # direction of the inclined spring: up and to the right
 K = k_vertical * np.diag([1.0, 0.0]) + k_inclined * np.outer(along, along)
 Q = np.linalg.inv(K)
 load = np.array([-3.0, 1.0])  # N: 3 N down, 1 N to the right
 q = np.array([1.0, 0.0]) + Q @ load  # the gap without load is 1 mm
 mu = 0.5  # friction coefficient
 print(
-    "K =", np.round(K, 6).tolist(), " Q =", np.round(Q, 6).tolist(), " q =", np.round(q, 6).tolist()
+    "K =",
+    np.round(K, 6).tolist(),
+    " Q =",
+    np.round(Q, 6).tolist(),
+    " q =",
+    np.round(q, 6).tolist(),
 )
 
 assert np.allclose(Q, [[1, -1], [-1, 2]]) and np.allclose(q, [-3, 5])
@@ -65,8 +84,18 @@ for tail, head, name, color in (
     ((-1.4, 0), (-1.4, 0.7), "$n$", "k"),
     ((-1.4, 0), (-0.75, 0), "$t$", "k"),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
-    ax.text((tail[0] + head[0]) / 2 + 0.06, (tail[1] + head[1]) / 2 + 0.08, name, color=color)
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
+    ax.text(
+        (tail[0] + head[0]) / 2 + 0.06,
+        (tail[1] + head[1]) / 2 + 0.08,
+        name,
+        color=color,
+    )
 ax.set(xlim=(-1.7, 2), ylim=(-0.6, 2.4), aspect="equal")
 _ = ax.axis("off")
 
@@ -107,25 +136,32 @@ _ = ax.axis("off")
 def primal(g):
     u = cp.Variable(2)
     floor = u[0] >= 0
-    cp.Problem(cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]).solve(
-        solver=cp.CLARABEL
-    )
+    cp.Problem(
+        cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]
+    ).solve(solver=cp.CLARABEL)
     return K @ (u.value - q)  # the contact force, from equilibrium
 
 
 def dual(g, Q=Q, q=q):
     r = cp.Variable(2)
     box = [r[0] >= 0, cp.abs(r[1]) <= g]
-    cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box).solve(
-        solver=cp.CLARABEL
-    )
+    cp.Problem(
+        cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box
+    ).solve(solver=cp.CLARABEL)
     return r.value
 
 
 for g in (0.0, 1.0, 2.0, 3.0):
-    print(f"bound {g} N: primal {np.round(primal(g), 4)}, dual {np.round(dual(g), 4)}")
+    print(
+        f"bound {g} N: primal",
+        np.round(primal(g), 4),
+        "dual",
+        np.round(dual(g), 4),
+    )
     assert np.allclose(primal(g), dual(g), atol=1e-4)
-assert np.allclose(dual(3.0), -K @ q, atol=1e-4)  # from 2 N on the node sticks: u = 0
+assert np.allclose(
+    dual(3.0), -K @ q, atol=1e-4
+)  # from 2 N on the node sticks: u = 0
 
 # %% [markdown]
 # ## Coulomb: the bound depends on the answer
@@ -141,7 +177,12 @@ for _ in range(30):
     r = dual(g)
     g = mu * r[0]
     history.append(r)
-print("Tresca's iteration:", np.round(history[:4], 3).tolist(), "...", np.round(r, 4))
+print(
+    "Tresca's iteration:",
+    np.round(history[:4], 3).tolist(),
+    "...",
+    np.round(r, 4),
+)
 
 problem = InterfaceProblem(Q, [q], mu)
 assert np.allclose(r, [2.0, -1.0], atol=1e-4)
@@ -169,9 +210,18 @@ def in_the_cone(coefficient):
     force = solve(InterfaceProblem(Q, [q], coefficient)).reactions[0]
     slip = (Q @ force + q)[1]
     fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
-    ax.fill([0, -coefficient * 4, coefficient * 4], [0, 4, 4], color="C0", alpha=0.15, lw=0)
+    ax.fill(
+        [0, -coefficient * 4, coefficient * 4],
+        [0, 4, 4],
+        color="C0",
+        alpha=0.15,
+        lw=0,
+    )
     ax.annotate(
-        "", (force[1], force[0]), (0, 0), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2}
+        "",
+        (force[1], force[0]),
+        (0, 0),
+        arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2},
     )
     ax.plot(*(-K @ q)[::-1], "kx")
     ax.text(-2.0, 0.7, "sticking force", ha="center")
@@ -182,12 +232,15 @@ def in_the_cone(coefficient):
         ylabel="normal force $r_n$ [N]",
     )
     ax.set_title(
-        rf"$\mu$ = {coefficient:.2f}: " + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks")
+        rf"$\mu$ = {coefficient:.2f}: "
+        + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks")
     )
     return fig
 
 
-Slider("friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2)
+Slider(
+    "friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2
+)
 
 # %% [markdown]
 # ## The convex relaxation: another law
@@ -204,9 +257,16 @@ Slider("friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2
 # %%
 f = cp.Variable(2)
 energy = cp.quad_form(f, cp.psd_wrap(Q)) / 2 + q @ f
-cp.Problem(cp.Minimize(energy), [cp.SOC(mu * f[0], f[1:])]).solve(solver=cp.CLARABEL)
+cp.Problem(cp.Minimize(energy), [cp.SOC(mu * f[0], f[1:])]).solve(
+    solver=cp.CLARABEL
+)
 lifted = Q @ f.value + q
-print(f"associated: force {np.round(f.value, 3)}, gap {lifted[0]:.3f} mm, slip {lifted[1]:.3f} mm")
+print(
+    "associated: force",
+    np.round(f.value, 3),
+    "gap and slip",
+    np.round(lifted, 3),
+)
 
 assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 
@@ -234,13 +294,21 @@ for _ in range(12):
 exact = all_solutions(InterfaceProblem(Q, [q], much))
 fig, ax = plt.subplots(figsize=(5, 3.2), layout="constrained")
 ax.plot(range(1, 13), history, "o-", label="Tresca's iteration")
-ax.axhline(exact[0].reactions[0, 0], color="k", ls="--", lw=1, label="the only solution")
+ax.axhline(
+    exact[0].reactions[0, 0],
+    color="k",
+    ls="--",
+    lw=1,
+    label="the only solution",
+)
 ax.set(xlabel="iteration [-]", ylabel="normal force [N]")
 ax.legend(frameon=False)
 
 assert len(exact) == 1 and np.allclose(exact[0].reactions, [[1.2, -1.8]])
 assert abs(history[-1] - 1.2) > 0.1  # it has not converged
-assert np.isclose(min(history), 1.0, atol=1e-4)  # it sticks in every second iteration
+assert np.isclose(
+    min(history), 1.0, atol=1e-4
+)  # it sticks in every second iteration
 assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 
 # %% [markdown]
@@ -257,17 +325,31 @@ assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 # in a cycle, although the solution is unique.
 
 # %%
-coupled, pulled, friction = np.array([[1.0, 0.99], [0.99, 1.0]]), np.array([-0.307, 0.71]), 0.7
+coupled, pulled, friction = (
+    np.array([[1.0, 0.99], [0.99, 1.0]]),
+    np.array([-0.307, 0.71]),
+    0.7,
+)
 f, sigma = cp.Variable(2), cp.Parameter(nonneg=True, value=0.9)
-energy = cp.quad_form(f, cp.psd_wrap(coupled)) / 2 + pulled @ f + friction * sigma * f[0]
-program, slips = cp.Problem(cp.Minimize(energy), [cp.SOC(friction * f[0], f[1:])]), []
+energy = (
+    cp.quad_form(f, cp.psd_wrap(coupled)) / 2
+    + pulled @ f
+    + friction * sigma * f[0]
+)
+program, slips = (
+    cp.Problem(cp.Minimize(energy), [cp.SOC(friction * f[0], f[1:])]),
+    [],
+)
 for _ in range(12):
     program.solve(solver=cp.CLARABEL)
     sigma.value = abs(float((coupled @ f.value + pulled)[1]))
     slips.append(sigma.value)
 (only,) = all_solutions(InterfaceProblem(coupled, [pulled], friction))
 right = (coupled @ only.reactions[0] + pulled)[1]
-print(f"slip of the only solution {right:.3f} mm; of the iteration", np.round(slips[-4:], 3))
+print(
+    f"slip of the only solution {right:.3f} mm; of the iteration",
+    np.round(slips[-4:], 3),
+)
 
 bottom = 1.0 - 2 * friction * 0.99 + friction**2
 assert friction * (friction - 0.99) / bottom < -1 and np.isclose(right, 1.0)
@@ -284,9 +366,8 @@ assert min(np.abs(np.array(slips[-4:]) - right)) > 0.1  # it has not converged
 wedged = InterfaceProblem(Q, [[0.1, -0.5]], 1.5)
 for found in all_solutions(wedged):
     state = Q @ found.reactions[0] + wedged.q[0]
-    print(
-        f"force {np.round(found.reactions[0], 4)}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm"
-    )
+    force = np.round(found.reactions[0], 4)
+    print(f"force {force}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm")
 
 assert len(all_solutions(wedged)) == 3
 assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
@@ -299,82 +380,88 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # |---|---|---|
 # | Tresca's iteration | the box program, again and again | $\mu$ times the coupling $\lvert Q_{nt} \rvert / Q_{nn}$ exceeds 1 while the node slips |
 # | cone program | associated friction | the node slips: then it is another law |
-# | Acary and Cadoux | the cone program with a shift, again and again | the factor below exceeds 1; for many nodes there is no proof of convergence |
+# | Acary and Cadoux | the cone program with a shift, again and again | the factor above is not between -1 and 1; for many nodes there is no proof of convergence |
 #
 # ## Exercises
 #
-# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1, 2)$ mm/N, $q = (-1, 1)$ mm and $\mu =
-# 0.3$. Find the normal force and the friction force.
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("2.1")` gives a hint, three times, and then the solution. `table(2)` shows what
+# you have done since the notebook was started.
+#
+# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1.2, 2.5)$ mm/N, $q = (-1.5, 1.1)$ mm and
+# $\mu = 0.3$. Find the normal force and the friction force.
 
 # %% tags=["exercise"]
-answer = ...  # (r_n, r_t) in N
-
-# %% [markdown] tags=["solution"]
-# Nothing couples the directions, so $r_n = -q_n / Q_{nn} = 1$ N. To stick, the node would need $r_t
-# = -q_t / Q_{tt} = -0.5$ N, which is more than friction can give. So the node slips to the right
-# with $r_t = -0.3$ N. The slip is $u_t = 1 - 0.6 = 0.4$ mm.
-
-# %% tags=["solution"]
-answer = (1.0, -0.3)
-
-# %%
-check("2.1", answer, (1.0, -0.3))
+answer = (..., ...)  # r_n, r_t [N]
+check("2.1", answer)
 
 # %% [markdown]
 # **2.2** (Pen and paper.) What is the smallest friction coefficient with which the node of this
-# chapter sticks?
+# chapter sticks, if $q = (-3.1, 5.3)$ mm?
 
 # %% tags=["exercise"]
-answer = ...
-
-# %% [markdown] tags=["solution"]
-# If the node sticks, $u = 0$, so that $r = -K q = (1, -2)$ N. The cone contains this force if $\mu
-# \ge 2$.
-
-# %% tags=["solution"]
-answer = 2.0
-
-# %%
-check("2.2", answer, 2.0)
+answer = ...  # friction coefficient [-]
+check("2.2", answer)
 
 # %% [markdown]
-# **2.3** Write the iteration of Acary and Cadoux. Solve the case $\mu = 1.5$ with it, in which
-# Tresca's iteration failed. The certificate grades your forces.
+# **2.3** (Program.) Write the iteration of Acary and Cadoux. Solve the case $\mu = 1.5$ with it, in
+# which Tresca's iteration failed. The certificate grades your forces.
 
 # %% tags=["exercise"]
-answer = ...  # (r_n, r_t) in N
-
-# %% tags=["solution"]
-x, shift = cp.Variable(2), cp.Parameter(nonneg=True, value=0.0)
-cost = cp.quad_form(x, cp.psd_wrap(Q)) / 2 + q @ x + 1.5 * shift * x[0]
-program = cp.Problem(cp.Minimize(cost), [cp.SOC(1.5 * x[0], x[1:])])
-for _ in range(60):  # an error shrinks by .7 each time
-    program.solve(solver=cp.CLARABEL)
-    shift.value = abs(float((Q @ x.value + q)[1]))
-answer = x.value
-
-# %%
-check("2.3", answer, InterfaceProblem(Q, [q], 1.5))
+answer = (..., ...)  # r_n, r_t [N]
+check("2.3", answer)
 
 # %% [markdown]
-# **2.4** (Pen and paper.) Find the three solutions of the wedged node, $q = (0.1, -0.5)$ mm and
-# $\mu = 1.5$. Try the three states open, stick, and slip to the left. Give the three normal forces,
-# the smallest first.
+# **2.4** (Pen and paper.) Find the three solutions of the wedged node with $q = (0.13, -0.55)$ mm
+# and $\mu = 1.5$. Give their normal forces, the smallest first.
 
 # %% tags=["exercise"]
-answer = ...  # three numbers [N]
+answer = (..., ..., ...)  # three normal forces, the smallest first [N]
+check("2.4", answer)
 
-# %% [markdown] tags=["solution"]
-# *Open:* if $r = 0$, then $u = q$, and the gap $u_n = 0.1$ mm is not negative. This is a solution.
-# *Stick:* if $u = 0$, then $r = -K q = (0.3, 0.4)$ N, and the cone contains this force, because
-# $0.4 \le 1.5 \cdot 0.3$. *Slip to the left:* $u_n = (1 - 1.5)\, r_n + 0.1 = 0$ gives $r_n = 0.2$ N
-# and $r_t = 0.3$ N. The slip $u_t = -0.2 + 0.6 - 0.5 = -0.1$ mm is negative, as we assumed.
+# %% [markdown]
+# **2.5** (Program.) How large is the gap in the solution of *associated* friction, for the node of
+# this chapter with $\mu = 0.7$?
 
-# %% tags=["solution"]
-answer = (0.0, 0.2, 0.3)
+# %% tags=["exercise"]
+answer = ...  # gap [mm]
+check("2.5", answer)
+
+# %% [markdown]
+# **2.6** (Pen and paper.) Let $Q = \begin{pmatrix} 1.3 & -0.8 \\ -0.8 & 2 \end{pmatrix}$ mm/N.
+# Above which friction coefficient are there loads with several solutions?
+
+# %% tags=["exercise"]
+answer = ...  # friction coefficient [-]
+check("2.6", answer)
+
+# %% [markdown]
+# **2.7** (Think.) Find another load $q$ for which the node of this chapter has three solutions with
+# $\mu = 1.5$. Multiples of $(0.1, -0.5)$ mm do not count.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # q_n, q_t [mm]
+check("2.7", answer)
+
+# %% [markdown]
+# **2.8** (Think.) Take $Q$ of exercise 2.6 and $\mu = 0.7$. By which factor, with its sign, does a
+# step of Tresca's iteration multiply an error of the bound, while the node slips to the right?
+
+# %% tags=["exercise"]
+answer = ...  # factor of the error in one step, with its sign [-]
+check("2.8", answer)
+
+# %% [markdown]
+# **2.9** (Think.) In space a node has two tangential directions. Let $Q = \operatorname{diag}(1, 1,
+# 3)$ mm/N, $q = (-2, 1.5, 2)$ mm and $\mu = 0.5$. Find the three forces. Friction is opposite to
+# the *slip*, and the slip is not parallel to $(1.5, 2)$.
+
+# %% tags=["exercise"]
+answer = (..., ..., ...)  # r_n, r_1, r_2 [N]
+check("2.9", answer)
 
 # %%
-check("2.4", answer, (0.0, 0.2, 0.3))
+table(2)
 
 # %% [markdown]
 # ## References

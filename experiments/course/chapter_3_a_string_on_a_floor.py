@@ -9,12 +9,19 @@
 # minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import InterfaceProblem, solve
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -43,13 +50,23 @@ for tail, head, name, color, at in (
     ((0, 0.25), (-0.09, 0.25), "$T$", "k", (-0.07, 0.265)),
     ((L, 0.25), (L + 0.09, 0.25), "$T$", "k", (L + 0.05, 0.265)),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
     ax.text(*at, name, color=color)
 for x_at, top, name, at in (
     (0.0, 0.25, "$d$", (0.012, 0.03)),
     (15 / 16, sag[15], "$u_i$", (0.95, 0.05)),
 ):
-    ax.annotate("", (x_at, top), (x_at, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
+    ax.annotate(
+        "",
+        (x_at, top),
+        (x_at, 0),
+        arrowprops={"arrowstyle": "<->", "color": "C2"},
+    )
     ax.text(*at, name, color="C2")
 ax.set(xlim=(-0.15, L + 0.15), ylim=(-0.075, 0.3))
 _ = ax.axis("off")
@@ -63,7 +80,7 @@ _ = ax.axis("off")
 
 # %%
 def string(N):
-    """Stiffness A [N/mm], weights w [N] and places x [mm] of the inner nodes."""
+    """Stiffness [N/mm], weights [N] and places [mm] of the inner nodes."""
     h = L / N
     A = T / h * (2 * np.eye(N - 1) - np.eye(N - 1, k=1) - np.eye(N - 1, k=-1))
     weight = np.full(N - 1, f * h)
@@ -100,15 +117,15 @@ q = d - Q @ weight
 # %%
 u = cp.Variable(len(x))
 floor = u >= 0
-cp.Problem(cp.Minimize(cp.quad_form(u - d, cp.psd_wrap(A)) / 2 + weight @ u), [floor]).solve(
-    solver=cp.CLARABEL
-)
+cp.Problem(
+    cp.Minimize(cp.quad_form(u - d, cp.psd_wrap(A)) / 2 + weight @ u), [floor]
+).solve(solver=cp.CLARABEL)
 
 r = cp.Variable(len(x))
 push = r >= 0
-cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [push]).solve(
-    solver=cp.CLARABEL
-)
+cp.Problem(
+    cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [push]
+).solve(solver=cp.CLARABEL)
 
 assert np.allclose(u.value, push.dual_value, atol=1e-5)
 assert np.allclose(r.value, floor.dual_value, atol=1e-3)
@@ -123,17 +140,21 @@ assert np.allclose(r.value, floor.dual_value, atol=1e-3)
 # $$ d = \frac{f a^2}{2 T}, \qquad a = \sqrt{2 T d / f} . $$
 #
 # On the floor the string is straight, so its tension carries nothing. There the floor carries
-# exactly the weight: $r_i = f h$.
+# exactly the weight: $r_i = f h$, and half of it at a node where the contact ends.
 
 
 # %%
 def exact(height, places):
     a = np.sqrt(2 * T * height / f)
-    return f / (2 * T) * np.maximum(a - np.minimum(places, L - places), 0) ** 2, a
+    return f / (2 * T) * np.maximum(
+        a - np.minimum(places, L - places), 0
+    ) ** 2, a
 
 
 truth, a = exact(d, x)
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.plot(x, u.value, "C0.", label="computed")
 left.plot(x, truth, "k-", lw=1, label="exact")
 left.set(xlabel="x [mm]", ylabel="gap [mm]")
@@ -156,7 +177,8 @@ def lowered(height):
     height = max(height, 1e-9)
     if height < f * L**2 / (8 * T):
         gap, touch = exact(height, line)
-        ax.set_title(f"height {height:.2f} mm: touches from {touch:.2f} to {L - touch:.2f} mm")
+        ends = f"{touch:.2f} to {L - touch:.2f} mm"
+        ax.set_title(f"height {height:.2f} mm: touches from {ends}")
     else:
         gap = height - f / (2 * T) * line * (L - line)
         ax.set_title(f"height {height:.2f} mm: hangs freely")
@@ -226,7 +248,9 @@ h = L / 40
 def penalty(kappa):
     touches = np.ones(len(x), bool)
     while True:
-        gap = np.linalg.solve(A + kappa * h * np.diag(touches), A @ np.full(len(x), d) - weight)
+        gap = np.linalg.solve(
+            A + kappa * h * np.diag(touches), A @ np.full(len(x), d) - weight
+        )
         if np.array_equal(gap < 0, touches):
             return gap
         touches = gap < 0
@@ -239,7 +263,9 @@ def proximal_galerkin(steps, alpha=0.1):
         for _ in range(100):
             gap = np.exp(psi)
             step = alpha * (A @ (gap - d) + weight) + h * (psi - last)
-            change = np.linalg.solve(alpha * A * gap + h * np.eye(len(x)), -step)
+            change = np.linalg.solve(
+                alpha * A * gap + h * np.eye(len(x)), -step
+            )
             psi = psi + change * min(
                 1.0, 2 / np.abs(change).max()
             )  # the exponential allows no large step
@@ -252,15 +278,27 @@ def proximal_galerkin(steps, alpha=0.1):
 stiffness = 10.0 ** np.arange(2, 7)
 depths = [-penalty(kappa).min() for kappa in stiffness]
 gap, errors = proximal_galerkin(25)
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.loglog(stiffness, depths, "o-")
 left.set(
-    xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]", ylabel="largest depth [mm]", title="penalty"
+    xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]",
+    ylabel="largest depth [mm]",
+    title="penalty",
 )
-right.semilogy(range(1, 26), errors, "s-", color="C1", label="against the exact string")
-right.set(xlabel="step [-]", ylabel="largest error of the gap [mm]", title="proximal Galerkin")
+right.semilogy(
+    range(1, 26), errors, "s-", color="C1", label="against the exact string"
+)
+right.set(
+    xlabel="step [-]",
+    ylabel="largest error of the gap [mm]",
+    title="proximal Galerkin",
+)
 
-assert np.isclose(depths[-1] * stiffness[-1], f, rtol=0.05)  # the springs carry the weight
+assert np.isclose(
+    depths[-1] * stiffness[-1], f, rtol=0.05
+)  # the springs carry the weight
 assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %% [markdown]
@@ -276,8 +314,13 @@ assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %%
 loose = cp.Variable(len(x))
-program = cp.Problem(cp.Minimize(cp.quad_form(loose, cp.psd_wrap(Q)) / 2 + q @ loose), [loose >= 0])
-program.solve(solver=cp.CLARABEL, tol_gap_abs=1e-3, tol_gap_rel=1e-3, tol_feas=1e-3)
+program = cp.Problem(
+    cp.Minimize(cp.quad_form(loose, cp.psd_wrap(Q)) / 2 + q @ loose),
+    [loose >= 0],
+)
+program.solve(
+    solver=cp.CLARABEL, tol_gap_abs=1e-3, tol_gap_rel=1e-3, tol_feas=1e-3
+)
 print(
     "nodes with r > 0:",
     int(np.sum(loose.value > 0)),
@@ -303,89 +346,78 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # %% [markdown]
 # ## Exercises
 #
-# **3.1** (Pen and paper.) The ends of the string are only 0.09 mm above the floor. At which
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("3.1")` gives a hint, three times, and then the solution. `table(3)` shows what
+# you have done since the notebook was started.
+#
+# **3.1** (Pen and paper.) The ends of the string are only 0.07 mm above the floor. At which
 # distance from the end does the contact begin?
 
 # %% tags=["exercise"]
 answer = ...  # distance from the end [mm]
-
-# %% [markdown] tags=["solution"]
-# $a = \sqrt{2 T d / f} = \sqrt{0.18 / 8} = 0.15$ mm.
-
-# %% tags=["solution"]
-answer = 0.15
-
-# %%
-check("3.1", answer, 0.15)
+check("3.1", answer)
 
 # %% [markdown]
 # **3.2** (Pen and paper.) Which part of the weight does the floor carry in exercise 3.1?
 
 # %% tags=["exercise"]
-answer = ...  # between 0 and 1
-
-# %% [markdown] tags=["solution"]
-# The floor carries the weight of the part that lies on it. This part is $(L - 2 a) / L = 0.7$.
-
-# %% tags=["solution"]
-answer = 0.7
-
-# %%
-check("3.2", answer, 0.7)
+answer = ...  # part of the weight [-]
+check("3.2", answer)
 
 # %% [markdown]
-# **3.3** A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) / 0.2)^2)$ mm
-# where this number is positive. The ends of the string stay at $d = 0.25$ mm. Change $q$ and solve
-# for the 39 forces. The certificate grades them.
+# **3.3** (Program.) A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) /
+# 0.2)^2)$ mm where this number is positive. The ends of the string stay at $d = 0.25$ mm. Change
+# $q$ and solve for the 39 forces. The certificate grades them.
 
 # %% tags=["exercise"]
 answer = ...  # 39 forces [N]
-
-# %% [markdown] tags=["solution"]
-# The gap is now measured from the hill, so the height of the hill is subtracted from $q$. $Q$ does
-# not change.
-
-# %% tags=["solution"]
-hill = np.maximum(0.2 * (1 - ((x - 0.5) / 0.2) ** 2), 0)
-answer = active_set(Q, q - hill)[0]
-
-
-# %%
-def frictionless(Q, q):
-    """An interface problem in the forces r_n alone: tangential components get the same compliance,
-    and no friction.
-    """
-    return InterfaceProblem(np.kron(Q, np.eye(2)), np.column_stack([q, np.zeros(len(q))]), 0.0)
-
-
-hill_problem = frictionless(Q, q - np.maximum(0.2 * (1 - ((x - 0.5) / 0.2) ** 2), 0))
-given = answer if answer is ... else np.column_stack([answer, np.zeros(len(x))])
-check("3.3", given, hill_problem)
+check("3.3", answer)
 
 # %% [markdown]
-# **3.4** The active set method above starts with the guess that all nodes touch. On 320 elements,
-# start it from the set that it found on 160 elements. How many steps does it take? (`np.repeat` or
-# `np.interp` carry a set to the finer mesh.)
+# **3.4** (Program.) The active set method above starts with the guess that all nodes touch. Count
+# its steps on 320 elements. Then start it from the set that it found on 160 elements, carried to
+# the finer mesh by `np.interp(x_fine, x_coarse, touches) >= 0.5`, and count again.
 
 # %% tags=["exercise"]
-answer = ...  # number of steps
+answer = (..., ...)  # steps from all nodes, steps from the coarse set
+check("3.4", answer)
 
-# %% tags=["solution"]
-A_c, w_c, x_c = string(160)
-A_f, w_f, x_f = string(320)
-coarse = active_set(np.linalg.inv(A_c), d - np.linalg.solve(A_c, w_c))[0]
-touches, Q_f, answer = np.interp(x_f, x_c, coarse > 0) >= 0.5, np.linalg.inv(A_f), 0
-while True:
-    answer += 1
-    forces = np.zeros(len(x_f))
-    forces[touches] = np.linalg.solve(Q_f[np.ix_(touches, touches)], -(d - Q_f @ w_f)[touches])
-    new = forces - (Q_f @ forces + d - Q_f @ w_f) > 0
-    if np.array_equal(new, touches):
-        break
-    touches = new
+# %% [markdown]
+# **3.5** (Program.) *Projected Gauss-Seidel* goes from node to node. At each it changes the force
+# $r_i \ge 0$ of this node alone, so that $u_i = 0$, or $r_i = 0$ if this would need tension. Take
+# four elements and $d = 0.07$ mm, start with $r = 0$, and make one sweep from left to right.
+
+# %% tags=["exercise"]
+answer = (..., ..., ...)  # three forces after one sweep [N]
+check("3.5", answer)
+
+# %% [markdown]
+# **3.6** (Pen and paper.) Which penalty stiffness lets the string of this chapter sink by 0.0003 mm
+# only, where it lies on the floor?
+
+# %% tags=["exercise"]
+answer = ...  # stiffness per length [N/mm^2]
+check("3.6", answer)
+
+# %% [markdown]
+# **3.7** (Think.) The ends of a string of 40 elements are at $d = 0.19$ mm. Its floor is raised to
+# a height $b$, so that $u_i \ge b$ while the ends stay. How large is the derivative of the minimum
+# of the energy by $b$, at $b = 0$?
+
+# %% tags=["exercise"]
+answer = ...  # derivative of the energy [N]
+check("3.7", answer)
+
+# %% [markdown]
+# **3.8** (Think.) Give the condition number of $A$ for $N = 1000$ to three digits, without forming
+# the matrix.
+
+# %% tags=["exercise"]
+answer = ...  # condition number [-]
+check("3.8", answer)
 
 # %%
-check("3.4", answer, lambda steps: 1 <= steps <= 5)
+table(3)
 
 # %% [markdown]
 # ## References
@@ -399,5 +431,4 @@ check("3.4", answer, lambda steps: 1 <= steps <= 5)
 # Next: [from bodies to the interface](chapter_4_from_bodies_to_the_interface.py).
 
 # %% tags=["remove-cell"]
-assert solve(hill_problem).solved
 plt.show()  # opens the figures where this runs as a script

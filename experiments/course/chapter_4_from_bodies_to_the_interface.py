@@ -10,6 +10,8 @@
 # minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
@@ -39,7 +41,12 @@ from contactopt import (
     solve,
 )
 from contactopt.problem.laws.tresca import Tresca
-from contactopt.teaching import Slider, check
+from contactopt.teaching import Slider
+
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -55,9 +62,9 @@ from contactopt.teaching import Slider, check
 
 # %%
 E, nu, lowered = 5.0, 0.3, 0.1  # MPa, -, mm
-mesh = MeshTri.init_tensor(np.linspace(-2, 2, 33), np.linspace(0, 2, 17)).with_boundaries(
-    {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2}
-)
+mesh = MeshTri.init_tensor(
+    np.linspace(-2, 2, 33), np.linspace(0, 2, 17)
+).with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2})
 basis = Basis(mesh, ElementVector(ElementTriP1()))
 K = linear_elasticity(*lame_parameters(E, nu)).assemble(basis)
 
@@ -68,7 +75,7 @@ U_top[top.all(["u^2"])] = -lowered
 x = mesh.p[0, bottom.nodal_ix]
 gap = x**2 / 20
 
-print(f"{basis.N} unknowns, {len(held)} held, {len(x)} nodes on the contact surface")
+print(f"{basis.N} unknowns, {len(held)} held, {len(x)} nodes may touch")
 
 assert np.abs(K - K.T).max() < 1e-12
 
@@ -78,14 +85,35 @@ ax.triplot(*mesh.p, mesh.t.T, color="C0", lw=0.4)
 line = np.linspace(-2.4, 2.4, 101)
 ax.fill_between(line, -0.5, -(line**2) / 20, color="0.8", lw=0)
 ax.plot([-2.2, 2.2], [2.03, 2.03], "k", lw=4)
-ax.annotate("", (0, 2.1), (0, 2.6), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+ax.annotate(
+    "",
+    (0, 2.1),
+    (0, 2.6),
+    arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2},
+)
 ax.text(0.1, 2.35, "0.1 mm", color="C3")
 for head, name in (((2.7, 0.6), "$n$"), ((3.3, 0.0), "$t$")):
-    ax.annotate("", head, (2.7, 0.0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        (2.7, 0.0),
+        arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8},
+    )
     ax.text(head[0] + 0.06, head[1] + 0.04, name)
-ax.annotate("", (0, -0.02), (0, -0.46), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2})
+ax.annotate(
+    "",
+    (0, -0.02),
+    (0, -0.46),
+    arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2},
+)
 ax.text(0.08, -0.42, "$r_n$", color="C1")
-_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), ylim=(-0.5, 2.7))
+_ = ax.set(
+    xlabel="x [mm]",
+    ylabel="y [mm]",
+    aspect="equal",
+    xlim=(-2.5, 3.6),
+    ylim=(-0.5, 2.7),
+)
 
 # %% [markdown]
 # ## Primal: all displacements
@@ -102,13 +130,13 @@ _ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), y
 U = cp.Variable(basis.N)
 floor = U[c_n] + gap >= 0
 primal = cp.Problem(
-    cp.Minimize(cp.quad_form(U, cp.psd_wrap(K)) / 2), [floor, U[held] == U_top[held]]
+    cp.Minimize(cp.quad_form(U, cp.psd_wrap(K)) / 2),
+    [floor, U[held] == U_top[held]],
 )
 primal.solve(solver=cp.CLARABEL)
 pressed = floor.dual_value
-print(
-    f"the floor carries {pressed.sum():.4f} N; {int(np.sum(pressed > 1e-4))} of {len(x)} nodes touch"
-)
+touching = int(np.sum(pressed > 1e-4))
+print(f"the floor carries {pressed.sum():.4f} N; {touching} nodes of {len(x)}")
 
 assert 3 < np.sum(pressed > 1e-4) < len(x)
 
@@ -143,7 +171,9 @@ q = (T @ U_0).reshape(-1, 2) + np.column_stack([gap, 0 * gap])
 S = np.linalg.inv(Q)
 others = np.setdiff1d(np.arange(len(free)), np.nonzero(T)[1])
 places = np.nonzero(T)[1]
-schur = K_free[np.ix_(places, places)] - K_free[np.ix_(places, others)] @ np.linalg.solve(
+schur = K_free[np.ix_(places, places)] - K_free[
+    np.ix_(places, others)
+] @ np.linalg.solve(
     K_free[np.ix_(others, others)], K_free[np.ix_(others, places)]
 )
 print(f"{len(free)} free unknowns became {len(Q)}")
@@ -173,7 +203,10 @@ assert np.allclose(S, schur)
 r_n = cp.Variable(len(x))
 push = r_n >= 0
 dual = cp.Problem(
-    cp.Minimize(cp.quad_form(r_n, cp.psd_wrap(Q[::2, ::2])) / 2 + q[:, 0] @ r_n), [push]
+    cp.Minimize(
+        cp.quad_form(r_n, cp.psd_wrap(Q[::2, ::2])) / 2 + q[:, 0] @ r_n
+    ),
+    [push],
 )
 dual.solve(solver=cp.CLARABEL)
 
@@ -191,7 +224,9 @@ assert answer.solved and np.allclose(answer.reactions[:, 0], pressed, atol=1e-4)
 
 # %% tags=["hide-input"]
 def further_down(depth):
-    without_contact = depth / lowered * (T @ U_0).reshape(-1, 2) + np.column_stack([gap, 0 * gap])
+    without_contact = depth / lowered * (T @ U_0).reshape(
+        -1, 2
+    ) + np.column_stack([gap, 0 * gap])
     forces = solve(InterfaceProblem(Q, without_contact, 0.0)).reactions[:, 0]
     order = np.argsort(x)
     fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
@@ -201,7 +236,12 @@ def further_down(depth):
     return fig
 
 
-Slider("the plate comes down by [mm]", np.linspace(0.02, 0.2, 10), further_down, start=4)
+Slider(
+    "the plate comes down by [mm]",
+    np.linspace(0.02, 0.2, 10),
+    further_down,
+    start=4,
+)
 
 # %% [markdown]
 # ## Nitsche's method with finite elements
@@ -235,7 +275,12 @@ def consistency(U, v, w):
 
 @BilinearForm
 def bracket(U, v, w):
-    return w.touches * (pressure(U) - gamma * U[1]) * (pressure(v) - gamma * v[1]) / gamma
+    return (
+        w.touches
+        * (pressure(U) - gamma * U[1])
+        * (pressure(v) - gamma * v[1])
+        / gamma
+    )
 
 
 @LinearForm
@@ -249,7 +294,9 @@ while step < 30:
     step += 1
     system = K + fixed + bracket.assemble(edge, touches=touches)
     nitsche = solve_linear(
-        *condense(system, distance.assemble(edge, touches=touches), x=U_top, D=held)
+        *condense(
+            system, distance.assemble(edge, touches=touches), x=U_top, D=held
+        )
     )
     field = edge.interpolate(nitsche)
     value = pressure(field) - gamma * (
@@ -271,7 +318,12 @@ ax.plot(
 )
 middle = np.asarray(edge.global_coordinates())[0].mean(axis=1)
 order = np.argsort(middle)
-ax.plot(middle[order], np.maximum(value, 0).mean(axis=1)[order], "C1.", label="Nitsche's bracket")
+ax.plot(
+    middle[order],
+    np.maximum(value, 0).mean(axis=1)[order],
+    "C1.",
+    label="Nitsche's bracket",
+)
 ax.set(xlabel="x [mm]", ylabel="pressure [MPa]")
 ax.legend(frameon=False)
 
@@ -279,7 +331,7 @@ assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 
 # %% [markdown]
 # Both methods find the same pressure, up to the error of the mesh. If $\gamma_0$ is too small, the
-# energy has no minimum, as in chapter 1 (exercise 4.4).
+# energy is not convex, as in chapter 1 (exercise 4.4).
 #
 # ## Friction with a given bound
 #
@@ -292,9 +344,9 @@ assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 bound = np.full(len(x), 0.02)  # N
 r = cp.Variable(2 * len(x))
 law = [r[::2] >= 0, cp.abs(r[1::2]) <= bound]
-cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q.ravel() @ r), law).solve(
-    solver=cp.CLARABEL
-)
+cp.Problem(
+    cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q.ravel() @ r), law
+).solve(solver=cp.CLARABEL)
 with_bound = InterfaceProblem(Q, q, Tresca(bound))
 
 assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
@@ -309,103 +361,110 @@ assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
 # The remedy is to treat the rigid motions as unknowns of the interface problem. In the plane there
 # are three: two translations and a rotation. The columns of a matrix $V$ hold what these motions do
 # to the contact. The unknowns $\lambda$ say how far the block moves in each of them. In return, the
-# contact forces have to balance the load, and $s$ is minus the load in each motion:
+# contact forces have to balance the load, and $s$ is the load in each motion:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0 . $$
 #
 # contactopt finds the rigid motions by itself.
 
 # %%
-flat = MeshTri.init_tensor(np.linspace(-2, 2, 17), np.linspace(0, 2, 9)).with_boundaries(
-    {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2}
-)
+flat = MeshTri.init_tensor(
+    np.linspace(-2, 2, 17), np.linspace(0, 2, 9)
+).with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2})
 loads = (Traction("top", (0.0, -1.0)),)
 block = Part("block", flat, Material(E=E, nu=nu), loads=loads, contact="bottom")
 floating = reduce(Scene("block on a floor", block, Rigid("floor"), mu=0.5))
 resting = solve(floating)
+supported = resting.reactions[:, 0].sum()
 print(
-    f"{floating.V.shape[1]} rigid motions, status {resting.status}, normal force {resting.reactions[:, 0].sum():.6f} N"
+    floating.V.shape[1], "rigid motions,", resting.status, f"{supported:.6f} N"
 )
 
 assert floating.V.shape[1] == 3 and resting.solved
 assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
+assert np.isclose(floating.s.min(), -4.0)  # the load, downwards
 
 # %% [markdown]
 # ## Exercises
 #
-# **4.1** (Pen and paper.) The block of this chapter has $33 \times 17$ nodes, and the top row is
-# held. How many free unknowns does the primal problem have? How many unknowns does the dual problem
-# with friction have?
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("4.1")` gives a hint, three times, and then the solution. `table(4)` shows what
+# you have done since the notebook was started.
+#
+# **4.1** (Pen and paper.) A mesh of the block has $41 \times 21$ nodes, and its top row is held.
+# How many free unknowns does the primal problem have? How many unknowns does the dual problem with
+# friction have?
 
 # %% tags=["exercise"]
-answer = ...  # (primal, dual)
-
-# %% [markdown] tags=["solution"]
-# $2 \cdot 33 \cdot 16 = 1056$ displacements are free. The dual has two force components at each of
-# the 33 nodes of the bottom, which makes 66.
-
-# %% tags=["solution"]
-answer = (1056, 66)
-
-# %%
-check("4.1", answer, (1056, 66))
+answer = (..., ...)  # unknowns of the primal problem, of the dual problem
+check("4.1", answer)
 
 # %% [markdown]
-# **4.2** (Pen and paper.) The block without a plate is 4 mm wide. The load on it is one vertical
+# **4.2** (Pen and paper.) A block without a plate is 4.6 mm wide. The load on it is one vertical
 # force at the distance $e$ from the middle. What is the largest $e$ for which the block does not
 # tip over?
 
 # %% tags=["exercise"]
-answer = ...  # mm
-
-# %% [markdown] tags=["solution"]
-# The floor can only push. So the resultant of its forces lies between the ends of the block, and
-# $e$ can be at most 2 mm. For a larger $e$ no forces balance the load, and the interface problem is
-# *infeasible*.
-
-# %% tags=["solution"]
-answer = 2.0
-
-# %%
-check("4.2", answer, 2.0)
+answer = ...  # distance from the middle [mm]
+check("4.2", answer)
 
 # %% [markdown]
-# **4.3** Solve the block under the lowered plate with Coulomb's law and $\mu = 0.4$. Use Tresca's
-# iteration of chapter 2, with the program above. Give the forces, one row $(r_n, r_t)$ for each
-# node. The certificate grades them.
+# **4.3** (Program.) Solve the block under the lowered plate with Coulomb's law and $\mu = 0.1$. Use
+# Tresca's iteration of chapter 2, with the program above. Give the forces, one row $(r_n, r_t)$ for
+# each node. The certificate grades them.
 
 # %% tags=["exercise"]
-answer = ...  # (33, 2) forces [N]
-
-# %% tags=["solution"]
-limit = cp.Parameter(len(x), nonneg=True, value=np.zeros(len(x)))
-y = cp.Variable(2 * len(x))
-cost = cp.quad_form(y, cp.psd_wrap(Q)) / 2 + q.ravel() @ y
-program = cp.Problem(cp.Minimize(cost), [y[::2] >= 0, cp.abs(y[1::2]) <= limit])
-for _ in range(12):
-    program.solve(solver=cp.CLARABEL)
-    limit.value = 0.4 * np.maximum(y.value[::2], 0)
-answer = y.value.reshape(-1, 2)
-
-# %%
-check("4.3", answer, InterfaceProblem(Q, q, 0.4))
+answer = ...  # 33 rows r_n, r_t [N]
+check("4.3", answer)
 
 # %% [markdown]
-# **4.4** Nitsche's energy is convex only if one matrix is positive definite on the free unknowns:
-# $K$ minus the matrix of the integral of $p(U)\,p(v) / \gamma$. Compute the smallest eigenvalue of
-# this matrix for $\gamma_0 = 0.1$ and for $\gamma_0 = 10$. Is it positive?
+# **4.4** (Think.) Nitsche's energy is convex only if one matrix is positive definite on the free
+# unknowns: $K$ minus the matrix of the integral of $p(U)\,p(v) / \gamma$. What is the smallest
+# $\gamma_0$ for which it is? (The matrix `fixed` above has the integral with its minus sign, for
+# $\gamma_0 = 10$.)
 
 # %% tags=["exercise"]
-answer = ...  # (True or False for 0.1, True or False for 10)
+answer = ...  # gamma_0 [-]
+check("4.4", answer)
 
-# %% tags=["solution"]
-at_ten = fixed[free][
-    :, free
-].toarray()  # it was assembled with gamma_0 = 10, and scales with 1 / gamma_0
-answer = tuple(bool(np.linalg.eigvalsh(K_free + at_ten * 10 / g)[0] > 0) for g in (0.1, 10.0))
+# %% [markdown]
+# **4.5** (Pen and paper.) An inner node stands on a spring of 3 N/mm. A second spring of 1.7 N/mm
+# joins it to the node that may touch the floor. Eliminate the inner node: how stiff is the other
+# one?
+
+# %% tags=["exercise"]
+answer = ...  # stiffness of the contact [N/mm]
+check("4.5", answer)
+
+# %% [markdown]
+# **4.6** (Pen and paper.) A body in three dimensions becomes 2.5 times as large, and its Young's
+# modulus 1.7 times as large. By which factor does $Q$ change?
+
+# %% tags=["exercise"]
+answer = ...  # factor of Q [-]
+check("4.6", answer)
+
+# %% [markdown]
+# **4.7** (Program.) A rigid beam stands on two points at $x = -1.2$ mm and $x = 2.1$ mm. A load of
+# 7 N presses it down at $x = 0.4$ mm. Write $V$ for the motion upwards and the rotation about $x =
+# 0$, and $s$. Find the two forces.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # forces of the left and of the right point [N]
+check("4.7", answer)
+
+# %% [markdown]
+# **4.8** (Think.) The block of exercise 4.2 carries 10 N at $e = 2.45$ mm, to the right of the
+# middle. No forces of the floor balance it. *Prove* it by a motion: each point rises by $a + \theta
+# x$, no corner ($x = \pm 2.3$ mm) goes into the floor, and the load does positive work. Why is this
+# a proof?
+
+# %% tags=["exercise"]
+answer = (..., ...)  # motion upwards [mm], rotation [-]
+check("4.8", answer)
 
 # %%
-check("4.4", answer, lambda given: tuple(given) == (False, True))
+table(4)
 
 # %% [markdown]
 # ## References

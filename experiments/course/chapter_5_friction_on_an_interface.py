@@ -9,14 +9,27 @@
 # You need chapters 2 and 4. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
 import time
 
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce, scenes, solve
-from contactopt.teaching import Slider, check
+from contactopt import (
+    InterfaceProblem,
+    diagnose,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+)
+from contactopt.teaching import Slider
+
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -49,22 +62,35 @@ ax.fill([0, 20, 20, 0], [0, 0, 40, 40], color="C0", alpha=0.25, lw=0)
 ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
 ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
 ax.plot([0, 20], [40.6, 40.6], "k", lw=4)
-ax.annotate("", (10, 42), (10, 54), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+ax.annotate(
+    "",
+    (10, 42),
+    (10, 54),
+    arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2},
+)
 ax.text(11.5, 47, "100 N", color="C3")
 for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
-    ax.annotate("", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"})
+    ax.annotate(
+        "", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"}
+    )
     ax.text(head[0] + 1, head[1] + 1, name)
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
 ax.text(3, 20, "block")
 ax.text(3, -14, "foundation")
-_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-26, 57))
+_ = ax.set(
+    xlabel="x [mm]",
+    ylabel="y [mm]",
+    aspect="equal",
+    xlim=(-2, 48),
+    ylim=(-26, 57),
+)
 
 # %% [markdown]
 # ## Primal and dual for a given bound
 #
 # First let the friction bound $g_i$ of every node be given. Then the solution is the minimum of an
 # energy. The *primal* problem has the displacements $u$ of the contact and the motion $\lambda$ of
-# the plate as its unknowns. With the stiffness $S = Q^{-1}$ it is
+# the plate as its unknowns. With the stiffness $S = Q^{-1}$ of the components that can move it is
 #
 # $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| . $$
 #
@@ -99,7 +125,11 @@ dual = cp.Problem(
 u, plate = cp.Variable(2 * k), cp.Variable(V.shape[1])
 S = np.linalg.inv(Q[np.ix_(moves, moves)])
 stretch = u - q - V @ plate
-energy = cp.quad_form(stretch[moves], cp.psd_wrap((S + S.T) / 2)) / 2 - s @ plate + g @ cp.abs(u[t])
+energy = (
+    cp.quad_form(stretch[moves], cp.psd_wrap((S + S.T) / 2)) / 2
+    - s @ plate
+    + g @ cp.abs(u[t])
+)
 primal = cp.Problem(cp.Minimize(energy), [u[n] >= 0, u[~moves] == q[~moves]])
 
 g.value = np.full(k, 0.5)
@@ -107,14 +137,16 @@ dual.solve(solver=cp.CLARABEL)
 primal.solve(solver=cp.CLARABEL)
 
 assert np.isclose(primal.value, -dual.value, rtol=1e-5)
-assert np.allclose(S @ (u.value - q - V @ plate.value)[moves], r.value[moves], atol=1e-2)
+assert np.allclose(
+    S @ (u.value - q - V @ plate.value)[moves], r.value[moves], atol=1e-2
+)
 
 # %% [markdown]
 # ## Method 1: Tresca's iteration
 #
 # Solve the dual for a bound $g$, set $g = \mu r_n$, and repeat. Each step is one quadratic program
-# (QP: a quadratic cost with linear constraints). The certificate falls by the same factor in every
-# step. It stops falling when it has reached the accuracy of the QP solver.
+# (QP: a quadratic cost with linear constraints). As soon as no node changes its state any more, the
+# certificate falls by about the same factor in every step. It stops falling when it has reached the accuracy of the QP solver.
 
 # %%
 g.value, road = np.zeros(k), []
@@ -145,7 +177,7 @@ def newton(rho=1.0, steps=20):
         pressed = np.maximum(r[n] - rho * u[n], 0) if step > 1 else np.ones(k)
         trial = r[t] - rho * u[t] if step > 1 else np.zeros(k)
         slips = (np.abs(trial) > mu * pressed) & (pressed > 0)
-        # rows of A r + B u = 0: one normal and one tangential equation for every node
+        # rows of A r + B u = 0: for every node a normal and a tangential one
         A, B = np.zeros((2 * k, 2 * k)), np.zeros((2 * k, 2 * k))
         for i in range(k):
             if pressed[i] == 0:
@@ -155,24 +187,32 @@ def newton(rho=1.0, steps=20):
                 A[2 * i + 1, 2 * i] = -mu * np.sign(trial[i])
             else:
                 B[2 * i, 2 * i] = B[2 * i + 1, 2 * i + 1] = 1
-        B[~moves], A[~moves] = 0, np.eye(2 * k)[~moves]  # no friction on the axis of symmetry
-        system = np.block([[A + B @ Q, B @ V], [V.T, np.zeros((V.shape[1],) * 2)]])
-        r, lam = np.split(np.linalg.solve(system, -np.concatenate([B @ q, s])), [2 * k])
+        B[~moves], A[~moves] = (
+            0,
+            np.eye(2 * k)[~moves],
+        )  # no friction on the axis of symmetry
+        system = np.block(
+            [[A + B @ Q, B @ V], [V.T, np.zeros((V.shape[1],) * 2)]]
+        )
+        r, lam = np.split(
+            np.linalg.solve(system, -np.concatenate([B @ q, s])), [2 * k]
+        )
         if natural_map_residual(problem, r.reshape(-1, 2), lam) < 1e-12:
             return r, step
     return r, steps
 
 
 forces, steps = newton()
-print(
-    f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces.reshape(-1, 2)):.0e}"
-)
+certificate = natural_map_residual(problem, forces.reshape(-1, 2))
+print(f"Newton: {steps} steps, certificate {certificate:.0e}")
 
-assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8)
+assert steps < 20 and np.allclose(
+    forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8
+)
 
 # %% [markdown]
 # Once the states are right, the next step is exact. Therefore Newton's method ends with an error of
-# the size of rounding. Tresca's iteration does not.
+# the size of rounding. Tresca's iteration comes closer step by step, as far as its QP solver allows.
 #
 # ## Method 3: a cone program with a shift
 #
@@ -189,8 +229,8 @@ assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ra
 # the contact force of the last iteration to the force of the spring. By repetition it removes the
 # error, although $\kappa$ is moderate.
 #
-# Now we compare five methods. Each is asked for a small certificate and for smaller and smaller
-# ones.
+# Now we compare five methods. Each is asked for a certificate of $10^{-2}$, and then for smaller and
+# smaller ones.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -231,7 +271,13 @@ def with_friction(coefficient):
     answer = solve(InterfaceProblem(Q, problem.q, coefficient, V, s))
     pressure, shear = (answer.reactions / problem.areas[:, None]).T
     fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
-    ax.plot(problem.coordinates[0], coefficient * pressure, "k--", lw=1, label=r"$\mu\, p$")
+    ax.plot(
+        problem.coordinates[0],
+        coefficient * pressure,
+        "k--",
+        lw=1,
+        label=r"$\mu\, p$",
+    )
     ax.plot(problem.coordinates[0], -shear, "C1.-", label="friction, inwards")
     ax.set(
         xlabel="x [mm]",
@@ -243,7 +289,9 @@ def with_friction(coefficient):
     return fig
 
 
-Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3)
+Slider(
+    "friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3
+)
 
 # %% [markdown]
 # Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the
@@ -271,85 +319,113 @@ motions = np.array(
 )  # both runners move up, or sideways
 pulled = np.array([-100.0, 25.0])  # N: the load in these two motions
 for coefficient in (0.2, 0.3):
-    sledge = InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), coefficient, motions, pulled)
+    sledge = InterfaceProblem(
+        np.zeros((4, 4)), np.zeros((2, 2)), coefficient, motions, pulled
+    )
     print(f"mu = {coefficient}: {solve(sledge).status}")
 
 assert (
-    str(solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled)).status)
+    str(
+        solve(
+            InterfaceProblem(
+                np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled
+            )
+        ).status
+    )
     == "infeasible"
 )
-assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, pulled)).solved
+assert solve(
+    InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, pulled)
+).solved
 
 # %% [markdown]
 # ## Exercises
 #
-# **5.1** (Pen and paper.) What is the smallest friction coefficient with which the sledge stands
-# still?
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("5.1")` gives a hint, three times, and then the solution. `table(5)` shows what
+# you have done since the notebook was started.
+#
+# **5.1** (Pen and paper.) A sledge is pressed down with 130 N and pulled with 23 N. What is the
+# smallest friction coefficient with which it stands still?
 
 # %% tags=["exercise"]
-answer = ...
-
-# %% [markdown] tags=["solution"]
-# Together the two runners carry 100 N, so friction can hold $100 \mu$ N. It has to hold 25 N. Hence
-# $\mu = 0.25$.
-
-# %% tags=["solution"]
-answer = 0.25
-
-# %%
-check("5.1", answer, 0.25)
+answer = ...  # friction coefficient [-]
+check("5.1", answer)
 
 # %% [markdown]
-# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the
-# back runner 20 N. The front runner stands on ice, with $\mu = 0.05$. The back runner stands on
-# stone, with $\mu = 0.5$. Write a linear program for the largest pull that the sledge withstands.
+# **5.2** (Pen and paper.) The load of a sledge stands far in front, so that the front runner
+# carries 82 N and the back runner 21 N. The front runner stands on ice, with $\mu = 0.06$. The back
+# runner stands on stone, with $\mu = 0.45$. What is the largest pull that the sledge withstands?
 
 # %% tags=["exercise"]
-answer = ...  # N
-
-# %% [markdown] tags=["solution"]
-# By hand: $0.05 \cdot 80 + 0.5 \cdot 20 = 14$ N.
-
-# %% tags=["solution"]
-pull, friction = cp.Variable(), cp.Variable(2)
-limits = np.array([0.05 * 80, 0.5 * 20])
-cp.Problem(cp.Maximize(pull), [cp.abs(friction) <= limits, pull == cp.sum(friction)]).solve(
-    solver=cp.CLARABEL
-)
-answer = float(pull.value)
-
-# %%
-check("5.2", answer, 14.0)
+answer = ...  # largest pull [N]
+check("5.2", answer)
 
 # %% [markdown]
-# **5.3** How many nodes of the block slip if $\mu = 0.2$? Count them in the answer of Newton's
-# method, `forces`.
+# **5.3** (Program.) How many nodes of the block slip if $\mu = 0.2$, and how many if $\mu = 0.1$?
 
 # %% tags=["exercise"]
-answer = ...
-
-# %% tags=["solution"]
-answer = int(np.sum((np.abs(forces[t]) > mu * forces[n] * (1 - 1e-9)) & (forces[n] > 0)))
-
-# %%
-check("5.3", answer, diagnose(problem, solve(problem)).local.slip)
+answer = (..., ...)  # slipping nodes with mu = 0.2, with mu = 0.1
+check("5.3", answer)
 
 # %% [markdown]
-# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to
-# the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for every step,
-# with the certificate as `"residual"`.) The cell below compares your factor with the one that
+# **5.4** (Program.) Measure the factor by which the certificate of Tresca's iteration falls from
+# one step to the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for
+# every step, with the certificate as `"residual"`.) Your factor is compared with the one that
 # `diagnose` predicts.
 
 # %% tags=["exercise"]
-answer = ...
+answer = ...  # factor in one step [-]
+check("5.4", answer)
 
-# %% tags=["solution"]
-history = [entry["residual"] for entry in solve(problem, "tresca", tol=1e-13).history]
-answer = (history[8] / history[4]) ** (1 / 4)
+# %% [markdown]
+# **5.5** (Pen and paper.) Newton's method above looks at $y = r - \rho u$. The map of Alart and
+# Curnier is $P = ([y_n]_+,$ the point of $|p_t| \le \mu [y_n]_+$ nearest to $y_t)$; at a solution
+# $r = P$. Compute $P$ for $r = (2.3, -1.5)$ N, $u = (0.1, 0.3)$ mm, $\rho = 2$ N/mm and $\mu =
+# 0.4$.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # normal component, tangential component [N]
+check("5.5", answer)
+
+# %% [markdown]
+# **5.6** (Think.) The map of De Saxcé projects $y = r - \rho\,(u + \mu |u_t|\, n)$ on the cone
+# $|p_t| \le \mu p_n$. Compute it for the numbers of exercise 5.5.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # normal component, tangential component [N]
+check("5.6", answer)
+
+# %% [markdown]
+# **5.7** (Program.) Find the forces of the block for $\mu = 0.35$ with a method of your own choice,
+# but not with `solve`. The certificate grades them.
+
+# %% tags=["exercise"]
+answer = ...  # 25 rows r_n, r_t [N]
+check("5.7", answer)
+
+# %% [markdown]
+# **5.8** (Think.) A sledge on two runners is pressed down with 110 N and pulled along with 31 N.
+# With $\mu = 0.26$ it slides. *Prove* it by a motion $(a, b)$, upwards and along the pull: no force
+# of the friction cones does negative work on it, and the load does positive work.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # up, along [-]
+check("5.8", answer)
+
+# %% [markdown]
+# **5.9** (Think.) Coulomb's law in the plane is a *linear complementarity problem* (LCP). With $r_t
+# = r_+ - r_-$ and $\sigma = |u_t|$, the unknowns $r_n, r_+, r_-, \sigma$ and the numbers $u_n,\;
+# u_t + \sigma,\; \sigma - u_t,\; \mu r_n - r_+ - r_-$ are not negative, and the product of each
+# pair is zero. Solve the LCP of the node of chapter 2, $Q = \begin{pmatrix} 1 & -1 \\ -1 & 2
+# \end{pmatrix}$ mm/N and $q = (-3, 5)$ mm, for $\mu = 0.6$.
+
+# %% tags=["exercise"]
+answer = (..., ..., ..., ...)  # r_n [N], r_plus [N], r_minus [N], sigma [mm]
+check("5.9", answer)
 
 # %%
-predicted = diagnose(problem, solve(problem)).local.tresca_rate
-check("5.4", answer, lambda rate: abs(rate / predicted - 1) < 0.05)
+table(5)
 
 # %% [markdown]
 # ## References

@@ -8,13 +8,28 @@
 # You need chapter 2. The chapter takes 50 minutes with its exercises.
 
 # %%
+import sys
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, Material, Part, Scene, Support, laws, models, reduce
+from contactopt import (
+    InterfaceProblem,
+    Material,
+    Part,
+    Scene,
+    Support,
+    laws,
+    models,
+    reduce,
+)
 from contactopt.meshes.structured import tensor_mesh
-from contactopt.teaching import check
+
+sys.path.extend(
+    [".", "../.."]
+)  # the folder of the repository, where the exercises are
+from experiments.course.grader import check, hint, table
 
 # %% [markdown]
 # ## The mechanical system
@@ -75,7 +90,8 @@ for program in (forces, displacements):
     print(program)
 r, u = forces.variables["r"].value, displacements.variables["u"].value
 print("forces", np.round(r, 4), "N; displacements", np.round(u, 4), "mm")
-print(f"P = {displacements.problem.value:.5f}, D = {-forces.problem.value:.5f} N mm")
+P, D = displacements.problem.value, -forces.problem.value
+print(f"P = {P:.5f}, D = {D:.5f} N mm")
 
 assert np.isclose(displacements.problem.value, -forces.problem.value, atol=1e-5)
 assert np.allclose(displacements.multipliers["reaction"], r, atol=1e-4)
@@ -98,8 +114,18 @@ for tail, head, name, color in (
     ((u[1] - 0.12, 0.1), (u[1] - 0.12 + 0.7 * r[1], 0.1), "$r_t$", "C1"),
     ((0, 0.6), (u[1], 0.6), "$u_t$", "C0"),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
-    ax.text((tail[0] + head[0]) / 2 + 0.08, (tail[1] + head[1]) / 2 + 0.1, name, color=color)
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
+    ax.text(
+        (tail[0] + head[0]) / 2 + 0.08,
+        (tail[1] + head[1]) / 2 + 0.1,
+        name,
+        color=color,
+    )
 ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.85, 0.95), aspect="equal")
 _ = ax.axis("off")
 
@@ -131,13 +157,18 @@ _ = ax.axis("off")
 
 # %%
 axis = np.linspace(0, 1, 9)
-sides = {"low": lambda x: x[1] == x[1].min(), "high": lambda x: x[1] == x[1].max()}
+sides = {
+    "low": lambda x: x[1] == x[1].min(),
+    "high": lambda x: x[1] == x[1].max(),
+}
 upper = tensor_mesh(axis, axis).with_boundaries(sides)
 lower = tensor_mesh(axis, axis - 1).with_boundaries(sides)
 pressed = (Support("high", {"x": 0.01, "y": -0.02}),)
 blocks = (
     Part("upper", upper, Material(5.0, 0.3), pressed, contact="low"),
-    Part("lower", lower, Material(50.0, 0.3), (Support("low"),), contact="high"),
+    Part(
+        "lower", lower, Material(50.0, 0.3), (Support("low"),), contact="high"
+    ),
 )
 pair = reduce(Scene("two blocks", *blocks, mu=0.3))
 C, start, bound = pair.Q, pair.q.ravel(), 2e-3  # N per node
@@ -154,7 +185,10 @@ def admissible(force):
 def parts_of_the_gap(force):
     moved = (C @ force + start).reshape(-1, 2)
     moved[:, 0] = np.maximum(moved[:, 0], 0)
-    stretch, (f_n, f_t) = moved.ravel() - start - C @ force, force.reshape(-1, 2).T
+    stretch, (f_n, f_t) = (
+        moved.ravel() - start - C @ force,
+        force.reshape(-1, 2).T,
+    )
     friction = bound * np.abs(moved[:, 1]) + f_t * moved[:, 1]
     return stretch @ stiffness @ stretch / 2, f_n @ moved[:, 0], friction.sum()
 
@@ -169,9 +203,11 @@ for _ in range(150):
     errors.append((force - best) @ C @ (force - best) / 2)
     force = admissible(force - (C @ force + start) / np.linalg.norm(C, 2))
 gap = np.sum(gaps, axis=1)
-print(f"after {len(gap)} steps: gap {gap[-1]:.1e} N mm, error {errors[-1]:.1e} N mm")
+print(f"{len(gap)} steps: gap {gap[-1]:.1e} N mm, error {errors[-1]:.1e} N mm")
 
-assert np.all(np.array(gaps) >= -1e-12) and np.all(gap >= np.array(errors) - 1e-10)
+assert np.all(np.array(gaps) >= -1e-12) and np.all(
+    gap >= np.array(errors) - 1e-10
+)
 assert gap[-1] < 0.02 * gap[0]
 
 # %% tags=["hide-input"]
@@ -180,9 +216,17 @@ ax.semilogy(gap, "k", lw=2)
 ax.semilogy(errors, "C3--")
 ax.text(75, 3e-6, "gap, mostly of contact")
 ax.text(100, 2.5e-8, "error", color="C3")
-for name, values, at in zip(("springs", "", "friction"), np.transpose(gaps), (95, 0, 140)):
+for name, values, at in zip(
+    ("springs", "", "friction"), np.transpose(gaps), (95, 0, 140)
+):
     ax.semilogy(np.maximum(values, 1e-12), lw=1, color="0.6")
-    ax.annotate(name, (at, values[at]), (-30, -20), textcoords="offset points", color="0.4")
+    ax.annotate(
+        name,
+        (at, values[at]),
+        (-30, -20),
+        textcoords="offset points",
+        color="0.4",
+    )
 ax.set(xlabel="step [-]", ylabel="energy [N mm]", ylim=(1e-9, None))
 _ = ax.margins(x=0)
 
@@ -206,10 +250,14 @@ _ = ax.margins(x=0)
 for way in (1.0, 10.0, 100.0, 1000.0):
     z = cp.Variable(3)
     at = z + np.array([way, -way, 1.0])
-    missing = cp.Problem(cp.Minimize(cp.sum_squares(z) / 2), [at[0] >= cp.norm(at[1:])])
+    missing = cp.Problem(
+        cp.Minimize(cp.sum_squares(z) / 2), [at[0] >= cp.norm(at[1:])]
+    )
     missing.solve(solver=cp.CLARABEL)
     print(f"lambda {way:6g} mm: energy {missing.value:.2e} N mm")
-    assert np.isclose(missing.value, (np.hypot(way, 1) - way) ** 2 / 4, rtol=0.1)
+    assert np.isclose(
+        missing.value, (np.hypot(way, 1) - way) ** 2 / 4, rtol=0.1
+    )
 
 # %% [markdown]
 # With a positive definite $Q$ and *without* rigid motions this cannot happen. Nothing restricts the
@@ -238,78 +286,87 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 #
 # ## Exercises
 #
-# **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4$ N/mm replaces the floor: it costs
+# Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
+# mechanics. `hint("7.1")` gives a hint, three times, and then the solution. `table(7)` shows what
+# you have done since the notebook was started.
+#
+# **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4.3$ N/mm replaces the floor: it costs
 # $f(u_n) = \tfrac12 \kappa \max(-u_n, 0)^2$. Its conjugate enters the dual problem as $f^*(-r_n)$.
-# What is $f^*(-r_n)$ for $r_n = 3$ N, in N mm?
+# What is $f^*(-r_n)$ for $r_n = 2.9$ N?
 
 # %% tags=["exercise"]
-answer = ...  # [N mm]
-
-# %% [markdown] tags=["solution"]
-# $f^*(-r_n) = \sup_u\,(-r_n u - \tfrac12 \kappa \max(-u, 0)^2)$. The supremum is at $u = -r_n /
-# \kappa$, and its value is $r_n^2 / (2 \kappa) = 9 / 8$. For $\kappa \to \infty$ it vanishes, and
-# what remains is $r_n \ge 0$.
-
-# %% tags=["solution"]
-answer = 9 / 8
-
-# %%
-check("7.1", answer, 9 / 8)
+answer = ...  # value of the conjugate [N mm]
+check("7.1", answer)
 
 # %% [markdown]
-# **7.2** (Pen and paper.) Someone proposes $r = (2, -1)$ N for the node of this chapter, $g = 1$ N.
-# Give $-D(r)$ in N mm, and decide with $u = Qr + q$ whether $r$ is the solution: 1 if it is, 0 if
-# not.
+# **7.2** (Program.) Give the three parts of the gap for the node of this chapter, $u = (0.1, 1.7)$
+# mm, $r = (2, -0.6)$ N and $g = 1$ N. Their sum is $P(u) - D(r)$.
 
 # %% tags=["exercise"]
-answer = ...  # (-D in N mm, 1 or 0)
-
-# %% [markdown] tags=["solution"]
-# $Qr = (3, -4)$, so that $-D = \tfrac12 r'Qr + q'r = \tfrac12 (6 + 4) + (-6 - 5) = -6$. Then $u = Qr
-# + q = (0, 1)$. All parts of the gap are zero: springs by construction, $r_n u_n = 0$, and $g|u_t| +
-# r_t u_t = 1 - 1$.
-
-# %% tags=["solution"]
-answer = (-6.0, 1)
-
-# %%
-check("7.2", answer, (-6.0, 1.0))
+answer = (..., ..., ...)  # springs, contact, friction [N mm]
+check("7.2", answer)
 
 # %% [markdown]
-# **7.3** Without solving anything: by how much may the energy of the springs, of the floor and of
-# friction still fall below that of $u = (0, 2)$ mm, if all you know is the admissible force $r =
-# (2, -0.5)$ N? Give $P(u) - D(r)$ in N mm.
+# **7.3** (Pen and paper.) By how much, at most, can the energy $P$ still fall below that of $u =
+# (0, 2.1)$ mm, if all you know is the admissible force $r = (2.1, -0.4)$ N?
 
 # %% tags=["exercise"]
-answer = ...  # [N mm]
-
-# %% tags=["solution"]
-tried, known = np.array([0.0, 2.0]), np.array([2.0, -0.5])
-energy = (tried - q) @ K @ (tried - q) / 2 + g * abs(tried[1])
-answer = energy + known @ Q @ known / 2 + q @ known
-
-# %%
-check("7.3", answer, 1.25)
+answer = ...  # bound [N mm]
+check("7.3", answer)
 
 # %% [markdown]
-# **7.4** Write the dual of Tresca's program for a floor that pulls, too: $u_n = 0$ instead of $u_n
-# \ge 0$, with $q = (1, 5)$ mm and $g = 1$ N. Give its forces.
+# **7.4** (Program.) Write the dual of Tresca's program for a floor that pulls, too: $u_n = 0$
+# instead of $u_n \ge 0$, with $q = (1, 5.2)$ mm and $g = 1.1$ N. Give its forces.
 
 # %% tags=["exercise"]
-answer = ...  # (r_n, r_t) in N
+answer = (..., ...)  # r_n, r_t [N]
+check("7.4", answer)
 
-# %% [markdown] tags=["solution"]
-# In $u_n = 0$ the term $r_n u_n$ is zero for every $r_n$. So the dual loses its constraint $r_n \ge
-# 0$, and the force may pull.
+# %% [markdown]
+# **7.5** (Program.) How large is the derivative of the minimum of $P$ by the friction bound $g$, at
+# $g = 0.83$ N? Which multiplier is it?
 
-# %% tags=["solution"]
-x = cp.Variable(2)
-cost = cp.quad_form(x, cp.psd_wrap(Q)) / 2 + np.array([1.0, 5.0]) @ x
-cp.Problem(cp.Minimize(cost), [cp.abs(x[1]) <= 1]).solve(solver=cp.CLARABEL)
-answer = x.value
+# %% tags=["exercise"]
+answer = ...  # derivative [mm]
+check("7.5", answer)
+
+# %% [markdown]
+# **7.6** (Program.) Find forces for the node of this chapter ($g = 1$ N) that are *not* the
+# solution, but whose gap with $u = (0, 1)$ mm is below 0.01 N mm. By the error bound they are near
+# the solution.
+
+# %% tags=["exercise"]
+answer = (..., ...)  # r_n, r_t [N]
+check("7.6", answer)
+
+# %% [markdown]
+# **7.7** (Pen and paper.) The displacements of associated friction lie in the *dual cone* of the
+# forces: no force with $|r_t| \le \mu r_n$ does negative work on them. How large must $u_n$ be at
+# least, if $u_t = 1.3$ mm and $\mu = 0.35$?
+
+# %% tags=["exercise"]
+answer = ...  # smallest gap [mm]
+check("7.7", answer)
+
+# %% [markdown]
+# **7.8** (Program.) Take the node on the rail with $q = (0, 0, 1.4)$ mm. How large is the energy
+# that is needed at $\lambda = 17.3$ mm?
+
+# %% tags=["exercise"]
+answer = ...  # energy [N mm]
+check("7.8", answer)
+
+# %% [markdown]
+# **7.9** (Think.) Grooves make friction depend on its direction: slip costs $f(v) = \sqrt{(1.2\,
+# v_1)^2 + (0.5\, v_2)^2}$. Where its conjugate is zero, the forces are admissible. How large is the
+# largest friction force in the direction $(1, 1) / \sqrt 2$?
+
+# %% tags=["exercise"]
+answer = ...  # largest friction force [N]
+check("7.9", answer)
 
 # %%
-check("7.4", answer, (-2.0, -1.0))
+table(7)
 
 # %% [markdown]
 # ## References

@@ -15,4 +15,6 @@ for pull in pulls:
     most.append(cp.Problem(cp.Maximize(t[0]), laws).solve(solver="CLARABEL"))
 assert np.allclose(most, np.minimum(mu * 6, (pulls + mu * 10) / 2), atol=1e-5)
 plt.plot(pulls, most, "o-")
-plt.gca().set(xlabel="pull on all three [N]", ylabel="most that the first carries [N]")
+plt.gca().set(
+    xlabel="pull on all three [N]", ylabel="most that the first carries [N]"
+)

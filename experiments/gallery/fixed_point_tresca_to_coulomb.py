@@ -9,7 +9,10 @@ import numpy as np
 
 from contactopt import InterfaceProblem, models, solve
 
-problem, bounds = InterfaceProblem([[2.0, 0.5], [0.5, 1.0]], [[-1.0, -2.0]], 0.4), [np.zeros(1)]
+problem, bounds = (
+    InterfaceProblem([[2.0, 0.5], [0.5, 1.0]], [[-1.0, -2.0]], 0.4),
+    [np.zeros(1)],
+)
 program = models.tresca(problem)
 for _ in range(12):
     program.parameters["g"].value = bounds[-1]

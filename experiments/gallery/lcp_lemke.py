@@ -10,7 +10,10 @@ from contactopt import reduce, scenes, solve
 
 problem = reduce(scenes.flat_punch(elements=8, mu=0.3))
 pivots, newton = solve(problem, "lemke"), solve(problem, "newton")
-assert abs(pivots.reactions - newton.reactions).max() < 1e-6 * newton.reactions.max()
+assert (
+    abs(pivots.reactions - newton.reactions).max()
+    < 1e-6 * newton.reactions.max()
+)
 plt.plot(problem.coordinates[0], pivots.reactions[:, 1], "o", label="Lemke")
 plt.plot(problem.coordinates[0], newton.reactions[:, 1], "x", label="Newton")
 plt.gca().set(xlabel="x [mm]", ylabel="friction force $r_t$ [N]")

@@ -12,8 +12,14 @@ from contactopt import InterfaceProblem, all_solutions, diagnose
 Q = np.linalg.inv([[4.0, -1.5], [-1.5, 1.0]])
 threshold = diagnose(InterfaceProblem(Q, [[0.0, 0.0]], 1.0)).guaranteed.unique
 mus, pushes = np.linspace(0.1, 1.9, 10) * threshold, np.linspace(0, 3, 61)
-count = lambda mu, push: len(all_solutions(InterfaceProblem(Q, [Q @ [-1.0, push]], mu)))  # noqa: E731
+count = lambda mu, push: len(
+    all_solutions(InterfaceProblem(Q, [Q @ [-1.0, push]], mu))
+)
 most = np.array([max(count(mu, push) for push in pushes) for mu in mus])
-assert abs(threshold - Q[0, 0] / Q[0, 1]) < 1e-9 and np.array_equal(most > 1, mus > threshold)
+assert abs(threshold - Q[0, 0] / Q[0, 1]) < 1e-9 and np.array_equal(
+    most > 1, mus > threshold
+)
 plt.plot(mus / threshold, most, "o")
-plt.gca().set(xlabel=r"$\mu$ / threshold [-]", ylabel="most solutions of one load [-]")
+plt.gca().set(
+    xlabel=r"$\mu$ / threshold [-]", ylabel="most solutions of one load [-]"
+)

@@ -12,7 +12,11 @@ from contactopt import InterfaceProblem, all_solutions
 Q = np.linalg.inv([[4.0, -1.5], [-1.5, 1.0]])
 counts, pushes = [], np.linspace(-2, 4, 25)
 for push in pushes:
-    counts.append(len(all_solutions(InterfaceProblem(Q, [Q @ [-1.0, push]], 3.5))))
+    counts.append(
+        len(all_solutions(InterfaceProblem(Q, [Q @ [-1.0, push]], 3.5)))
+    )
 assert max(counts) == 3 and min(counts) == 1
 plt.step(pushes, counts, where="mid")
-plt.gca().set(xlabel="push [N]", ylabel="number of solutions [-]", yticks=[0, 1, 2, 3])
+plt.gca().set(
+    xlabel="push [N]", ylabel="number of solutions [-]", yticks=[0, 1, 2, 3]
+)

@@ -9,7 +9,9 @@ import numpy as np
 
 from contactopt import InterfaceProblem, models
 
-problem = InterfaceProblem(np.eye(8) + 0.4, np.outer([-2, -1, 1, 2], [1.0, 0]), 0.0)
+problem = InterfaceProblem(
+    np.eye(8) + 0.4, np.outer([-2, -1, 1, 2], [1.0, 0]), 0.0
+)
 for name in ("normal", "bilateral"):
     program = getattr(models, name)(problem)
     program.problem.solve(solver="CLARABEL")

@@ -14,6 +14,8 @@ bounds, slip = np.linspace(0, 3, 13), []
 for program.parameters["g"].value in bounds[:, None]:
     program.problem.solve(solver="CLARABEL")
     slip.append(program.multipliers["slip"][0, 0])
-assert program.problem.is_dpp() and np.allclose(slip, -np.maximum(2 - bounds, 0), atol=1e-4)
+assert program.problem.is_dpp() and np.allclose(
+    slip, -np.maximum(2 - bounds, 0), atol=1e-4
+)
 plt.plot(bounds, slip, "o-")
 plt.gca().set(xlabel="friction bound $g$ [N]", ylabel="slip $u_t$ [mm]")

@@ -17,4 +17,6 @@ for kappa in stiffness:
     depth.append(-program.multipliers["gap"][0])
 assert np.allclose(depth, 1 / (1 + stiffness), atol=1e-6)
 plt.loglog(stiffness, depth, "o-")
-plt.gca().set(xlabel=r"penalty stiffness $\kappa$ [N/mm]", ylabel="overlap [mm]")
+plt.gca().set(
+    xlabel=r"penalty stiffness $\kappa$ [N/mm]", ylabel="overlap [mm]"
+)

@@ -13,7 +13,9 @@ gaps = {}
 for solver in ("OSQP", "CLARABEL", "SCS"):
     dual, primal = models.tresca(problem), models.tresca(problem, form="primal")
     dual.parameters["g"].value = primal.parameters["g"].value = [0.2]
-    gaps[solver] = abs(dual.problem.solve(solver) + primal.problem.solve(solver="CLARABEL"))
+    gaps[solver] = abs(
+        dual.problem.solve(solver) + primal.problem.solve(solver="CLARABEL")
+    )
 assert max(gaps.values()) < 1e-2
 plt.bar(list(gaps), [max(gap, 1e-16) for gap in gaps.values()], log=True)
 plt.gca().set(xlabel="solver", ylabel="duality gap [N mm]")

@@ -7,16 +7,21 @@ and VS Code open from the same file. MathJax comes with sphinx-mathjax-offline: 
 from elsewhere, neither when they are built nor when they are read.
 """
 
+import os
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parent))
 import docstrings
 import generate
+import lectures
 import museum
 
 import contactopt
 
+# the chapters, which run in processes of their own, import the exercises of the course
+os.environ["PYTHONPATH"] = os.pathsep.join([sys.path[1], os.environ.get("PYTHONPATH", "")])
 project, author = "contactopt", "The contactopt developers"
 copyright = author
 version = release = contactopt.__version__
@@ -29,12 +34,14 @@ exclude_patterns = [
     "performance.md",
     "course.md",
     "museum.md",
+    "lecturers.md",
     "museum/*",
     "generated/notebooks",
     "**/__pycache__",
 ]
 html_theme, html_title = "furo", f"contactopt {version}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
+html_search_scorer = str(Path(__file__).parent / "search.js")
 html_show_sourcelink, html_copy_source = False, False
 
 myst_enable_extensions = ["dollarmath", "amsmath"]
@@ -48,6 +55,13 @@ nb_execution_raise_on_error, nb_execution_in_temp, nb_merge_streams = True, True
 autodoc_member_order, autodoc_typehints = "bysource", "signature"
 autodoc_default_options = {"members": True}
 maximum_signature_line_length = 100
+
+
+def write_lectures(app, error):
+    """Write the slides, from the notebooks that MyST-NB has executed."""
+    notebooks = Path(app.outdir).parent / "jupyter_execute" / "generated"
+    if error is None:
+        lectures.write(notebooks, Path(app.outdir) / "lectures")
 
 
 def setup(app):
@@ -65,4 +79,5 @@ def setup(app):
     )
     app.connect("builder-inited", lambda app: generate.write_pages(Path(app.srcdir)))
     app.connect("build-finished", lambda app, error: museum.write(Path(app.outdir) / "museum"))
+    app.connect("build-finished", write_lectures)
     return {"parallel_read_safe": True}

@@ -15,11 +15,13 @@ from functools import partial
 from pathlib import Path
 
 import jupytext
+import lectures
 import museum
 import reference
 from reference import contents, index
 
 import contactopt.cli
+from experiments.course.nbgrader import solved
 
 ROOT = Path(__file__).parents[2]
 # the order in which a course would take them
@@ -42,6 +44,7 @@ ACCURACY = (
     "facing_surfaces",
     "load_cycle",
     "calculix",
+    "second_reading",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
@@ -77,6 +80,7 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     yield from notebook("gallery", "gallery", gallery())
     yield from course(site)
     yield Path("museum.md"), museum.index(site)
+    yield Path("lecturers.md"), lectures.index(site)
     yield from reference.plug_in_pages(site)
     yield Path("command_line.md"), command_line()
     yield from reference.room_pages(ROOT)
@@ -161,21 +165,13 @@ def course(site: Path) -> Iterator[tuple[Path, str]]:
         for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))
     }
     for name, text in chapters.items():
-        yield from notebook("course", name, without_cells(text, "solution"))
-        solved = re.sub(
-            r"^# # (Chapter \d)", r"# # Solutions: \1", without_cells(text, "exercise"), flags=re.M
-        )
-        yield from notebook("course", f"solutions_{name}", solved, PYTHON)
+        yield from notebook("course", name, text)
+        answers = re.sub(r"^# # (Chapter \d)", r"# # Solutions: \1", solved(text), flags=re.M)
+        yield from notebook("course", f"solutions_{name}", answers, PYTHON)
     pages = [f"course/{name}" for name in chapters] + [
         f"course/solutions_{name}" for name in chapters
     ]
     yield Path("course.md"), (site / "course.md").read_text() + contents(pages, hidden=False)
-
-
-def without_cells(text: str, tag: str) -> str:
-    """A percent script without the cells that have this tag."""
-    cells = re.split(r"^(?=# %%)", text, flags=re.M)
-    return "".join(cell for cell in cells if cell and f'tags=["{tag}"]' not in cell.splitlines()[0])
 
 
 def command_line() -> str:

@@ -82,7 +82,7 @@ def room_pages(root: Path) -> Pages:
         ("room", "what it is for"),
         [(f"[{name}](api/{name}.md)", purpose[name]) for name in names],
     )
-    text = f"{exported_names()}\n## The rooms\n\n{ROOMS_TEXT}\n{listed}"
+    text = f"{exported_names(names, purpose)}\n## The rooms\n\n{ROOMS_TEXT}\n{listed}"
     yield Path("api.md"), index("Reference", text, [f"api/{name}" for name in names], hidden=True)
 
 
@@ -95,7 +95,9 @@ checks this.
 def room_page(room: str, purpose: str) -> str:
     """All public names of the modules of a room, from their docstrings."""
     parts = []
-    for name in modules(f"contactopt.{room}"):
+    homes = [home(getattr(contactopt, name)) for name in contactopt.__all__ if name[0].isupper()]
+    # what users hold in their hands comes first
+    for name in sorted(modules(f"contactopt.{room}"), key=lambda name: name not in homes):
         # A package exports names of its modules, which are described where they stand and not a
         # second time.
         parts.append(
@@ -124,15 +126,28 @@ def worth_a_section(name: str) -> bool:
     return bool(module.__doc__) or any(getattr(thing, "__module__", None) == name for thing in own)
 
 
-def exported_names() -> str:
-    """The names that `contactopt` exports, each with the first sentence about it."""
-    rows = []
+def home(thing: Any) -> str:
+    """The module in which something is described."""
+    return thing.__name__ if inspect.ismodule(thing) else thing.__module__
+
+
+def exported_names(names: list[str], purpose: dict[str, str]) -> str:
+    """The names that `contactopt` exports by rooms, the interface problem first, each with the
+    first sentence about it.
+    """
+    rows: dict[str, list[tuple[str, ...]]] = {}
     for name in contactopt.__all__:
         thing = getattr(contactopt, name)
-        home = thing.__name__ if inspect.ismodule(thing) else thing.__module__
+        room = home(thing).split(".")[1]
         first = (inspect.getdoc(thing) or "").split("\n\n")[0].replace("\n", " ")
-        rows.append((f"[{name}](api/{home.split('.')[1]}.md)", re.split(r"(?<=[.:]) ", first)[0]))
-    return "What `import contactopt` offers:\n\n" + table(("name", "what it is"), rows)
+        sentence = re.split(r"(?<=[.:]) ", first)[0].rstrip(":.") + "."
+        rows.setdefault(room, []).append((f"[{name}](api/{room}.md)", sentence))
+    order = sorted(rows, key=lambda room: (room != "problem", room == "errors", names.index(room)))
+    parts = [
+        f"### {room}\n\n{purpose[room]}\n\n" + table(("name", "what it is"), rows[room])
+        for room in order
+    ]
+    return "## What `import contactopt` offers\n\n" + "\n".join(parts)
 
 
 # --- the tables of plug-ins ---

@@ -50,7 +50,12 @@ for tail, head, name, color, at in (
     ((2.4, 0), (2.4, 0.8), "$n$", "k", (2.48, 0.7)),
     ((2.4, 0), (3.2, 0), "$t$", "k", (3.1, 0.1)),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
     ax.text(*at, name, color=color, fontsize=12)
 ax.plot([-0.7, 0.7], [0, 0], "C3", lw=4)
 ax.text(0, -0.35, "contact, $-a < x < a$", color="C3", ha="center")
@@ -60,12 +65,15 @@ _ = ax.axis("off")
 
 # %%
 mu, P, T_most, D = 0.5, 100.0, 40.0, 400.0
-states = scenes.shear_cycle(2, steps=8, mu=mu, force=P, shear=T_most, depth=D, elements=32)
+states = scenes.shear_cycle(
+    2, steps=8, mu=mu, force=P, shear=T_most, depth=D, elements=32
+)
 path = follow(states)
 history, problem = path.history, path.reduction.problem
 T, shift = history["shear_force"], history["shift"]
 print(
-    f"{len(path.states)} states, {problem.contacts} contacts, largest certificate {history['residual'].max():.0e}"
+    f"{len(path.states)} states, {problem.contacts} contacts,"
+    f" largest certificate {history['residual'].max():.0e}"
 )
 
 assert path.solved
@@ -91,7 +99,7 @@ a, p0 = reference.half_width, reference.peak
 
 
 def first_loading(x, T):
-    """Cattaneo and Mindlin's shear traction on the lower body for 0 <= T <= mu P."""
+    """Cattaneo and Mindlin: traction on the lower body for 0 <= T <= mu P."""
     c = a * np.sqrt(1 - T / (mu * P))
     outer, inner = (
         np.sqrt(np.maximum(1 - (x / a) ** 2, 0)),
@@ -113,7 +121,7 @@ assert np.allclose(history["stick_half_width"][loading], exact, rtol=0.03)
 # ## Unloading: slip turns round
 #
 # Now reduce $T$ from its largest value $T^*$. The edge slips back at once, while the middle keeps
-# the traction that it had. To slip *against* the old direction the traction has to change by $2 \mu
+# the slip that it had. To slip *against* the old direction the traction has to change by $2 \mu
 # p$, from one bound to the other. So unloading is a first loading in the other direction and of
 # twice the size. This is Masing's rule:
 #
@@ -129,21 +137,38 @@ turned, home, lowest = 8, 16, 24  # states with T = 40 N, 0, -40 N
 
 fig, ax = plt.subplots(figsize=(6.2, 4.2), layout="constrained")
 for index, color in ((4, "C0"), (turned, "C1"), (home, "C2"), (lowest, "C3")):
-    tau = -path.states[index].solution.reactions[:, 1] / problem.areas  # on the lower body
+    tau = (
+        -path.states[index].solution.reactions[:, 1] / problem.areas
+    )  # on the lower body
     expected = (
         first_loading(fine, T[index])
         if index <= turned
-        else (first_loading(fine, T_most) - 2 * first_loading(fine, (T_most - T[index]) / 2))
+        else (
+            first_loading(fine, T_most)
+            - 2 * first_loading(fine, (T_most - T[index]) / 2)
+        )
     )
     ax.plot(fine, expected / p0, color=color, lw=1)
-    ax.plot(x, tau / p0, "o", ms=3, color=color, label=f"T = {round(T[index])} N")
+    ax.plot(
+        x, tau / p0, "o", ms=3, color=color, label=f"T = {round(T[index])} N"
+    )
     near = np.interp(x, fine, expected)
     assert (
         np.abs(tau - near).max() < 0.06 * mu * p0
     )  # largest next to the kinks, where elements see it blurred
-ax.plot(fine, mu * np.sqrt(1 - (fine / a) ** 2), "k--", lw=1, label=r"bound $\pm \mu p$")
+ax.plot(
+    fine,
+    mu * np.sqrt(1 - (fine / a) ** 2),
+    "k--",
+    lw=1,
+    label=r"bound $\pm \mu p$",
+)
 ax.plot(fine, -mu * np.sqrt(1 - (fine / a) ** 2), "k--", lw=1)
-ax.set(xlabel="x [mm]", ylabel="shear traction over peak pressure [-]", xlim=(-1.15 * a, 1.9 * a))
+ax.set(
+    xlabel="x [mm]",
+    ylabel="shear traction over peak pressure [-]",
+    xlim=(-1.15 * a, 1.9 * a),
+)
 ax.legend(frameon=False, title="dots: computed\nlines: exact", loc="right")
 
 resultant = path.states[home].solution.reactions[:, 1]
@@ -159,7 +184,9 @@ assert abs(resultant.sum()) < 1e-8 and np.abs(resultant).max() > 0.2
 # %%
 stiffness_line = shift.max() / T_most * T
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.plot(shift, T, "o-", ms=3)
 left.set(xlabel="shift of the plate [mm]", ylabel="shear force T [N]")
 right.plot(1e3 * (shift - stiffness_line), T, "o-", ms=3)
@@ -191,17 +218,22 @@ modulus = 1 / (2 * (1 - 0.3**2) / 5.0)  # E*, MPa
 def shift_by_slip(T):
     """delta(T) without its linear term [mm]."""
     rest = P / D - T / D / mu
-    return mu / (np.pi * modulus) * (rest * np.log(rest) - P / D * np.log(P / D))
+    return (
+        mu / (np.pi * modulus) * (rest * np.log(rest) - P / D * np.log(P / D))
+    )
 
 
 forces = np.linspace(0, T_most, 2001)
-expected = 4 * T_most * shift_by_slip(T_most) - 8 * np.trapezoid(shift_by_slip(forces), forces)
+expected = 4 * T_most * shift_by_slip(T_most) - 8 * np.trapezoid(
+    shift_by_slip(forces), forces
+)
 
 cycle = slice(turned, len(T))  # from the tip to the tip
 area = abs(np.trapezoid(T[cycle], shift[cycle]))
 friction = history["friction_work"][-1] - history["friction_work"][turned]
 print(
-    f"one cycle costs: exact {expected:.4f} N mm, area of the loop {area:.4f}, friction work {friction:.4f}"
+    f"one cycle costs: exact {expected:.4f} N mm,"
+    f" area of the loop {area:.4f}, friction work {friction:.4f}"
 )
 
 assert np.isclose(
@@ -209,7 +241,9 @@ assert np.isclose(
 )  # the same in closed form
 assert np.isclose(area, expected, rtol=0.03)
 assert np.isclose(friction, expected, rtol=0.05)
-assert np.all(np.diff(history["friction_work"]) >= -1e-12)  # friction never gives back
+assert np.all(
+    np.diff(history["friction_work"]) >= -1e-12
+)  # friction never gives back
 
 # %% [markdown]
 # The two computed numbers have different meanings. The area comes from the force and the shift of
@@ -220,8 +254,16 @@ assert np.all(np.diff(history["friction_work"]) >= -1e-12)  # friction never giv
 # %%
 fig, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
 step = np.arange(len(T))
-ax.plot(step, history["external_work"] - history["external_work"][0], label="work of the loads")
-ax.plot(step, history["elastic_energy"] - history["elastic_energy"][0], label="elastic energy")
+ax.plot(
+    step,
+    history["external_work"] - history["external_work"][0],
+    label="work of the loads",
+)
+ax.plot(
+    step,
+    history["elastic_energy"] - history["elastic_energy"][0],
+    label="elastic energy",
+)
 ax.plot(step, history["friction_work"], label="friction work")
 ax.set(xlabel="state [-]", ylabel="energy since T = 0 [N mm]", ylim=(None, 4.8))
 ax.legend(frameon=False)
@@ -258,7 +300,8 @@ assert history["energy_error"].max() < 1e-9
 # ```python
 # def loop(T_star):
 #     T = np.linspace(0, T_star, 4001)
-#     return 4 * T_star * shift_by_slip(T_star) - 8 * np.trapezoid(shift_by_slip(T), T)
+#     under = np.trapezoid(shift_by_slip(T), T)
+#     return 4 * T_star * shift_by_slip(T_star) - 8 * under
 #
 # exponent = np.log2(loop(2.0) / loop(1.0))
 # assert abs(exponent - 3) < 0.05
@@ -276,11 +319,14 @@ assert history["energy_error"].max() < 1e-9
 # because each step takes the force at its end.
 #
 # ```python
-# coarse = follow(scenes.shear_cycle(2, steps=2, mu=mu, force=P, shear=T_most, depth=D, elements=32)).history
+# loads = {"mu": mu, "force": P, "shear": T_most, "depth": D}
+# coarse = follow(scenes.shear_cycle(2, steps=2, elements=32, **loads)).history
 # assert np.isclose(coarse["shift"].max(), shift.max(), rtol=1e-3)
-# assert np.isclose(coarse["stick_half_width"].min(), history["stick_half_width"].min(), rtol=1e-3)
+# least = history["stick_half_width"].min()
+# assert np.isclose(coarse["stick_half_width"].min(), least, rtol=1e-3)
 # tip = 2  # the state with T = 40 N
-# assert abs(np.trapezoid(coarse["shear_force"][tip:], coarse["shift"][tip:])) < area
+# corners = coarse["shear_force"][tip:], coarse["shift"][tip:]
+# assert abs(np.trapezoid(*corners)) < area
 # assert coarse["friction_work"][-1] - coarse["friction_work"][tip] > friction
 # ```
 #

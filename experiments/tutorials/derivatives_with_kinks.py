@@ -20,7 +20,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import contactopt
-from contactopt import HalfSpace, InterfaceProblem, Material, Rigid, Scene, sensitivity, solve
+from contactopt import (
+    HalfSpace,
+    InterfaceProblem,
+    Material,
+    Rigid,
+    Scene,
+    sensitivity,
+    solve,
+)
 
 # %% [markdown]
 # ## One node as a function of friction and load
@@ -44,7 +52,9 @@ fig, axes = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 frictions = np.linspace(0.0, 1.3, 53)
 by_mu = np.array([solved(mu)[1].reactions[0] for mu in frictions])
 loads = np.linspace(-2.5, 2.5, 101)
-by_load = np.array([solved(0.5, [-1.0, load])[1].reactions[0] for load in loads])
+by_load = np.array(
+    [solved(0.5, [-1.0, load])[1].reactions[0] for load in loads]
+)
 for ax, x, forces, label in (
     (axes[0], frictions, by_mu, "friction coefficient $\\mu$"),
     (axes[1], loads, by_load, "load $q_t$ [mm]"),
@@ -60,7 +70,10 @@ for mu in (0.3, 0.6, 1.1):
     step = np.array([-0.1, 0.1])
     for component in range(2):
         axes[0].plot(
-            mu + step, solution.reactions[0, component] + step * slope[component], "k", lw=2.5
+            mu + step,
+            solution.reactions[0, component] + step * slope[component],
+            "k",
+            lw=2.5,
         )
 axes[0].plot([], [], "k", lw=2.5, label="slope from sensitivity")
 axes[0].legend(frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.62))
@@ -101,14 +114,21 @@ by_hand = Q[0, 1] * r_n / (Q[0, 0] - mu * Q[0, 1])
 
 forward = derivative.forward(mu=1.0).reactions[0]
 adjoint = derivative.adjoint(reactions=[[1.0, 0.0]])  # of the function r_n
-print(f"dr_n/dmu: by hand {by_hand:.6f}, forward {forward[0]:.6f}, adjoint {adjoint.mu[0]:.6f}")
+print(
+    f"dr_n/dmu: by hand {by_hand:.6f}, forward {forward[0]:.6f},"
+    f" adjoint {adjoint.mu[0]:.6f}"
+)
 print(f"dr_n/dq = {adjoint.q[0]}, dr_n/dQ =\n{adjoint.Q}")
 
 assert np.isclose(forward[0], by_hand) and np.isclose(adjoint.mu[0], by_hand)
-assert np.isclose(forward[1], -r_n - mu * by_hand)  # the product rule for r_t = -mu r_n
+assert np.isclose(
+    forward[1], -r_n - mu * by_hand
+)  # the product rule for r_t = -mu r_n
 nudged = InterfaceProblem(np.add(Q, [[1e-6, 0.0], [0.0, 0.0]]), [q], mu)
 assert np.isclose(
-    (solve(nudged, tol=1e-13).reactions[0, 0] - r_n) / 1e-6, adjoint.Q[0, 0], rtol=1e-4
+    (solve(nudged, tol=1e-13).reactions[0, 0] - r_n) / 1e-6,
+    adjoint.Q[0, 0],
+    rtol=1e-4,
 )
 
 # %% [markdown]
@@ -124,13 +144,18 @@ assert np.isclose(
 problem, solution = solved(5 / 6)
 kink = sensitivity(problem, solution)
 print(kink.sentence)
-more, less = kink.forward(mu=1.0).reactions[0], kink.forward(mu=-1.0).reactions[0]
+more, less = (
+    kink.forward(mu=1.0).reactions[0],
+    kink.forward(mu=-1.0).reactions[0],
+)
 print(f"for more friction dr = {more}, for less friction dr = {less}")
 
 assert not kink.differentiable and kink.weak[0].edge == "stick / slip"
 assert np.allclose(more, 0.0)  # it sticks: the coefficient has no influence
 assert less[0] < -0.5 and less[1] > 0.5
-assert not np.allclose(more, -less)  # a derivative would be linear in the direction
+assert not np.allclose(
+    more, -less
+)  # a derivative would be linear in the direction
 
 # %% [markdown]
 # ## Bilevel programs, in words
@@ -162,7 +187,9 @@ for _ in range(6):
     change = sensitivity(problem, solution).forward(mu=1.0)
     slip = problem.displacements(solution.reactions, solution.multipliers)[0, 1]
     mu -= (slip - sensor) / change.displacements[0, 1]
-print(f"mu = {mu:.9f}, slip = {slip:.9f} mm, certificate {solution.residual:.1e}")
+print(
+    f"mu = {mu:.9f}, slip = {slip:.9f} mm, certificate {solution.residual:.1e}"
+)
 
 assert np.isclose(slip, sensor, rtol=1e-9)
 
@@ -189,8 +216,8 @@ assert sensitivity(problem, solution).forward(mu=1.0).displacements[0, 1] == 0.0
 
 # %%
 def rounded(mu, eps):
-    """Newton's method on u_n = 0 and r_t = -mu r_n u_t / sqrt(u_t^2 + eps^2); eps goes down step by
-    step.
+    """Newton's method on u_n = 0 and r_t = -mu r_n u_t / sqrt(u_t^2 + eps^2);
+    eps goes down step by step.
     """
     r = np.array([1.5, -1.25])
     for size in np.geomspace(1.0, eps, 25):
@@ -200,22 +227,38 @@ def rounded(mu, eps):
             F = np.array([u[0], r[1] + mu * r[0] * u[1] / root])
             slope = mu * r[0] * size**2 / root**3
             r = r - np.linalg.solve(
-                [Q[0], [mu * u[1] / root + slope * Q[1, 0], 1.0 + slope * Q[1, 1]]], F
+                [
+                    Q[0],
+                    [mu * u[1] / root + slope * Q[1, 0], 1.0 + slope * Q[1, 1]],
+                ],
+                F,
             )
     return r
 
 
 widths = np.array([1e-1, 3e-2, 1e-2, 3e-3, 1e-3])
 slips = np.array([(Q @ rounded(1.0, eps) + q)[1] for eps in widths])
-slopes = np.array([(Q @ (rounded(1.01, eps) - rounded(0.99, eps)))[1] / 0.02 for eps in widths])
+slopes = np.array(
+    [
+        (Q @ (rounded(1.01, eps) - rounded(0.99, eps)))[1] / 0.02
+        for eps in widths
+    ]
+)
 certificates = [
-    contactopt.natural_map_residual(InterfaceProblem(Q, [q], 1.0), rounded(1.0, eps)[None])
+    contactopt.natural_map_residual(
+        InterfaceProblem(Q, [q], 1.0), rounded(1.0, eps)[None]
+    )
     for eps in widths
 ]
 
 fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
 ax.loglog(widths, slips, "o-", label="slip of a node that sticks [mm]")
-ax.loglog(widths, -slopes, "s-", label="its derivative by $\\mu$, with the opposite sign [mm]")
+ax.loglog(
+    widths,
+    -slopes,
+    "s-",
+    label="its derivative by $\\mu$, with the opposite sign [mm]",
+)
 ax.loglog(widths, certificates, "^-", label="certificate of the forces")
 ax.set(xlabel="width of the round corner [mm]", ylabel="what should be zero")
 ax.legend(frameon=False)
@@ -241,7 +284,9 @@ assert min(certificates) > 1e-4  # no corner makes it a solution
 rng = np.random.default_rng(2)
 A = rng.normal(size=(8, 8))
 many = InterfaceProblem(
-    A @ A.T / 8 + 0.3 * np.eye(8), 0.5 * rng.normal(size=(4, 2)) - [0.8, 0.0], 0.0
+    A @ A.T / 8 + 0.3 * np.eye(8),
+    0.5 * rng.normal(size=(4, 2)) - [0.8, 0.0],
+    0.0,
 )
 answer = solve(many, tol=1e-12)
 direction = rng.normal(size=4)
@@ -251,7 +296,8 @@ ours = (
     .reactions[:, 0]
 )
 print(
-    f"contacts that touch: {int((answer.reactions[:, 0] > 0).sum())} of 4; ours: {np.round(ours, 6)}"
+    f"contacts that touch: {int((answer.reactions[:, 0] > 0).sum())} of 4;"
+    f" ours: {np.round(ours, 6)}"
 )
 
 if find_spec("diffcp"):
@@ -259,7 +305,8 @@ if find_spec("diffcp"):
     load.value = many.q[:, 0]
     normal = cp.Problem(
         cp.Minimize(
-            cp.sum_squares(np.linalg.cholesky(many.Q[::2, ::2]).T @ force) / 2 + load @ force
+            cp.sum_squares(np.linalg.cholesky(many.Q[::2, ::2]).T @ force) / 2
+            + load @ force
         ),
         [force >= 0],
     )
@@ -270,9 +317,13 @@ if find_spec("diffcp"):
     assert np.allclose(force.delta, ours, atol=1e-5)
 
 t = 1e-6
-there = replace(many, q=many.q + t * np.stack([direction, 0 * direction], axis=1))
+there = replace(
+    many, q=many.q + t * np.stack([direction, 0 * direction], axis=1)
+)
 assert np.allclose(
-    (solve(there, tol=1e-13).reactions[:, 0] - answer.reactions[:, 0]) / t, ours, atol=1e-5
+    (solve(there, tol=1e-13).reactions[:, 0] - answer.reactions[:, 0]) / t,
+    ours,
+    atol=1e-5,
 )
 
 # %% [markdown]
@@ -289,25 +340,34 @@ assert np.allclose(
 half, cells = 10.0, 40
 points = half * (2 * np.arange(cells) + 1 - cells) / cells
 flat = HalfSpace("half-plane", Material(5.0, 0.3), points)
-punch = Scene("punch", Rigid("punch", normal=(0, 1), force={"y": -100.0}), flat, 0.3)
+punch = Scene(
+    "punch", Rigid("punch", normal=(0, 1), force={"y": -100.0}), flat, 0.3
+)
 
 
 def shapes(places):
-    return np.stack([(places[0] / half) ** power for power in (2, 4, 6, 8)], axis=1)
+    return np.stack(
+        [(places[0] / half) ** power for power in (2, 4, 6, 8)], axis=1
+    )
 
 
 designed = contactopt.design(punch, shapes)
 print(
-    f"largest pressure: {[round(visit.peak, 2) for visit in designed.visits]} MPa; over the mean {designed.unevenness:.3f}"
+    f"largest pressure: {[round(one.peak, 2) for one in designed.visits]} MPa;"
+    f" over the mean {designed.unevenness:.3f}"
 )
 
 fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
-ax.plot(points, designed.gap - designed.gap.min(), label="designed profile [mm]")
+ax.plot(
+    points, designed.gap - designed.gap.min(), label="designed profile [mm]"
+)
 ax.plot(points, designed.pressure, label="its pressure [MPa]")
 ax.set(xlabel="place [mm]", ylabel="profile, pressure")
 ax.legend(frameon=False)
 
-assert designed.unevenness < 1.05 and designed.visits[0].peak > 3 * designed.peak
+assert (
+    designed.unevenness < 1.05 and designed.visits[0].peak > 3 * designed.peak
+)
 assert all(visit.certificate < 1e-9 for visit in designed.visits)
 
 # %% [markdown]

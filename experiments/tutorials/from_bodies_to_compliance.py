@@ -39,17 +39,28 @@ from contactopt.meshes.structured import graded, rename, tensor_mesh
 
 # %%
 def two_blocks(nodes, upper=5.0, lower=5.0):
-    """Punch on a foundation, with that many contact nodes and Young's moduli in MPa; lengths in mm."""
+    """Punch on a foundation: contact nodes, Young's moduli in MPa."""
     h, zone = 4 / (nodes - 1), np.linspace(-2, 2, nodes)
-    punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")
+    punch = rename(
+        tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+"
+    )
     outside = 2 + graded(6, 1.15 * h, 1.15)[1:]
     across = np.concatenate([-outside[::-1], zone, outside])
     ground = rename(tensor_mesh(across, -graded(8, h, 1.15)[::-1]), bottom="y-")
-    ground = ground.with_boundaries({"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)})
+    ground = ground.with_boundaries(
+        {"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)}
+    )
     return Scene(
         "two blocks",
-        upper=Part("punch", punch, Material(upper, nu=0.3), supports=(Support("top"),)),
-        lower=Part("ground", ground, Material(lower, nu=0.3), supports=(Support("bottom"),)),
+        upper=Part(
+            "punch", punch, Material(upper, nu=0.3), supports=(Support("top"),)
+        ),
+        lower=Part(
+            "ground",
+            ground,
+            Material(lower, nu=0.3),
+            supports=(Support("bottom"),),
+        ),
         mu=0.5,
     )
 
@@ -61,7 +72,13 @@ fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 for body, color in zip(bodies, ("C0", "C1")):
     mesh = body.basis.mesh
     ax.plot(*mesh.p[:, mesh.facets].transpose(0, 1, 2), color=color, lw=0.4)
-    ax.plot(*body.points, "o", color=color, ms=3, label=f"{body.name}, {len(body.free)} unknowns")
+    ax.plot(
+        *body.points,
+        "o",
+        color=color,
+        ms=3,
+        label=f"{body.name}, {len(body.free)} unknowns",
+    )
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
 ax.legend(frameon=False, loc="lower left")
 
@@ -85,13 +102,13 @@ assert all(len(body.nodes) == 33 for body in bodies)
 
 # %%
 def schur_complement(body):
-    """S of one body; unknowns ordered node by node, (x, y) each, from left to right."""
+    """S of one body; unknowns node by node, (x, y) each, from left to right."""
     contact = body.contact_dofs[np.argsort(body.points[0])].ravel()
     inside = np.setdiff1d(body.free, contact)
     A = body.A.toarray()  # a real code keeps it sparse and factorises it once
-    return A[np.ix_(contact, contact)] - A[np.ix_(contact, inside)] @ np.linalg.solve(
-        A[np.ix_(inside, inside)], A[np.ix_(inside, contact)]
-    )
+    return A[np.ix_(contact, contact)] - A[
+        np.ix_(contact, inside)
+    ] @ np.linalg.solve(A[np.ix_(inside, inside)], A[np.ix_(inside, contact)])
 
 
 S1, S2 = (schur_complement(body) for body in bodies)
@@ -105,7 +122,9 @@ print(
 
 for S in (S1, S2):
     assert np.allclose(S, S.T)
-    assert np.linalg.eigvalsh(S).min() > 0  # both bodies are held, so no motion is free
+    assert (
+        np.linalg.eigvalsh(S).min() > 0
+    )  # both bodies are held, so no motion is free
 
 # %% [markdown]
 # ## Add the compliances
@@ -144,7 +163,9 @@ values, vectors = np.linalg.eigh(Q_nn)
 values, vectors = values[::-1], vectors[:, ::-1]  # softest first
 x = problem.coordinates[0]
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.8), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.8), layout="constrained"
+)
 for column in (0, 16, 24):
     left.plot(x, Q_nn[:, column], label=f"force at x = {x[column]:g} mm")
 left.set(xlabel="x [mm]", ylabel="normal displacement [mm/N]")
@@ -152,7 +173,9 @@ left.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 for j in (0, 1, 2, 5):
     right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"number {j}")
 right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]")
-right.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+right.legend(
+    frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+)
 
 assert np.array_equal(np.argmax(Q_nn, axis=0), np.arange(nodes))
 assert Q_nn[0, 0] > 1.8 * Q_nn[16, 16]
@@ -193,7 +216,9 @@ def predicted(count):
 
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 for count, marker in ((17, "s"), (33, "o"), (65, "^")):
-    eigenvalues = np.linalg.eigvalsh(reduce(two_blocks(count)).Q[::2, ::2])[::-1]
+    eigenvalues = np.linalg.eigvalsh(reduce(two_blocks(count)).Q[::2, ::2])[
+        ::-1
+    ]
     ax.loglog(
         np.arange(1, count),
         eigenvalues[1:] * 4 / (count - 1),
@@ -203,12 +228,23 @@ for count, marker in ((17, "s"), (33, "o"), (65, "^")):
         label=f"{count} nodes",
     )
     assert np.all(
-        np.abs(eigenvalues[2 : count // 4] / predicted(count)[1 : count // 4 - 1] - 1) < 0.25
+        np.abs(
+            eigenvalues[2 : count // 4] / predicted(count)[1 : count // 4 - 1]
+            - 1
+        )
+        < 0.25
     )
 ax.loglog(
-    np.arange(1, 65), predicted(65) * 4 / 64, "k--", lw=1, label=r"half-planes, $2 / (E^* \xi_j)$"
+    np.arange(1, 65),
+    predicted(65) * 4 / 64,
+    "k--",
+    lw=1,
+    label=r"half-planes, $2 / (E^* \xi_j)$",
 )
-ax.set(xlabel="number j of the wave [-]", ylabel=r"eigenvalue of $Q_{nn}$ times h [mm$^2$/N]")
+ax.set(
+    xlabel="number j of the wave [-]",
+    ylabel=r"eigenvalue of $Q_{nn}$ times h [mm$^2$/N]",
+)
 _ = ax.legend(frameon=False)
 
 # %% [markdown]
@@ -223,7 +259,8 @@ for count in (17, 33, 65):
     fine = reduce(two_blocks(count)).Q
     conditions.append([np.linalg.cond(fine[::2, ::2]), np.linalg.cond(fine)])
     print(
-        f"{count} nodes: condition {conditions[-1][0]:.1f} of the normal block, {conditions[-1][1]:.0f} of all Q"
+        f"{count} nodes: condition {conditions[-1][0]:.1f} of the normal block,"
+        f" {conditions[-1][1]:.0f} of all Q"
     )
 growth = np.array(conditions)[1:] / np.array(conditions)[:-1]
 
@@ -231,8 +268,8 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 
 # %% [markdown]
 # The condition number of the whole $Q$ is about ten times that of its normal block, but it grows at
-# the same rate. The reason is one more soft motion: the punch, which is held at its top, can sway
-# sideways.
+# the same rate. The main reason is one more soft motion: the punch, which is held at its top, can
+# sway sideways.
 #
 # [Tutorial 3](why_the_preconditioner_works.py) shows how an iterative method can undo the division
 # by $|\xi|$.
@@ -267,13 +304,15 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 # from dataclasses import replace
 # from contactopt import Plate, solve
 # scene = two_blocks(17)
-# pressed = replace(scene, upper=replace(scene.upper, supports=(), loads=(Plate("top", {"y": -10.0}),)))
+# plate = Plate("top", {"y": -10.0})
+# upper = replace(scene.upper, supports=(), loads=(plate,))
+# pressed = replace(scene, upper=upper)
 # with_plate = reduce(pressed)
 # V = with_plate.V.reshape(-1, 2)
 # assert np.allclose(V[:, 0], 1.0) and np.allclose(V[:, 1], 0.0)
 # assert np.allclose(with_plate.s, -10.0)
 # answer = solve(with_plate)
-# assert np.isclose(answer.reactions[:, 0].sum(), 10.0)  # the contact carries the load
+# assert np.isclose(answer.reactions[:, 0].sum(), 10.0)  # it carries the load
 # assert answer.multipliers[0] < 0  # the plate comes down
 # ```
 #

@@ -23,7 +23,8 @@ rubber = Material(E=5.0, nu=0.3)
 P, R = 100.0, 400.0  # N, mm
 exact = hertz_point(P, R, contact_modulus(rubber))
 print(
-    f"Hertz: contact radius {exact.half_width:.3f} mm, peak pressure {exact.peak:.4f} MPa, approach {exact.approach:.4f} mm"
+    f"Hertz: contact radius {exact.half_width:.3f} mm,"
+    f" peak pressure {exact.peak:.4f} MPa, approach {exact.approach:.4f} mm"
 )
 
 # %% [markdown]
@@ -43,9 +44,18 @@ a = exact.half_width
 def on_half_space(n: int) -> Scene:
     """The sphere on n x n points of a square that is 2.5 contact radii wide."""
     x = (np.arange(n) + 0.5) * 2.5 * a / n - 1.25 * a
-    sphere = Rigid("sphere", gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R), force={"z": -P})
+    sphere = Rigid(
+        "sphere",
+        gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R),
+        force={"z": -P},
+    )
     return Scene(
-        "sphere", sphere, HalfSpace("block", rubber, (x, x)), 0.0, kind="solid", law="frictionless"
+        "sphere",
+        sphere,
+        HalfSpace("block", rubber, (x, x)),
+        0.0,
+        kind="solid",
+        law="frictionless",
     )
 
 
@@ -58,7 +68,7 @@ assert np.allclose(small.Q @ r, Q @ r)
 
 # %% [markdown]
 # The array above has $432^2$ entries. With $512 \times 512$ points it would have $6 \cdot 10^{11}$,
-# but the transforms need a few megabytes only. Nothing else changes: the problem $u = Qr + V\lambda
+# but the transforms need about a hundred megabytes only. Nothing else changes: the problem $u = Qr + V\lambda
 # + q$, its solvers and its certificate are the same as for finite elements.
 
 # %%
@@ -71,7 +81,8 @@ assert solution.solved and problem.contacts == 65536
 assert abs(pressure.max() / exact.peak - 1) < 1e-3
 assert abs(-solution.multipliers[0] / exact.approach - 1) < 1e-4
 print(
-    f"{problem.contacts} contacts, {seconds:.1f} s, {solution.products} products, residual {solution.residual:.0e}"
+    f"{problem.contacts} contacts, {seconds:.1f} s,"
+    f" {solution.products} products, residual {solution.residual:.0e}"
 )
 
 # %% [markdown]
@@ -92,16 +103,29 @@ def error_and_seconds(scene: Scene) -> tuple[float, float]:
     distance = np.linalg.norm(problem.coordinates[: scene.dim - 1], axis=0)
     hertz, w = exact.pressure(distance), problem.areas
     computed = solution.reactions[:, 0] / np.maximum(w, 1e-300)
-    return float(np.sqrt(np.sum(w * (computed - hertz) ** 2) / np.sum(w * hertz**2))), seconds
+    return float(
+        np.sqrt(np.sum(w * (computed - hertz) ** 2) / np.sum(w * hertz**2))
+    ), seconds
 
 
 meshed = np.array(
-    [error_and_seconds(scenes.sphere(rigid="sphere", mu=0.0, elements=n)) for n in (8, 16, 32)]
+    [
+        error_and_seconds(scenes.sphere(rigid="sphere", mu=0.0, elements=n))
+        for n in (8, 16, 32)
+    ]
 )
-spaced = np.array([error_and_seconds(on_half_space(n)) for n in (20, 40, 80, 160)])
+spaced = np.array(
+    [error_and_seconds(on_half_space(n)) for n in (20, 40, 80, 160)]
+)
 
 fig, ax = plt.subplots(figsize=(5.5, 3.8), layout="constrained")
-ax.loglog(meshed[:, 1], meshed[:, 0], "o-", color="C1", label="finite elements, axisymmetric")
+ax.loglog(
+    meshed[:, 1],
+    meshed[:, 0],
+    "o-",
+    color="C1",
+    label="finite elements, axisymmetric",
+)
 ax.loglog(spaced[:, 1], spaced[:, 0], "o-", color="C0", label="half-space, 3D")
 ax.set(xlabel="seconds", ylabel="error of the pressure [-]")
 ax.legend(frameon=False)
@@ -127,7 +151,11 @@ thickness = np.array([2.0, 4.0, 8.0, 16.0, 40.0])
 stiffer = []
 for H in thickness * a:
     block = scenes.sphere(
-        rigid="sphere", mu=0.0, elements=16, foundation_height=H, foundation_radius=800.0
+        rigid="sphere",
+        mu=0.0,
+        elements=16,
+        foundation_height=H,
+        foundation_radius=800.0,
     )
     thin = reduce(block)
     answer = solve(thin)

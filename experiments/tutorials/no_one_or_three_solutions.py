@@ -11,11 +11,20 @@
 # museum](../museum.md#one-node-one-solution-or-three) show the same with sliders.
 
 # %%
+from dataclasses import replace
+
 import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, Status, all_solutions, diagnose, models, solve
+from contactopt import (
+    InterfaceProblem,
+    Status,
+    all_solutions,
+    diagnose,
+    models,
+    solve,
+)
 
 # %% [markdown]
 # ## One node, two springs
@@ -30,14 +39,21 @@ from contactopt import InterfaceProblem, Status, all_solutions, diagnose, models
 fig, ax = plt.subplots(figsize=(5, 3), layout="constrained")
 ax.axhspan(-0.5, 0, color="0.8", lw=0)
 ax.plot([-2.2, 2.4], [0, 0], "k", lw=1)
-steps, side = np.linspace(0, 1, 15), 0.1 * np.array([0, 0, *[1, -1] * 5, 0, 0, 0])
+steps, side = (
+    np.linspace(0, 1, 15),
+    0.1 * np.array([0, 0, *[1, -1] * 5, 0, 0, 0]),
+)
 for start, end in (
     ((-1.9, 1.2), (-0.1, 0.15)),
     ((-0.6, 2.0), (-0.05, 0.2)),
 ):  # springs: one of them is oblique
     along = np.subtract(end, start)
     across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-    ax.plot(*(np.outer(steps, along) + start + np.outer(side, across)).T, "C0", lw=1.5)
+    ax.plot(
+        *(np.outer(steps, along) + start + np.outer(side, across)).T,
+        "C0",
+        lw=1.5,
+    )
     ax.plot(*start, "s", color="0.3")
 ax.plot(0, 0.1, "o", ms=10, color="C0")
 for tail, head, name, color, at in (
@@ -46,7 +62,12 @@ for tail, head, name, color, at in (
     ((1.5, 0), (1.5, 0.8), "$n$", "k", (1.58, 0.7)),
     ((1.5, 0), (2.3, 0), "$t$", "k", (2.2, 0.1)),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
     ax.text(*at, name, color=color, fontsize=12)
 ax.set(xlim=(-2.2, 2.4), ylim=(-0.5, 2.2), aspect="equal")
 _ = ax.axis("off")
@@ -63,9 +84,8 @@ def node(push, press, mu):
 problem = node(0.8, 1.0, mu=1.0)
 print(problem.Q, problem.q)
 
-assert (
-    problem.Q[0, 1] > 0
-)  # a push to the right also lifts the node: that is where the trouble comes from
+# a push to the right also lifts the node: that is where the trouble comes from
+assert problem.Q[0, 1] > 0
 
 # %% [markdown]
 # ## Three answers
@@ -82,10 +102,13 @@ for s in solutions:
         s.reactions[0],
     )
     print(
-        f"gap {u_n:.3f}, slip {u_t:.3f}, normal force {r_n:.3f}, friction {r_t:.3f}, certificate {s.residual:.0e}"
+        f"gap {u_n:.3f}, slip {u_t:.3f}, normal force {r_n:.3f},"
+        f" friction {r_t:.3f}, certificate {s.residual:.0e}"
     )
 
-assert np.allclose([s.reactions[0] for s in solutions], [[0.0, 0.0], [0.4, -0.4], [1.0, -0.8]])
+assert np.allclose(
+    [s.reactions[0] for s in solutions], [[0.0, 0.0], [0.4, -0.4], [1.0, -0.8]]
+)
 assert all(s.residual < 1e-12 for s in solutions)
 
 # %% [markdown]
@@ -95,11 +118,12 @@ assert all(s.residual < 1e-12 for s in solutions)
 # lies between the two. All three obey every law exactly. Which one happens in reality depends on
 # what happened before, and the data say nothing about that.
 #
-# If a method starts near one of the solutions, it finds this one:
+# Newton's method finds the solution near which it starts:
 
 # %%
 for s in solutions:
-    again = solve(problem, "newton", start=s)
+    nearby = replace(s, reactions=s.reactions + np.array([[0.001, -0.0003]]))
+    again = solve(problem, "newton", start=nearby)
     assert again.solved and np.allclose(again.reactions, s.reactions)
 print("from nothing:", solve(problem).reactions[0])
 
@@ -120,21 +144,33 @@ for label, color, chosen in (
     (
         "slip",
         "C1",
-        [(mu, r[0]) for mu, r in points if r[0] > 1e-6 and np.isclose(-r[1], mu * r[0], rtol=1e-6)],
+        [
+            (mu, r[0])
+            for mu, r in points
+            if r[0] > 1e-6 and np.isclose(-r[1], mu * r[0], rtol=1e-6)
+        ],
     ),
     (
         "stick",
         "C2",
-        [(mu, r[0]) for mu, r in points if r[0] > 1e-6 and -r[1] < mu * r[0] * (1 - 1e-6)],
+        [
+            (mu, r[0])
+            for mu, r in points
+            if r[0] > 1e-6 and -r[1] < mu * r[0] * (1 - 1e-6)
+        ],
     ),
 ):
     ax.plot(*np.transpose(chosen), "o", ms=3, color=color, label=label)
 ax.axvline(2 / 3, color="grey", lw=1, ls="--")
-ax.text(2 / 3 - 0.01, 0.6, "one solution\nfor every load", color="grey", ha="right")
+ax.text(
+    2 / 3 - 0.01, 0.6, "one solution\nfor every load", color="grey", ha="right"
+)
 ax.set(xlabel=r"friction coefficient $\mu$ [-]", ylabel="normal force [N]")
 ax.legend(frameon=False)
 
-count = {mu: len(all_solutions(node(0.8, 1.0, mu))) for mu in (0.6, 0.7, 0.8, 0.9)}
+count = {
+    mu: len(all_solutions(node(0.8, 1.0, mu))) for mu in (0.6, 0.7, 0.8, 0.9)
+}
 print(count)
 assert count == {0.6: 1, 0.7: 1, 0.8: 2, 0.9: 3}
 
@@ -147,8 +183,13 @@ assert count == {0.6: 1, 0.7: 1, 0.8: 2, 0.9: 3}
 
 # %%
 random = np.random.default_rng(0)
-numbers = [len(all_solutions(node(*random.normal(size=2), mu=1.0))) for _ in range(200)]
-print("solutions for 200 random loads:", {n: numbers.count(n) for n in sorted(set(numbers))})
+numbers = [
+    len(all_solutions(node(*random.normal(size=2), mu=1.0))) for _ in range(200)
+]
+print(
+    "solutions for 200 random loads:",
+    {n: numbers.count(n) for n in sorted(set(numbers))},
+)
 
 assert set(numbers) == {1, 3}
 
@@ -164,7 +205,9 @@ assert diagnose(problem).exact
 assert np.isclose(diagnose(problem).guaranteed.unique, K[1, 1] / abs(K[0, 1]))
 
 angles = np.linspace(40, 70, 61)
-loads = np.column_stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))])
+loads = np.column_stack(
+    [np.cos(np.radians(angles)), np.sin(np.radians(angles))]
+)
 fig, ax = plt.subplots(figsize=(6.4, 3), layout="constrained")
 for mu in (0.6, 0.7, 1.0):
     number = [len(all_solutions(node(*load, mu))) for load in loads]
@@ -207,7 +250,9 @@ assert stuck_in_a_loop.status is Status.CYCLING
 # on. If the curve falls by more than one per unit, the path spirals outwards.
 
 # %%
-fig, axes = plt.subplots(1, 2, figsize=(6.4, 3.6), layout="constrained", sharey=True)
+fig, axes = plt.subplots(
+    1, 2, figsize=(6.4, 3.6), layout="constrained", sharey=True
+)
 bounds = np.linspace(0, 16, 33)
 for ax, mu in zip(axes, (0.6, 1.0)):
     program = models.tresca(node(-10.0, 1.0, mu))
@@ -217,12 +262,21 @@ for ax, mu in zip(axes, (0.6, 1.0)):
         program.problem.solve(solver=cp.CLARABEL)
         return mu * max(float(program.variables["r"].value[0]), 0.0)
 
-    ax.plot(bounds, [next_bound(g) for g in bounds], "C0", label=r"next bound, $\mu\, r_n(g)$")
+    ax.plot(
+        bounds,
+        [next_bound(g) for g in bounds],
+        "C0",
+        label=r"next bound, $\mu\, r_n(g)$",
+    )
     ax.plot(bounds, bounds, "k--", lw=1, label="diagonal")
     g, path = 4.0, []
     for _ in range(12):
         following = next_bound(g)
-        path += [(g, g if not path else path[-1][1]), (g, following), (following, following)]
+        path += [
+            (g, g if not path else path[-1][1]),
+            (g, following),
+            (following, following),
+        ]
         g = following
     ax.plot(*np.transpose(path), "C1", lw=1, label="Tresca iteration")
     ax.set(
@@ -237,7 +291,9 @@ axes[1].set_ylabel("next friction bound [N]")
 axes[0].legend(frameon=False)
 
 assert solve(node(-10.0, 1.0, 0.6), "tresca").solved
-assert np.isclose(max(y for _, y in path), 14.5, atol=0.1)  # the cycle runs between 1 and 14.5
+assert np.isclose(
+    max(y for _, y in path), 14.5, atol=0.1
+)  # the cycle runs between 1 and 14.5
 
 # %% [markdown]
 # At this solution the node slips to the left, and the slope of the curve is $-\mu / \mu^*$. So the
@@ -251,10 +307,15 @@ assert np.isclose(max(y for _, y in path), 14.5, atol=0.1)  # the cycle runs bet
 # %%
 half_steps = solve(pulled, "tresca", relaxation=0.5)
 newton = solve(pulled, "newton")
-print(f"half steps: {half_steps.iterations} iterations; Newton: {newton.iterations}")
+print(
+    f"half steps: {half_steps.iterations} iterations;"
+    f" Newton: {newton.iterations}"
+)
 
 for remedy in (half_steps, newton):
-    assert remedy.solved and np.allclose(remedy.reactions, only.reactions, atol=1e-5)
+    assert remedy.solved and np.allclose(
+        remedy.reactions, only.reactions, atol=1e-5
+    )
 
 # %% [markdown]
 # ## No solution
@@ -277,7 +338,9 @@ m = np.array([1.0, 1.0])
 
 
 def piston(mu, give=0.0):
-    return InterfaceProblem(np.outer(m, m) + give * np.eye(2), [[-1.0, 0.0]], mu)
+    return InterfaceProblem(
+        np.outer(m, m) + give * np.eye(2), [[-1.0, 0.0]], mu
+    )
 
 
 assert np.allclose(solve(piston(0.5)).reactions, [[2.0, -1.0]])
@@ -298,7 +361,10 @@ fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 for mu in (0.5, 0.9, 2.0):
     force = [solve(piston(mu, give)).reactions[0, 0] for give in gives]
     ax.loglog(gives, force, "o-", ms=3, label=rf"$\mu$ = {mu}")
-ax.set(xlabel=r"compliance of the guide $\varepsilon$ [mm/N]", ylabel="normal force [N]")
+ax.set(
+    xlabel=r"compliance of the guide $\varepsilon$ [mm/N]",
+    ylabel="normal force [N]",
+)
 ax.legend(frameon=False)
 
 assert np.isclose(force[0], 1 / (2 * gives[0]), rtol=0.01)
@@ -320,7 +386,9 @@ print(f"slide: {answer.status}, certificate {answer.residual:.2f}")
 
 assert not answer.solved and answer.residual > 0.1
 held = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.6, [[0.0], [1.0]], [0.5])
-assert np.allclose(solve(held).reactions, [[1.0, -0.5]])  # with more friction there is a solution
+assert np.allclose(
+    solve(held).reactions, [[1.0, -0.5]]
+)  # with more friction there is a solution
 
 # %% [markdown]
 # ## Exercises
@@ -336,7 +404,8 @@ assert np.allclose(solve(held).reactions, [[1.0, -0.5]])  # with more friction t
 # ```python
 # for copies in (2, 3):
 #     Q = np.kron(np.eye(copies), problem.Q)
-#     many = all_solutions(InterfaceProblem(Q, np.tile(problem.q, (copies, 1)), 1.0))
+#     q = np.tile(problem.q, (copies, 1))
+#     many = all_solutions(InterfaceProblem(Q, q, 1.0))
 #     assert len(many) == 3**copies
 # ```
 #
@@ -351,9 +420,12 @@ assert np.allclose(solve(held).reactions, [[1.0, -0.5]])  # with more friction t
 # iteration.
 #
 # ```python
-# assert solve(node(-10.0, 1.0, 0.66), "alternating", max_iterations=5000).solved
-# assert not solve(node(-10.0, 1.0, 0.67), "alternating", max_iterations=5000).solved
-# seen = {round(solve(pulled, "alternating", max_iterations=n).reactions[0, 0], 4) for n in (200, 201)}
+# def alternating(problem, steps):
+#     return solve(problem, "alternating", max_iterations=steps)
+#
+# assert alternating(node(-10.0, 1.0, 0.66), 5000).solved
+# assert not alternating(node(-10.0, 1.0, 0.67), 5000).solved
+# seen = {round(alternating(pulled, n).reactions[0, 0], 4) for n in (200, 201)}
 # assert np.allclose(sorted(seen), [5.1186, 8.3221], atol=1e-3)
 # assert solve(pulled, "alternating", relaxation=0.5).solved
 # ```

@@ -15,7 +15,12 @@ import cvxpy as cp
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
+from contactopt import (
+    InterfaceProblem,
+    all_solutions,
+    natural_map_residual,
+    solve,
+)
 from contactopt.teaching import Slider
 
 # %% [markdown]
@@ -34,9 +39,14 @@ from contactopt.teaching import Slider
 fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
 ax.axhspan(-0.5, 0, color="0.8", lw=0)
 ax.plot([-2, 2.6], [0, 0], "k", lw=1)
-ax.fill([-1.2, 1.2, 1.2, -1.2], [1.3, 1.3, 2.3, 2.3], color="C0", alpha=0.25, lw=0)
+ax.fill(
+    [-1.2, 1.2, 1.2, -1.2], [1.3, 1.3, 2.3, 2.3], color="C0", alpha=0.25, lw=0
+)
 ax.plot(
-    [0, 0.15, -0.15, 0.15, -0.15, 0.15, 0], [1.3, 1.15, 1.0, 0.85, 0.7, 0.55, 0.45], "C0", lw=1.5
+    [0, 0.15, -0.15, 0.15, -0.15, 0.15, 0],
+    [1.3, 1.15, 1.0, 0.85, 0.7, 0.55, 0.45],
+    "C0",
+    lw=1.5,
 )
 ax.plot(0, 0.4, "o", ms=9, color="C0")
 for tail, head, name, color, at in (
@@ -46,7 +56,12 @@ for tail, head, name, color, at in (
     ((-0.75, 0.4), (-0.12, 0.4), "$r_t$", "C1", (-0.62, 0.48)),
     ((-1.1, 0), (-1.1, 0.4), "$u_n$", "C2", (-1.45, 0.14)),
 ):
-    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.annotate(
+        "",
+        head,
+        tail,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
+    )
     ax.text(*at, name, color=color, fontsize=12)
 ax.text(-1.1, 1.75, "elastic body", color="C0")
 ax.text(-1.9, -0.32, "floor", color="0.3")
@@ -66,12 +81,13 @@ _ = ax.axis("off")
 
 # %%
 Q = np.array([[1.0, 0.4], [0.4, 1.2]])  # mm / N
-q = np.array(
-    [-1.0, 0.9]
-)  # mm: without contact the node would sink 1 mm into the floor and move 0.9 mm to the right
+# mm: without contact the node would sink 1 mm into the floor, 0.9 mm to the right
+q = np.array([-1.0, 0.9])
 mu = 0.5  # friction coefficient
 
-assert np.all(np.linalg.eigvalsh(Q) > 0)  # every force stores energy in the body
+assert np.all(
+    np.linalg.eigvalsh(Q) > 0
+)  # every force stores energy in the body
 
 # %% [markdown]
 # ## Signorini: contact without friction is a QP
@@ -106,7 +122,9 @@ assert np.isclose(push.dual_value, 0.0, atol=1e-6)
 # zero, and the multiplier is the gap of 2 mm.
 
 # %%
-lifted = cp.Problem(cp.Minimize(Q[0, 0] * r_n**2 / 2 + (q[0] + 3.0) * r_n), [push])
+lifted = cp.Problem(
+    cp.Minimize(Q[0, 0] * r_n**2 / 2 + (q[0] + 3.0) * r_n), [push]
+)
 lifted.solve(solver=cp.CLARABEL)
 
 assert np.isclose(r_n.value, 0.0, atol=1e-6)
@@ -132,19 +150,32 @@ assert np.isclose(push.dual_value, 2.0, atol=1e-5)
 
 # %%
 force = cp.Variable(2)
-bound, pull, other = cp.Parameter(nonneg=True), cp.Parameter(value=0.0), cp.Parameter()
+bound, pull, other = (
+    cp.Parameter(nonneg=True),
+    cp.Parameter(value=0.0),
+    cp.Parameter(),
+)
 normal = cp.Problem(
-    cp.Minimize(Q[0, 0] * force[0] ** 2 / 2 + (q[0] + Q[0, 1] * pull) * force[0]), [force[0] >= 0]
+    cp.Minimize(
+        Q[0, 0] * force[0] ** 2 / 2 + (q[0] + Q[0, 1] * pull) * force[0]
+    ),
+    [force[0] >= 0],
 )
 friction = cp.abs(force[1]) <= bound
 tangential = cp.Problem(
-    cp.Minimize(Q[1, 1] * force[1] ** 2 / 2 + (q[1] + Q[1, 0] * other) * force[1]), [friction]
+    cp.Minimize(
+        Q[1, 1] * force[1] ** 2 / 2 + (q[1] + Q[1, 0] * other) * force[1]
+    ),
+    [friction],
 )
 
 path = []
 for _ in range(14):
     normal.solve(solver=cp.CLARABEL)
-    bound.value, other.value = mu * max(float(force.value[0]), 0.0), float(force.value[0])
+    bound.value, other.value = (
+        mu * max(float(force.value[0]), 0.0),
+        float(force.value[0]),
+    )
     tangential.solve(solver=cp.CLARABEL)
     pull.value = float(force.value[1])
     path.append([other.value, pull.value])
@@ -164,7 +195,7 @@ assert np.allclose(error[1:] / error[:-1], mu * Q[0, 1] / Q[0, 0], rtol=1e-2)
 
 # %% [markdown]
 # Does more friction push this factor beyond one, so that the iteration fails? For this load it does
-# not. From $\mu = 0.84$ on the node sticks. Then the friction force no longer depends on $\mu$, and
+# not. From $\mu = 5/6$ on the node sticks. Then the friction force no longer depends on $\mu$, and
 # the factor is $Q_{nt}^2 / (Q_{nn} Q_{tt}) = 0.13$, which is below one for every positive definite
 # $Q$.
 #
@@ -186,7 +217,8 @@ for much in (0.5, 2.4, 2.6):
     pulled = InterfaceProblem(Q, [[-1.0, -5.0]], much)
     answer, exact = solve(pulled, "alternating"), all_solutions(pulled)
     print(
-        f"pulled to the left, mu = {much}: {answer.status}, slope {-much * Q[0, 1] / Q[0, 0]:.2f}"
+        f"pulled to the left, mu = {much}: {answer.status},"
+        f" slope {-much * Q[0, 1] / Q[0, 0]:.2f}"
     )
     assert len(exact) == 1 and np.isclose(
         exact[0].reactions[0, 1], much * exact[0].reactions[0, 0]
@@ -217,7 +249,8 @@ socp = cp.Problem(cp.Minimize(energy), [cone])
 socp.solve(solver=cp.CLARABEL)
 u = Q @ r.value + q
 print(
-    f"force {np.round(r.value, 3)}, slip {u[1]:.3f}, gap {u[0]:.3f} = mu |slip| = {mu * abs(u[1]):.3f}"
+    f"force {np.round(r.value, 3)}, slip {u[1]:.3f},"
+    f" gap {u[0]:.3f} = mu |slip| = {mu * abs(u[1]):.3f}"
 )
 
 assert np.isclose(u[0], mu * abs(u[1]), atol=1e-5)
@@ -265,8 +298,16 @@ assert np.isclose(u[0], 0.0, atol=1e-5)
 # %%
 z, b, M = cp.Variable(3, nonneg=True), cp.Variable(3, boolean=True), 10.0
 reaction = cp.hstack([z[0], z[1] - mu * z[0]])
-w = cp.hstack([Q[0] @ reaction + q[0], Q[1] @ reaction + q[1] + z[2], 2 * mu * z[0] - z[1]])
-complementarity = cp.Problem(cp.Minimize(0), [w >= 0, z <= M * b, w <= M * (1 - b)])
+w = cp.hstack(
+    [
+        Q[0] @ reaction + q[0],
+        Q[1] @ reaction + q[1] + z[2],
+        2 * mu * z[0] - z[1],
+    ]
+)
+complementarity = cp.Problem(
+    cp.Minimize(0), [w >= 0, z <= M * b, w <= M * (1 - b)]
+)
 complementarity.solve(solver=cp.SCIPY)
 
 assert np.allclose(reaction.value, [1.25, -0.625], atol=1e-6)
@@ -279,12 +320,18 @@ assert np.allclose(reaction.value, [1.25, -0.625], atol=1e-6)
 # %%
 problem = InterfaceProblem(Q, [q], mu)  # one row of q per contact
 solution = solve(problem)
-print(solution.status, solution.reactions[0], f"certificate {solution.residual:.0e}")
+print(
+    solution.status,
+    solution.reactions[0],
+    f"certificate {solution.residual:.0e}",
+)
 
 assert solution.solved and np.allclose(solution.reactions, [[1.25, -0.625]])
 for answer in (path[-1], r.value, reaction.value):
     assert natural_map_residual(problem, answer[None]) < 1e-4
-assert len(all_solutions(problem)) == 1  # the complementarity problem has no other solution
+assert (
+    len(all_solutions(problem)) == 1
+)  # the complementarity problem has no other solution
 
 # %% [markdown]
 # ## More friction, less slip
@@ -299,10 +346,14 @@ answers = [solve(InterfaceProblem(Q, [q], value)) for value in coefficients]
 forces = np.array([answer.reactions[0] for answer in answers])
 slips = (forces @ Q + q)[:, 1]
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.2), layout="constrained"
+)
 left.plot(coefficients, forces[:, 0], label="normal force $r_n$")
 left.plot(coefficients, -forces[:, 1], label="friction force $-r_t$")
-left.set(xlabel=r"friction coefficient $\mu$ [-]", ylabel="force [N]", ylim=(0, 1.7))
+left.set(
+    xlabel=r"friction coefficient $\mu$ [-]", ylabel="force [N]", ylim=(0, 1.7)
+)
 left.legend(frameon=False)
 right.plot(coefficients, slips, color="C2")
 right.axvline(1.25 / 1.5, color="grey", lw=1, ls="--")
@@ -321,7 +372,10 @@ assert np.all((slips > 1e-6) == (coefficients < 1.25 / 1.5))
 # %% tags=["hide-input"]
 def in_the_cone(value):
     answer = solve(InterfaceProblem(Q, [q], value))
-    (normal, friction), slip = answer.reactions[0], (Q @ answer.reactions[0] + q)[1]
+    (normal, friction), slip = (
+        answer.reactions[0],
+        (Q @ answer.reactions[0] + q)[1],
+    )
     assert answer.solved
     fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
     ax.fill([0, -2 * value, 2 * value], [0, 2, 2], color="C0", alpha=0.15, lw=0)
@@ -335,7 +389,9 @@ def in_the_cone(value):
     return fig
 
 
-Slider("friction coefficient [-]", np.linspace(0, 1.2, 13), in_the_cone, start=5)
+Slider(
+    "friction coefficient [-]", np.linspace(0, 1.2, 13), in_the_cone, start=5
+)
 
 # %% [markdown]
 # ## Exercises

@@ -32,13 +32,21 @@ from contactopt.methods.preconditioners import preconditioner
 # %%
 def two_blocks(nodes):
     h, zone = 4 / (nodes - 1), np.linspace(-2, 2, nodes)
-    punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")
+    punch = rename(
+        tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+"
+    )
     outside = 2 + graded(6, 1.15 * h, 1.15)[1:]
     across = np.concatenate([-outside[::-1], zone, outside])
     ground = rename(tensor_mesh(across, -graded(8, h, 1.15)[::-1]), bottom="y-")
-    ground = ground.with_boundaries({"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)})
-    upper = Part("punch", punch, Material(E=5.0, nu=0.3), supports=(Support("top"),))
-    lower = Part("ground", ground, Material(E=5.0, nu=0.3), supports=(Support("bottom"),))
+    ground = ground.with_boundaries(
+        {"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)}
+    )
+    upper = Part(
+        "punch", punch, Material(E=5.0, nu=0.3), supports=(Support("top"),)
+    )
+    lower = Part(
+        "ground", ground, Material(E=5.0, nu=0.3), supports=(Support("bottom"),)
+    )
     return reduce(Scene("two blocks", upper, lower, mu=0.5))
 
 
@@ -87,9 +95,13 @@ def multiply_by_wave_number(nodes):
     xi[0] = 0.5  # constants: a little, so that P can be inverted
 
     def product(displacement):
-        components = displacement.reshape(nodes, 2)  # normal and tangential, each by itself
+        components = displacement.reshape(
+            nodes, 2
+        )  # normal and tangential, each by itself
         return (
-            np.fft.ifft(xi[:, None] * np.fft.fft(components, n=2 * m, axis=0), axis=0)
+            np.fft.ifft(
+                xi[:, None] * np.fft.fft(components, n=2 * m, axis=0), axis=0
+            )
             .real[:nodes]
             .ravel()
         )
@@ -119,7 +131,7 @@ assert ours[129] <= ours[17] + 4
 # | `p22` | the paper's equation 26: the inverse of a sparse circulant form of $Q$ itself |
 # | `neumann` | the square root of the Laplacian of the contact line, by the cosine transform |
 #
-# The trick of the paper is a circulant matrix that is sparse. It has about $\log_2 N$ entries per
+# The trick of the paper is a circulant matrix that is sparse. It has about $2 \log_2 N$ entries per
 # row for $N$ nodes, so that it needs no FFT. Its symbol is not exactly $|\xi|$, but it stays near
 # it. To see this, we give waves of displacement to each preconditioner, and measure by how much it
 # multiplies them.
@@ -127,10 +139,14 @@ assert ours[129] <= ours[17] + 4
 # %%
 nodes = 129
 problem = problems[nodes]
-waves = np.cos(np.pi * np.outer(np.arange(nodes) + 0.5, np.arange(nodes)) / nodes)
+waves = np.cos(
+    np.pi * np.outer(np.arange(nodes) + 0.5, np.arange(nodes)) / nodes
+)
 waves /= np.linalg.norm(waves, axis=0)
 choices = {"|xi|, five lines": multiply_by_wave_number(nodes)}
-choices |= {name: preconditioner(problem, name) for name in ("p21", "p22", "neumann")}
+choices |= {
+    name: preconditioner(problem, name) for name in ("p21", "p22", "neumann")
+}
 
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 number = np.arange(1, nodes)
@@ -138,11 +154,16 @@ for name, P in choices.items():
     displacement = np.zeros((2 * nodes, nodes))
     displacement[::2] = waves  # waves of normal displacement only
     symbol = np.sum(waves * (P @ displacement)[::2], axis=0)[1:]
-    symbol *= np.exp(-np.mean(np.log(symbol / number)))  # CG does not see a factor
+    symbol *= np.exp(
+        -np.mean(np.log(symbol / number))
+    )  # CG does not see a factor
     ax.loglog(number, symbol, label=name)
     assert np.all((symbol / number > 0.2) & (symbol / number < 5))
 ax.loglog(number, number, "k--", lw=1, label="proportional to the wave number")
-ax.set(xlabel="number of the wave [-]", ylabel="what the preconditioner multiplies it by [-]")
+ax.set(
+    xlabel="number of the wave [-]",
+    ylabel="what the preconditioner multiplies it by [-]",
+)
 _ = ax.legend(frameon=False)
 
 # %% [markdown]
@@ -158,11 +179,14 @@ _ = ax.legend(frameon=False)
 counts = {"none": plain, "|xi|, five lines": ours}
 for name in ("p21", "p22", "neumann"):
     counts[name] = {
-        k: iterations(problem.Q, preconditioner(problem, name)) for k, problem in problems.items()
+        k: iterations(problem.Q, preconditioner(problem, name))
+        for k, problem in problems.items()
     }
 
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
-for (name, count), style in zip(counts.items(), ("ko-", "C0s-", "C1^-", "C2v-", "C3D-")):
+for (name, count), style in zip(
+    counts.items(), ("ko-", "C0s-", "C1^-", "C2v-", "C3D-")
+):
     ax.loglog(list(count), list(count.values()), style, label=name)
 ax.set_xticks(list(problems), [str(k) for k in problems])
 ax.set_yticks([10, 20, 40, 80], ["10", "20", "40", "80"])
@@ -172,7 +196,9 @@ ax.legend(frameon=False)
 
 assert plain[129] > 3 * counts["p21"][129]
 assert counts["neumann"][129] <= counts["neumann"][17] + 2
-assert all(counts["neumann"][k] <= counts[name][k] for k in problems for name in counts)
+assert all(
+    counts["neumann"][k] <= counts[name][k] for k in problems for name in counts
+)
 
 # %% [markdown]
 # ## Why are they not all the same?
@@ -180,7 +206,7 @@ assert all(counts["neumann"][k] <= counts[name][k] for k in problems for name in
 # They differ at the ends of the line. Our five lines and `p21` extend the displacement by zero.
 # That does no harm to a displacement that vanishes where the contact ends; such functions form the
 # space $H^{1/2}_{00}$. But the displacement does not vanish there: a uniform pressure, for
-# instance, moves the nodes at the edge nearly as far as those in the middle. So the extension by
+# instance, moves the nodes at the edge four fifths as far as those in the middle. So the extension by
 # zero makes a jump at each end, and the $H^{1/2}$ norm of a jump is infinite. On a mesh it is
 # finite, but it grows slowly with the number of nodes. The other two avoid the jump. `neumann`
 # continues the displacement by its mirror image. `p22` is the inverse of a matrix that acts on
@@ -193,7 +219,7 @@ under_pressure = (problem.Q @ pressed.ravel()).reshape(nodes, 2)[:, 0]
 ends = under_pressure[[0, -1]] / under_pressure.max()
 print("normal displacement at the ends over the largest:", ends.round(2))
 
-assert np.all(ends > 0.5)  # no sign of a zero at the edge
+assert np.allclose(ends, 0.8, atol=0.05)  # no sign of a zero at the edge
 
 # %% [markdown]
 # Now look at the eigenvalues of $P Q$. They should lie close together.
@@ -207,11 +233,20 @@ for height, name in enumerate(("p21", "p22", "neumann")):
     scaled = spectra[name] / np.median(spectra[name])
     ax.semilogx(scaled, np.full(len(scaled), height), "|", ms=18)
 ax.set_yticks(range(3), list(spectra))
-ax.set(xlabel="eigenvalues of P Q over their median [-]", ylabel="preconditioner", ylim=(-0.5, 2.5))
+ax.set(
+    xlabel="eigenvalues of P Q over their median [-]",
+    ylabel="preconditioner",
+    ylim=(-0.5, 2.5),
+)
 
 condition = {name: values[-1] / values[0] for name, values in spectra.items()}
-without_largest = {name: values[-2] / values[0] for name, values in spectra.items()}
-print("condition number:", {name: f"{value:.1f}" for name, value in condition.items()})
+without_largest = {
+    name: values[-2] / values[0] for name, values in spectra.items()
+}
+print(
+    "condition number:",
+    {name: f"{value:.1f}" for name, value in condition.items()},
+)
 print(
     "without the largest eigenvalue:",
     {name: f"{value:.1f}" for name, value in without_largest.items()},
@@ -233,14 +268,18 @@ def spread(nodes, name):
 
 
 growth = {
-    name: spread(129, name) / spread(17, name) for name in ("five lines", "p21", "p22", "neumann")
+    name: spread(129, name) / spread(17, name)
+    for name in ("five lines", "p21", "p22", "neumann")
 }
 print(
-    "growth of that from 17 to 129 nodes:", {name: f"{value:.2f}" for name, value in growth.items()}
+    "growth of that from 17 to 129 nodes:",
+    {name: f"{value:.2f}" for name, value in growth.items()},
 )
 
 assert all(without_largest[name] < 0.5 * condition[name] for name in spectra)
-assert min(growth["five lines"], growth["p21"]) > 1.5  # the displacement extended by zero
+assert (
+    min(growth["five lines"], growth["p21"]) > 1.5
+)  # the displacement extended by zero
 assert max(growth["p22"], growth["neumann"]) < 1.2  # no jump
 assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
     motion[:, 1]
@@ -260,11 +299,13 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 #
 # <details><summary>Solution</summary>
 #
-# The diagonal is nearly constant, because all nodes but those at the edge are alike. Dividing by a
-# constant makes no difference to CG.
+# Away from the edge the diagonal has one value for all normal components, and one that is less than
+# twice as large for all tangential ones. Dividing by them treats long and short waves alike, so that
+# CG gains next to nothing.
 #
 # ```python
-# jacobi = LinearOperator((2 * nodes,) * 2, matvec=lambda b: b / np.diag(problem.Q))
+# diagonal = np.diag(problem.Q)
+# jacobi = LinearOperator((2 * nodes,) * 2, matvec=lambda b: b / diagonal)
 # assert iterations(problem.Q, jacobi) > 0.7 * plain[nodes]
 # ```
 #
@@ -281,7 +322,8 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 # ```python
 # def power(exponent):
 #     m = 128 * 2
-#     xi = np.maximum(np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m)), 0.5) ** exponent
+#     xi = np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m))
+#     xi = np.maximum(xi, 0.5) ** exponent
 #
 #     def product(displacement):
 #         waves = np.fft.fft(displacement.reshape(nodes, 2), n=2 * m, axis=0)
@@ -289,7 +331,8 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 #
 #     return LinearOperator((2 * nodes, 2 * nodes), matvec=product)
 #
-# tried = {exponent: iterations(problem.Q, power(exponent)) for exponent in (0.0, 0.5, 1.0, 1.5, 2.0)}
+# exponents = (0.0, 0.5, 1.0, 1.5, 2.0)
+# tried = {e: iterations(problem.Q, power(e)) for e in exponents}
 # assert min(tried, key=tried.get) == 1.0
 # ```
 #

@@ -15,7 +15,7 @@ INNER = 1e-13
 
 def seminorm(m: float) -> np.ndarray:
     """The first column (2 m,) of the circulant matrix of the H^1/2 seminorm, eq (27), on a closed
-    curve of 2 m nodes: about log2 m entries, of sum zero where m is a power of two.
+    curve of 2 m nodes: about 2 log2 m entries, of sum zero where m is a power of two.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)

@@ -1,0 +1,153 @@
+"""Exercises that grade themselves, tell what is wrong, and give three hints before the solution.
+
+    check("1.1", answer)    grades an answer and counts the attempt
+    hint("1.1")             gives the next hint; after the third the solution
+    table(1)                shows the state of every exercise of a chapter
+
+An exercise is a record in `exercises_N.py`, with N the number of its chapter; its question stands
+in the chapter. The right answer is computed by the record, and never stands in a notebook.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from experiments.course.feedback import Numbers, Right, Verdict, as_numbers, draw, wrong
+
+LEVELS = {1: "pen and paper", 2: "program", 3: "think"}
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """One exercise.
+
+    number    chapter.number
+    level     1 to 3, in LEVELS
+    asks      what the answer holds, with units
+    right     computes the right answer: numbers, or one of the kinds of `feedback`
+    mistakes  answers that are typically wrong, or functions that compute them; and what to tell
+              about each of them, or the kind of error that `feedback` finds by itself
+    hints     three, each says more
+    solution  lines that a student can run in the chapter; they end with the answer
+    """
+
+    number: str
+    level: int
+    asks: str
+    right: Callable[[], Any]
+    mistakes: tuple[tuple[Any, str], ...]
+    hints: tuple[str, str, str]
+    solution: str
+
+
+@dataclass
+class Progress:
+    """What a student has done with an exercise."""
+
+    state: str = "not answered"
+    attempts: int = 0
+    hints: int = 0
+
+
+PROGRESS: dict[str, Progress] = {}
+
+
+@cache
+def exercises(chapter: int) -> dict[str, Exercise]:
+    """The exercises of a chapter by their numbers."""
+    records = import_module(f"experiments.course.exercises_{chapter}").EXERCISES
+    return {record.number: record for record in records}
+
+
+def exercise(number: str) -> Exercise:
+    """An exercise by its number, such as "1.1"."""
+    chapter = str(number).split(".")[0]
+    found = exercises(int(chapter)) if chapter in "1234567" and chapter else {}
+    if number not in found:
+        raise KeyError(f"there is no exercise {number!r}; the numbers look like '1.1'.")
+    return found[number]
+
+
+@cache
+def right_answer(number: str) -> Right:
+    """The right answer as a kind of `feedback`; it is computed once."""
+    value = exercise(number).right()
+    return Numbers(value) if isinstance(value, (int, float, tuple, list, np.ndarray)) else value
+
+
+@cache
+def mistakes(number: str) -> list[tuple[Any, str]]:
+    """The wrong answers that the record of an exercise tells, computed once."""
+    found = exercise(number).mistakes
+    return [(wrong() if callable(wrong) else wrong, told) for wrong, told in found]
+
+
+def grade(number: str, answer: Any) -> Verdict:
+    """Grade an answer; nothing is printed or counted."""
+    task, right = exercise(number), right_answer(number)
+    given = as_numbers(answer, right, task.asks)
+    if isinstance(given, Verdict):
+        return given
+    verdict = right.verdict(given)
+    if verdict.right or not isinstance(right, Numbers):
+        return verdict
+    for value, told in mistakes(number):
+        if " " in told and right.agrees(given, value):
+            return wrong("mistake", told)
+    return verdict
+
+
+def check(number: str, answer: Any) -> None:
+    """Grade an answer, print the verdict, and count the attempt; `...` is no answer yet."""
+    if answer is ... or (isinstance(answer, (tuple, list)) and any(a is ... for a in answer)):
+        print(f"Exercise {number}: not answered yet. hint({number!r}) gives a first hint.")
+        return
+    verdict, done = grade(number, answer), PROGRESS.setdefault(number, Progress())
+    done.attempts += 1
+    if verdict.right:
+        done.state = "right"
+    elif done.state != "right":
+        done.state = "not right yet"
+    print(f"Exercise {number}: {verdict.sentence.strip()}")
+    if not verdict.right:
+        print(f"hint({number!r}) gives {_next(done.hints)}.")
+        _show(number, answer, verdict)
+
+
+def hint(number: str) -> None:
+    """Print the next hint to an exercise; after the third one its solution."""
+    task, done = exercise(number), PROGRESS.setdefault(number, Progress())
+    if done.hints < 3:
+        print(f"Hint {done.hints + 1} of 3 to exercise {number}: {task.hints[done.hints]}")
+    else:
+        print(f"Solution of exercise {number}:\n\n{task.solution.strip()}")
+    done.hints = min(done.hints + 1, 4)
+
+
+def table(chapter: int) -> None:
+    """Print the state of every exercise of a chapter: level, attempts, and hints that were read."""
+    print(f"{'exercise':<10}{'level':<18}{'state':<16}{'attempts':>9}{'hints':>10}")
+    tasks = exercises(chapter)
+    for number, task in tasks.items():
+        done = PROGRESS.get(number, Progress())
+        hints = "solution" if done.hints > 3 else str(done.hints)
+        print(f"{number:<10}{LEVELS[task.level]:<18}{done.state:<16}{done.attempts:>9}{hints:>10}")
+    right = sum(PROGRESS.get(number, Progress()).state == "right" for number in tasks)
+    print(f"{right} of {len(tasks)} exercises are right.")
+
+
+def _next(read: int) -> str:
+    return ("a first hint", "a second hint", "a third hint", "the solution")[min(read, 3)]
+
+
+def _show(number: str, answer: Any, verdict: Verdict) -> None:
+    """Draw the worst contact where the answer is forces."""
+    right = right_answer(number)
+    if verdict.contact is not None and hasattr(right, "problem"):
+        draw(right.problem, right.forces(np.asarray(answer, dtype=float)), verdict.contact)
