@@ -71,6 +71,17 @@ def test_a_strangers_rows_join_with_their_own_card(campaign, tmp_path):
     assert main(["report", "all", "--merge", str(tmp_path / "theirs.csv")]) == 2
 
 
+def test_figures_for_a_paper_stand_beside_those_of_the_page(campaign, tmp_path):
+    folder = shutil.copytree(campaign, tmp_path / "own")
+    assert main(["report", str(folder), "--figures", "pdf"]) == 0
+    drawn = {file.stem for file in folder.glob("figure-*.png")}
+    assert drawn and drawn == {file.stem for file in folder.glob("figure-*.pdf")}
+    assert all(file.read_bytes()[:5] == b"%PDF-" for file in folder.glob("figure-*.pdf"))
+    assert main(["report", str(folder)]) == 0
+    assert not list(folder.glob("figure-*.pdf"))  # none of an earlier report is left
+    assert main(["report", "all", "--figures", "pdf"]) == 2
+
+
 def test_names_of_a_campaign_are_text(campaign, tmp_path):
     table = load(campaign)
     table["method"] = "</script><img src=x onerror=alert(1)>"

@@ -13,7 +13,7 @@ import skfem.io.meshio
 
 from contactopt import InputError, load_mesh
 from contactopt.meshes import mesh_formats
-from contactopt.meshes.mesh_files import name_boundaries
+from contactopt.meshes.mesh_files import load_bodies, name_boundaries
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.0]])
 TWO = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
@@ -458,11 +458,176 @@ def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path)
         ("101,102", "999,102", "names a node that is not there"),
         ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "cannot be read as abaqus"),
         ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
-        ("*Heading", "*PART, NAME=A\n*PART, NAME=B", "several parts"),
+        ("TYPE=C3D20", "TYPE=C3D21", "elements of type C3D21R are not known"),
+        ("up, S1", "upper, S1", "there is no set upper of elements"),
+        ("FLOOR, range", "FLOOR, RANGES", "there is no set RANGES of nodes"),
     ):
         (tmp_path / "two.inp").write_text(text.replace(old, new))
         with pytest.raises(InputError, match=words):
             load_mesh(tmp_path / "two.inp", "LOW")
+
+
+ASSEMBLY = """*Heading
+*Part, name=Brick
+*Node
+{brick}
+*Element, type=C3D20, elset=All
+1, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,
+16,17,18,19,20
+*Nset, nset=Under
+1, 2, 3, 4
+*Elset, elset=_Over_S2, internal
+1,
+*Surface, type=ELEMENT, name=Over
+_Over_S2, S2
+*Surface, type=ELEMENT, name=Skin
+All
+*End Part
+*Part, name=Tool
+*Surface, type=SEGMENTS, name=Rigid
+START, 0., 0.
+*End Part
+*Assembly, name=Assembly
+*Instance, name=Low, part=Brick
+*End Instance
+*Instance, name=Up, part=Brick
+ 0., 0., 3.
+ 0., 0., 3., 0., 1., 3., 90.
+*End Instance
+*Instance, name=Tool-1, part=TOOL
+*End Instance
+*Nset, nset=Foot, instance=Low
+1, 2, 3, 4
+*Nset, nset=Side, instance=Up
+Under
+*Nset, nset=Under, instance=Low
+5, 6, 7, 8
+*Elset, elset=Both
+Low.All, Up.1
+*Surface, type=ELEMENT, name=Front
+Low._Over_S2, S3
+*End Assembly
+"""
+
+
+def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
+    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height:
+    (x, y, z) goes to (z, y, 3 - x).
+    """
+    path, text = tmp_path / "two.inp", ASSEMBLY.format(brick=brick_of_twenty(0.0, 1))
+    path.write_text(text)
+    low, up = load_mesh(path, "Low"), load_mesh(path, "Up")
+    for mesh, z in ((low, 0), (up, 2)):
+        assert volume(mesh) == pytest.approx(1.0)
+        np.testing.assert_allclose(mesh.p.min(axis=1), [0, 0, z], atol=1e-12)
+        assert len(mesh.boundaries["Skin"]) == 6 and flux(mesh, "Skin") == pytest.approx(3.0)
+    assert set(low.boundaries) == {"Foot", "Under", "Low.Under", "Over", "Front", "Skin"}
+    assert set(up.boundaries) == {"Side", "Up.Under", "Over", "Skin"}
+    for mesh, name, axis, value in (
+        (low, "Foot", 2, 0.0), (low, "Low.Under", 2, 0.0), (low, "Under", 2, 1.0),
+        (low, "Over", 2, 1.0), (low, "Front", 1, 0.0),
+        (up, "Side", 0, 0.0), (up, "Up.Under", 0, 0.0), (up, "Over", 0, 1.0),
+    ):  # fmt: skip
+        corners = mesh.p[axis, mesh.facets[:, mesh.boundaries[name]]]
+        np.testing.assert_allclose(corners, value, atol=1e-12)
+    for old, new, words in (
+        ("Low.All, Up.1", "Low.All, Up.None", "there is no set None of elements"),
+        ("instance=Low", "instance=Lowest", "there is no instance Lowest"),
+        ("part=TOOL", "part=Toll", "is of part Toll, which is not there; parts: brick, tool"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=words):
+            load_mesh(path, "Low")
+    path.write_text(text)
+    with pytest.raises(InputError, match="no group 'Tool-1'; its groups of elements are Low, Up"):
+        load_mesh(path, "Tool-1")
+    with pytest.raises(InputError, match="falls into 2 pieces"):
+        load_mesh(path, "Both")
+    bodies, refused = load_bodies(path)
+    assert set(bodies) == {"Low", "Up"} and len(refused) == 3
+    assert any("'Both' is the same as" in told or "same as 'Both'" in told for told in refused)
+
+
+def exodus_bricks(path, hdf5):
+    """Two bricks of twenty nodes, one on the other, and a tetrahedron beside them."""
+    places = np.array([
+        [float(word) for word in line.split(",")[1:]]
+        for z in (0.0, 1.0) for line in brick_of_twenty(z, 1).splitlines()
+    ])  # fmt: skip
+    corners = np.array([[5, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1.0]])
+    # edges: those below, those along the third axis, those above
+    order = np.array([*range(12), 16, 17, 18, 19, 12, 13, 14, 15]) + 1
+    letters = np.zeros((3, 8), dtype="S1")
+    for row, name in zip(letters, ("low", "up", "tip")):
+        row[: len(name)] = list(name)
+    values = {
+        "coordx": np.append(places[:, 0], corners[:, 0]),
+        "coordy": np.append(places[:, 1], corners[:, 1]),
+        "coordz": np.append(places[:, 2], corners[:, 2]),
+        "eb_prop1": np.array([10, 20, 30]), "eb_names": letters,
+        "connect1": order[None], "connect2": order[None] + 20,
+        "connect3": np.array([[41, 42, 43, 44]]),
+        "ss_prop1": np.arange(1, 7),
+        **{f"elem_ss{k}": np.array([1, 2, 3][: 3 if k < 5 else 2]) for k in range(1, 7)},
+        **{f"side_ss{k}": np.full(3 if k < 5 else 2, k) for k in range(1, 7)},
+        "ns_prop1": np.array([7]), "node_ns1": np.array([1, 2, 3, 4]),
+    }  # fmt: skip
+    kinds = {"connect1": "HEX20", "connect2": "HEX20", "connect3": "TETRA4"}
+    if hdf5:
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            for name, value in values.items():
+                file[name] = value
+            for name, kind in kinds.items():
+                file[name].attrs["elem_type"] = np.bytes_(kind)
+        return
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w") as file:
+        for name, value in values.items():
+            lengths = tuple(f"{name}_{axis}" for axis in range(value.ndim))
+            for length, size in zip(lengths, value.shape):
+                file.createDimension(length, size)
+            value = value if value.dtype.kind != "i" else value.astype("i4")
+            file.createVariable(name, value.dtype, lengths)[:] = value
+        for name, kind in kinds.items():
+            file.variables[name].elem_type = kind
+
+
+@pytest.mark.parametrize("hdf5", [False, True])
+def test_exodus_files_keep_the_names_of_blocks_and_their_side_sets(tmp_path, hdf5):
+    path = tmp_path / "bricks.exo"
+    exodus_bricks(path, hdf5)
+    low, up, tip = (load_mesh(path, name) for name in ("low", "up", "tip"))
+    assert type(up) is skfem.MeshHex2 and type(tip) is skfem.MeshTet1
+    for mesh, size in ((low, 1.0), (up, 1.0), (tip, 1 / 6)):
+        assert volume(mesh) == pytest.approx(size) and flux(mesh) == pytest.approx(3 * size)
+    # of a brick: (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (1, 5, 8, 4), (1, 4, 3, 2), (5, 6, 7, 8)
+    for side, (axis, value) in enumerate(((1, 0), (0, 1), (1, 1), (0, 0), (2, 0), (2, 1)), 1):
+        for mesh, z in ((low, 0), (up, 1)):
+            corners = mesh.p[:, mesh.facets[:, mesh.boundaries[f"side {side}"]]]
+            assert corners.shape[2] == 1
+            np.testing.assert_allclose(corners[axis], value + (z if axis == 2 else 0), atol=1e-12)
+    for side, axis in ((1, 1), (3, 0), (4, 2)):  # of a tetrahedron; its second side is oblique
+        corners = tip.p[:, tip.facets[:, tip.boundaries[f"side {side}"]]]
+        np.testing.assert_allclose(corners[axis], 5.0 if axis == 0 else 0.0, atol=1e-12)
+    assert set(low.boundaries) == {"nodes 7", *(f"side {k}" for k in range(1, 7))}
+    with pytest.raises(InputError, match="its groups of elements are low, up, tip"):
+        load_mesh(path, "middle")
+    path.write_bytes(path.read_bytes()[: 400 if not hdf5 else 1000])
+    with pytest.raises(InputError, match="cannot be read as exodus"):
+        load_mesh(path)
+
+
+def test_groups_of_med_files_keep_their_names(gmsh, tmp_path):
+    pytest.importorskip("h5py")
+    disc_in_plate(gmsh, tmp_path / "a.msh", 3, 2)
+    gmsh.write(str(tmp_path / "a.med"))
+    for name in ("disc", "plate"):
+        own, other = (load_mesh(tmp_path / file, name) for file in ("a.msh", "a.med"))
+        assert set(own.boundaries) == set(other.boundaries) == {"rim"}
+        assert other.nelements == own.nelements
+        assert volume(other) == pytest.approx(volume(own), rel=1e-12)
+        assert flux(other, "rim") == pytest.approx(flux(own, "rim"), rel=1e-12)
 
 
 @pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])
@@ -588,7 +753,7 @@ def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence
     for key, found in text.members.items():
         assert all(np.array_equal(members, binary.members[key][i]) for i, members in found.items())
     data, rng, refused = (tmp_path / "1.msh").read_bytes(), np.random.default_rng(0), 0
-    for trial in range(40):
+    for trial in range(40 if version == "4.1" else 6):  # 2.2 is read by another process
         bad = np.frombuffer(data, np.uint8).copy()
         bad[rng.integers(30, len(bad), 5)] = rng.integers(0, 256, 5)
         (tmp_path / "bad.msh").write_bytes(
@@ -598,4 +763,4 @@ def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence
             mesh_formats.read_groups(tmp_path / "bad.msh")
         except InputError as error:
             refused += "\n" not in str(error)
-    assert refused > 20
+    assert refused > (trial + 1) / 2

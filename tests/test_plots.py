@@ -1,11 +1,15 @@
+import re
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from conftest import two_blocks
+from matplotlib.text import Text
 
 from contactopt import plots, reduce_bodies, run, scenes, solve
 from contactopt.figures.solids import nearest, picture
+from contactopt.figures.style import COLUMN, draw_lines, paper_axes, save_figure
 
 
 @pytest.mark.parametrize("name,elements", [("punch-2d", 5), ("punch-3d", 3), ("sphere", 8)])
@@ -18,7 +22,7 @@ def test_every_axis_is_labelled_with_its_unit(name, elements):
     assert all("[" in label and "]" in label for label in labels)
     if result.scene.dim == 3:  # the axes of a picture of solids are drawn in it
         texts = {text.get_text() for text in bodies.texts}
-        assert {"x [mm]", "y [mm]", "z [mm]"} <= texts
+        assert {"$x$ [mm]", "$y$ [mm]", "$z$ [mm]"} <= texts
 
 
 def test_a_users_scene_is_not_labelled_with_our_units():
@@ -46,6 +50,43 @@ def test_a_rigid_punch_is_drawn_with_its_exact_curve():
     assert any("rigid punch" in label for label in labels)
     plain = run("punch-2d", elements=6)
     assert len(plots.pressure(plain.scene, plain.problem, plain.solution).lines) == 1
+
+
+@pytest.mark.parametrize("wide, columns, rows", [(False, 1, 1), (True, 2, 1), (True, 2, 2)])
+def test_names_beside_lines_never_meet_and_stay_in_the_figure(wide, columns, rows):
+    random, x = np.random.default_rng(rows), np.geomspace(1.0, 1e3, 5)
+    figure, axes = paper_axes(columns, rows, wide)
+    for ax, spread in zip(axes, (0.0, 0.01, 1.0, 5.0)):
+        lines = [
+            (f"name of {i}", x[: 2 + i % 4], 10 ** (spread * random.random(2 + i % 4)))
+            for i in range(11)
+        ]
+        draw_lines(ax, lines)
+    figure.draw_without_rendering()
+    for ax in axes:
+        assert {text.get_text() for text in ax.texts} == {f"name of {i}" for i in range(8)}
+        assert len(ax.texts) == 8 and len({line.get_color() for line in ax.lines}) == 9
+        boxes = [Text.get_window_extent(text) for text in ax.texts]
+        assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+        assert all(box.x0 >= ax.bbox.x1 and box.x1 <= figure.bbox.x1 + 1 for box in boxes)
+
+
+def test_a_figure_as_pdf_is_one_column_wide_and_says_a_status_only_if_it_failed(tmp_path):
+    result = run("punch-2d", elements=4)
+    figure = plots.contact_figure(result.scene, result.problem, result.solution)
+    save_figure(figure, tmp_path / "a.pdf")
+    box = re.search(rb"MediaBox \[([\d. ]+)\]", (tmp_path / "a.pdf").read_bytes())
+    assert float(box[1].split()[2]) == pytest.approx(72 * COLUMN, abs=0.1)
+    assert figure.get_suptitle() == r"punch-2d, $\mu$ = 0.5"
+    assert all(ax.get_legend() is None or _above(ax) for ax in figure.axes)
+    failed = replace(result.solution, status=solve(result.problem, "nsgs", max_iterations=1).status)
+    words = plots.contact_figure(result.scene, result.problem, failed).get_suptitle()
+    assert words.startswith(r"punch-2d, $\mu$ = 0.5: ")
+
+
+def _above(ax):
+    ax.figure.draw_without_rendering()
+    return ax.get_legend().get_window_extent().y0 >= ax.bbox.y1
 
 
 def test_triangles_and_convergence_are_drawn():

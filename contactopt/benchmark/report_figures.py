@@ -10,24 +10,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.benchmark.figure_style import (
-    COLOURS,
-    FAINT,
     FLOOR,
     LEAST_RESIDUAL,
     NAMES,
     NO_LABELS,
-    STYLES,
-    WIDTH,
-    add_legend,
-    label_ends,
-    label_right,
-    make_figure,
     set_ticks,
     short_label,
     short_tick,
@@ -36,11 +27,26 @@ from contactopt.benchmark.figure_style import (
 from contactopt.benchmark.ranking import achieved, mean_times, points
 from contactopt.benchmark.tables import INSTANCE, groups
 from contactopt.errors import InputError
+from contactopt.figures.style import (
+    COLOURS,
+    FAINT,
+    LETTERS,
+    LINE,
+    MARKS,
+    add_colours,
+    label_ends,
+    paper_axes,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
+
+
+def _look(rank: int) -> dict[str, Any]:
+    """Of a line by its rank: the eight first have colours."""
+    return {"color": COLOURS[rank], "lw": LINE} if rank < len(COLOURS) else dict(FAINT)
 
 
 def speed_accuracy(
@@ -52,36 +58,36 @@ def speed_accuracy(
     """Draw time against certified residual: per method a line through its settings, medians over
     problems and repeats.
 
-    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both
-    faster and more accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at
-    FLOOR. Labels stand where the lines end, too.
+    Filled: at least half of the runs kept the tolerance. The eight that keep most, and are the
+    fastest among these, have colours and names. The Pareto front, where nothing is both faster and
+    more accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR.
     """
-    figure, ax = make_figure()
-    points, ends = [], []
-    for (name, rows), style in zip(groups(table, by), cycle(STYLES)):
-        name = short_label(name, labels)
-        # settings of the same tolerance are one point
-        settings = rows.groupby("tolerance").agg(
-            {time: "median", "residual": "median", "success": "mean"}
-        )
-        settings = settings.sort_index(ascending=False)
+    figure, (ax,) = paper_axes()
+    # settings of the same tolerance are one point
+    how = {time: "median", "residual": "median", "success": "mean"}
+    found = [(name, own.groupby("tolerance").agg(how)) for name, own in groups(table, by)]
+    found.sort(key=lambda pair: (-pair[1]["success"].mean(), pair[1][time].median()))
+    drawn, ends = [], []
+    for rank, (name, settings) in enumerate(found):
+        name, settings = short_label(name, labels), settings.sort_index(ascending=False)
         shown = settings[np.isfinite(settings["residual"])]
         floor = FLOOR * shown.index.to_numpy(float)
         x, y = shown[time].to_numpy(), np.maximum(shown["residual"].to_numpy(), floor)
-        ends += [(x[-1], y[-1], name, style["color"])] if len(x) else []
-        ax.loglog(x, y, "-", color=style["color"], lw=1, alpha=0.7)
+        ax.loglog(x, y, "-", alpha=0.7, **_look(rank))
         good = shown["success"].to_numpy() >= 0.5
-        look = style | {"ls": "none", "ms": 6}
+        look = _look(rank) | {"ls": "none", "marker": MARKS[rank % len(MARKS)]}
         if good.any():
             ax.loglog(x[good], y[good], label=name, **look)
         ax.loglog(x[~good], y[~good], mfc="white", label="" if good.any() else name, **look)
-        points += list(zip(x, y))
-    label_ends(ax, ends)
-    wide = {"color": "#bbbbbb", "lw": 5, "zorder": 0}
-    ax.step(*_pareto(np.array(points)).T, where="post", label="Pareto front", **wide)
+        drawn += list(zip(x, y))
+        if len(x) and rank < len(COLOURS):
+            ends.append((x[-1], y[-1], name, COLOURS[rank]))
+    wide = {"color": "#dddddd", "lw": 4, "zorder": 0}
+    ax.step(*_pareto(np.array(drawn)).T, where="post", label="Pareto front", **wide)
     ax.set(xlabel=NAMES.get(time, time) + ", median", ylabel="natural-map residual [-], median")
     set_ticks(ax.xaxis)
-    return add_legend(figure, ax)
+    label_ends(ax, ends)
+    return figure
 
 
 def _pareto(points: np.ndarray) -> np.ndarray:
@@ -111,7 +117,7 @@ def performance_profile(
     Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math.
     Program. 91, 201-213.
     """
-    figure, ax = make_figure()
+    figure, (ax,) = paper_axes()
     if accuracy is None:
         wide = _at_settings(table, metric, by)
     else:
@@ -125,16 +131,14 @@ def performance_profile(
         reached = np.sort(ratio[full][np.isfinite(ratio[full])].to_numpy())
         share = np.arange(len(reached) + 1) / len(wide)
         label = f"{short_label(str(full), labels)} ({len(reached)})"
-        look = FAINT if rank >= len(COLOURS) else {"color": COLOURS[rank], "lw": 1.6}
         x, y = np.concatenate([[1.0], reached, [largest]]), np.append(share, share[-1])
-        ax.step(x, y, where="post", label=label, **look)
-        ends += [(float(share[-1]), label, COLOURS[rank])] if rank < len(COLOURS) else []
+        ax.step(x, y, where="post", label=label, **_look(rank))
+        ends += [(largest, share[-1], label, COLOURS[rank])] if rank < len(COLOURS) else []
     what = NAMES.get(metric, metric).partition(" [")[0]
     ax.set(xscale="log", xlim=(1, largest), ylim=(0, 1.03))
-    ax.set(xlabel=f"ratio: {what} / the best method's [-]")
+    ax.set_xlabel(f"ratio: {what} / the best method's [-]", loc="left")
     ax.set(ylabel=f"share of the {len(wide)} instances solved")
-    ax.grid(alpha=0.3)
-    label_right(ax, ends)
+    label_ends(ax, ends)
     return figure
 
 
@@ -147,21 +151,19 @@ def time_to_accuracy(
     so far, with a failure counted at its limit. So a method is not the faster for failing where the
     others need time. The eight best at the middle have colours and names at their right ends.
     """
-    figure, ax = make_figure()
+    figure, (ax,) = paper_axes()
     found, which = points(table), "wall" if time == "call_seconds" else "cpu"
     across = np.geomspace(*ACCURACIES)
     curves = [mean_times(found, accuracy, which) for accuracy in across]
     ends = []
     for rank, full in enumerate(curves[len(curves) // 2].sort_values().index):
         height = [float(curve.get(full, np.nan)) for curve in curves]
-        look = FAINT if rank >= len(COLOURS) else {"color": COLOURS[rank], "lw": 1.6}
-        ax.loglog(across, height, **look)
+        ax.loglog(across, height, **_look(rank))
         if rank < len(COLOURS):
-            ends.append((height[-1], short_label(str(full), labels), COLOURS[rank]))
+            ends.append((across[-1], height[-1], short_label(str(full), labels), COLOURS[rank]))
     ax.set(xlim=ACCURACIES[:2], xlabel="certificate that is reached [-]")
     ax.set(ylabel=NAMES.get(time, time) + ", mean")
-    ax.grid(alpha=0.3)
-    label_right(ax, ends)
+    label_ends(ax, ends)
     return figure
 
 
@@ -182,22 +184,26 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
-    """Draw median times of successes against size, with the exponent p of the larger sizes."""
-    figure, ax = make_figure()
-    ends = []
-    look = {name: style for (name, _), style in zip(groups(table, by), cycle(STYLES))}
+    """Draw median times of successes against size, with the exponent of the larger sizes n.
+
+    The eight fastest at their largest sizes have colours and names.
+    """
+    figure, (ax,) = paper_axes()
+    ends, found = [], []
     for full, rows in groups(table[table["success"]], by):
-        name, style = short_label(full, labels), look[full]
         medians = rows.groupby(size)[metric].median()
-        x, y = medians.index.to_numpy(float), medians.to_numpy()
-        exponent = fitted_exponent(x, y)
-        ends.append((x[-1], y[-1], name, style["color"]))
-        label = name + ("" if np.isnan(exponent) else f": {exponent:.1f}")
-        ax.loglog(x, y, ms=5, lw=1.2, label=label, **style)
-    label_ends(ax, ends)
+        found.append((full, medians.index.to_numpy(float), medians.to_numpy()))
+    found.sort(key=lambda own: (-own[1][-1], own[2][-1]))
+    for rank, (full, x, y) in enumerate(found):
+        exponent, label = fitted_exponent(x, y), short_label(full, labels)
+        label += "" if np.isnan(exponent) else f" $n^{{{exponent:.1f}}}$"
+        ax.loglog(x, y, marker=MARKS[rank % len(MARKS)], label=label, **_look(rank))
+        if rank < len(COLOURS):
+            ends.append((x[-1], y[-1], label, COLOURS[rank]))
     ax.set(xlabel=NAMES.get(size, size), ylabel=NAMES.get(metric, metric) + ", median")
     set_ticks(ax.xaxis)
-    return add_legend(figure, ax, "method: exponent")
+    label_ends(ax, ends)
+    return figure
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
@@ -228,28 +234,28 @@ def stability_map(
 
     parts = groups(table, by)
     columns = min(2, len(parts))
-    size = (WIDTH / columns, 2.5 if columns > 1 else 3.8)
-    figure, axes = make_figure(columns, -(-len(parts) // columns), size)
+    figure, axes = paper_axes(columns, -(-len(parts) // columns), height=1.5 * (3 - columns))
     grids = [_grid(rows, x, y, value) for _, rows in parts]
     shown = np.concatenate([grid.to_numpy(float).ravel() for grid in grids])
     shown = shown[np.isfinite(shown) & (shown > 0)]
     low, high = (float(shown.min()), float(shown.max())) if len(shown) else (0.1, 1.0)
     norm = Normalize(0, 1) if value == "success" else LogNorm(low, high if high > low else 2 * low)
-    small = 8 if columns > 1 else None
-    for number, (ax, (name, rows), grid) in enumerate(zip(np.ravel(axes), parts, grids)):
+    for number, (ax, (name, rows), grid) in enumerate(zip(axes, parts, grids)):
         mesh = _draw_map(ax, grid, norm, columns > 1)
-        ax.set_title(name, fontsize=9)
-        ax.set_xlabel(NAMES.get(x, x), fontsize=small)
-        ax.set_ylabel(NAMES.get(y, y) if number % columns == 0 else "", fontsize=small)
+        ax.set_title(short_label(name), fontsize=LETTERS, pad=3)
+        last = number + columns >= len(parts)
+        ax.set_xlabel(NAMES.get(x, x) if last else "")
         _thresholds(ax, rows, x, y, grid)
-    for ax in np.ravel(axes)[len(parts) :]:
+    for ax in axes[len(parts) :]:
         ax.set_axis_off()
-    handles = {line.get_label(): line for ax in np.ravel(axes) for line in ax.get_lines()}
+    figure.supylabel(NAMES.get(y, y), fontsize=LETTERS)
+    handles = {line.get_label(): line for ax in axes for line in ax.get_lines()}
     if handles:
-        look = {"loc": "outside lower center", "ncols": 1, "frameon": False, "fontsize": 8}
+        look = {"loc": "outside lower center", "ncols": 1, "frameon": False, "fontsize": LETTERS}
         figure.legend(handles=list(handles.values()), **look)
-    label = "share of runs solved" if value == "success" else NAMES.get(value, value) + ", median"
-    figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.8, aspect=30)
+    what = NAMES.get(value, value) + ", median"
+    what = "share of runs solved [-]" if value == "success" else what
+    add_colours(mesh, axes, what, location="top", aspect=30)
     return figure
 
 
@@ -268,17 +274,17 @@ def _draw_map(ax: Any, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
     """Draw one map, with less room if another stands beside it; its picture."""
     ax.set_facecolor("#cccccc")
     ax.patch.set(hatch="xx", edgecolor="#999999")
-    write_numbers(ax, grid, norm, 7 if beside else 8)
+    write_numbers(ax, grid, norm, 5 if beside else LETTERS)
     look = {"cmap": "viridis", "origin": "lower", "aspect": "auto"}
     mesh = ax.imshow(grid.to_numpy(float), norm=norm, **look)
     # the last number is the room along the axis [characters]
     for axis, index, room in (
-        (ax.xaxis, grid.columns, 26 if beside else 60),
-        (ax.yaxis, grid.index, 60),
+        (ax.xaxis, grid.columns, 20 if beside else 40),
+        (ax.yaxis, grid.index, 40),
     ):
         names = [short_tick(v) for v in index]
         ticks = range(0, len(index), -(-sum(len(name) + 1 for name in names) // room))
-        axis.set_ticks(list(ticks), [names[i] for i in ticks], fontsize=8)
+        axis.set_ticks(list(ticks), [names[i] for i in ticks])
     return mesh
 
 
@@ -303,7 +309,8 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
         along = np.interp(np.log(known.to_numpy()), cells, number, left=np.nan, right=np.nan)
         line = along, np.array([places[v] for v in known.index])
         if np.isfinite(along).sum() > 1:
-            ax.plot(*(line if upright else line[::-1]), style, color="#D55E00", lw=2, label=label)
+            look = {"color": COLOURS[1], "lw": 1.5, "label": label}
+            ax.plot(*(line if upright else line[::-1]), style, **look)
 
 
 def convergence(
@@ -315,18 +322,23 @@ def convergence(
     """Draw the residual over outer iterations, or over time ("seconds"), of first repeats."""
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
-    figure, ax = make_figure()
-    for (name, rows), style in zip(groups(table, by), cycle(STYLES)):
+    figure, (ax,) = paper_axes()
+    ends = []
+    for rank, (name, rows) in enumerate(groups(table, by)):
         history = json.loads(rows.sort_values("repeat")["history"].iloc[0])
         if not history:
             continue
         residual, seconds, iterations = history
         along = iterations if x == "iterations" else seconds
         residual = np.maximum(residual, max(LEAST_RESIDUAL, FLOOR * float(rows["tolerance"].min())))
-        ax.loglog(along, residual, ms=3, lw=1, label=short_label(name, labels), **style)
-    across = "outer iteration" if x == "iterations" else "seconds"
+        label = short_label(name, labels)
+        ax.loglog(along, residual, label=label, **_look(rank))
+        if rank < len(COLOURS):
+            ends.append((along[-1], residual[-1], label, COLOURS[rank]))
+    across = "outer iteration [-]" if x == "iterations" else "time [s]"
     ax.set(xlabel=across, ylabel="natural-map residual [-]")
-    return add_legend(figure, ax)
+    label_ends(ax, ends)
+    return figure
 
 
 FIGURES: dict[str, Callable[..., Any]] = {

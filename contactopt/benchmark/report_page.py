@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.figure_style import COLOURS
 from contactopt.benchmark.ranking import (
     NOISE,
     RESAMPLES,
@@ -34,6 +33,7 @@ from contactopt.benchmark.store import ABSENT, load, require
 from contactopt.benchmark.testset import problems
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
+from contactopt.figures.style import COLOURS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +56,10 @@ PROTOCOL = (
 
 
 def report_campaign(
-    folder: str | Path, experiment: str | Path | None = None, others: Sequence[str | Path] = ()
+    folder: str | Path,
+    experiment: str | Path | None = None,
+    others: Sequence[str | Path] = (),
+    figures: Sequence[str] = (),
 ) -> Path:
     """Write the report of a finished campaign into its folder: report.md with figures, and
     report.html to look things up, one file with everything in it.
@@ -66,6 +69,7 @@ def report_campaign(
     folder : of the campaign, with rows.jsonl, rows.parquet or rows.csv
     experiment : its file; None: the copy in the folder, without which the usual figures are drawn
     others : files or folders with rows of other people, which join those of the campaign
+    figures : formats of the figures, of png, svg and pdf; PNG is always written
 
     Returns
     -------
@@ -87,7 +91,7 @@ def report_campaign(
     layout = read_layout(path) if known else Layout(path, name, name)
     if not (path.parent / layout.findings).is_file():  # beside a copy there is none
         layout = replace(layout, findings="")
-    text = write_report(layout, folder, table)
+    text = write_report(layout, folder, table, figures)
     body = filled("report.html", title=html.escape(layout.title), static=rendered(text, folder))
     data = page_data(table) | {"absent": _absent(rows)}
     return write_html(folder / PAGE, layout.title, body, data, ["report.js"], plotly=False)

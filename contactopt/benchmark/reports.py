@@ -26,6 +26,7 @@ from contactopt.benchmark.tables import TABLES, select
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 from contactopt.figures.html import filled
+from contactopt.figures.style import save_figure
 from contactopt.files.toml_table import Table, read_table
 from contactopt.files.writing import remove_files, whole_file, whole_folder
 
@@ -61,7 +62,7 @@ LEFT_OUT = ("key", "label", "history")  # of a report's table
 TABLE_FILES = ("csv", "parquet")
 MOST_LINES = 2000  # of a table that is kept as text
 PAGE = "benchmarks.html"
-DPI, SHADES = 100, 160
+SHADES = 56
 
 
 @dataclass(frozen=True)
@@ -174,13 +175,15 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
     return page
 
 
-def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
-    """Write report.md with its pictures into a folder; its Markdown."""
+def write_report(
+    layout: Layout, folder: Path, table: pd.DataFrame, formats: Sequence[str] = ()
+) -> str:
+    """Write report.md into a folder, and its pictures as PNG and in more formats; its Markdown."""
     parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
         found = enumerate(_findings(layout, table), 1)
         parts.append("\n".join(f"{n}. {text}" for n, text in found))
-    with whole_folder(folder, [old.name for old in folder.glob("figure-*.png")]) as made:
+    with whole_folder(folder, [old.name for old in folder.glob("figure-*.*")]) as made:
         for number, entry in enumerate(layout.figures or USUAL, 1):
             result, caption = _drawn(layout, number, entry, table), _one_line(entry["caption"])
             if result is None:
@@ -190,6 +193,8 @@ def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
             else:
                 picture, plain = f"figure-{number}.png", re.sub(r"[\[\]*`]", "", caption)
                 (made / picture).write_bytes(_png(result))
+                for ending in {*formats} - {"png"}:
+                    save_figure(result, made / f"figure-{number}.{ending}")
                 parts += [f"![{plain}]({picture})", f"*Figure {number}. {caption}*"]
         parts.append(_foot(layout, folder, table))
         text = "\n\n".join(part for part in parts if part) + "\n"
@@ -281,7 +286,7 @@ def _png(figure: Any) -> bytes:
     from PIL import Image
 
     full, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(full, format="png", dpi=DPI)
+    figure.savefig(full, format="png")
     Image.open(full).convert("RGB").quantize(SHADES).save(small, format="png", optimize=True)
     return small.getvalue()
 

@@ -177,6 +177,34 @@ def show(options: argparse.Namespace) -> int:
     return 0
 
 
+def mesh(options: argparse.Namespace) -> int:
+    """Mesh a part of a CAD program, or read a mesh file; say and draw what it holds."""
+    import webbrowser
+
+    from contactopt.figures.check_page import write_mesh_page
+    from contactopt.figures.mesh_words import mesh_words
+    from contactopt.meshes.cad import ENDINGS, mesh_part
+    from contactopt.meshes.mesh_files import load_bodies
+
+    path = Path(options.file)
+    if path.suffix.lower() in ENDINGS:
+        part, path = path, Path(options.out or path.with_suffix(".msh"))
+        fine = dict(options.fine)
+        names = {new: old.split(",") for new, old in options.name}
+        mesh_part(part, path, options.size, fine, names, options.order)
+    meshes, refused = load_bodies(path)
+    text, named = mesh_words(path, meshes)
+    print("\n".join([text, *(f"# note: {note}" for note in refused)]))
+    if options.no_page or not meshes:
+        return 0 if meshes else 2
+    page = Path(f"out/{path.stem}-mesh.html")
+    write_mesh_page(str(path), named, text, refused, page)
+    if not options.no_open:
+        webbrowser.open(page.resolve().as_uri())
+    print(f"# {page} shows the bodies and their boundaries; open it in a browser")
+    return 0
+
+
 def simplify(options: argparse.Namespace) -> int:
     from contactopt.runner import scene_of
     from contactopt.simplification import simplify
@@ -290,10 +318,11 @@ def report(options: argparse.Namespace) -> int:
     folders = [path for path in given if path.is_dir() and any(path.glob("rows.*"))]
     if folders and len(folders) == len(options.names) and not options.run:
         for folder in folders:
-            print(f"report: {report_campaign(folder, others=options.merge)}")
+            page = report_campaign(folder, others=options.merge, figures=options.figures)
+            print(f"report: {page}")
         return 0
-    if options.merge:
-        raise InputError("--merge adds rows to the folder of a campaign; name this folder first.")
+    if options.merge or options.figures:
+        raise InputError("--merge and --figures are for the folder of a campaign; name it first.")
     paths = sorted(Path(options.experiments).glob("*.toml"))
     page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
     print(f"reports in {page.parent}, all of them in {page}")
@@ -352,6 +381,7 @@ COMMANDS: dict[str, Command] = {
     "view": view,
     "show": show,
     "check": check,
+    "mesh": mesh,
     "simplify": simplify,
     "export": export,
     "new": new,

@@ -34,6 +34,8 @@ COMMANDS = {
     " arguments, its source, and what is known exactly",
     "check": "say and draw what a scene is before it is solved: what holds and loads its bodies,"
     " gaps and normals of its surfaces, and what the run will cost",
+    "mesh": "mesh a part from a CAD file (.step, .iges, .brep), or read a mesh file; list and draw"
+    " its bodies and boundaries",
     "simplify": "say what may be left out of a scene, why it"
     " may be left out, and which error that makes",
     "export": "write a scene for another code: a deck of CalculiX with its contacts, or its"
@@ -101,6 +103,7 @@ def make_parser() -> argparse.ArgumentParser:
     without = "look only for symmetries, without the proof that takes a solution"
     _flag(made["simplify"], "--no-solve", help=without)
     _export(made["export"])
+    _mesh(made["mesh"])
     made["new"].add_argument(
         "file",
         metavar="FILE",
@@ -176,6 +179,41 @@ def _export(export: argparse.ArgumentParser) -> None:
     export.add_argument("--factor", type=float, default=100.0, metavar="X", help=what)
 
 
+def _mesh(mesh: argparse.ArgumentParser) -> None:
+    mesh.add_argument("file", metavar="FILE", help="a CAD file, or a mesh file in any format")
+    what = "size of the elements (default: a fifteenth of the smallest body)"
+    mesh.add_argument("--size", type=float, metavar="X", help=what)
+    what = "a smaller size on a boundary; the option may be given several times"
+    mesh.add_argument(
+        "--fine", type=_named, metavar="NAME:X", action="append", default=[], help=what
+    )
+    what = "call boundaries by another name, as in --name flank=plane1,plane2"
+    mesh.add_argument(
+        "--name", type=_called, metavar="NEW=OLD,...", action="append", default=[], help=what
+    )
+    what = "1: straight elements, 2: curved ones (default)"
+    mesh.add_argument("--order", type=int, choices=(1, 2), default=2, help=what)
+    mesh.add_argument("--out", metavar="FILE", help="name of the mesh file (default: FILE.msh)")
+    _flag(mesh, "--no-page", help="print the words alone")
+    _flag(mesh, "--no-open", help="make the page, but do not open it in the browser")
+
+
+def _named(text: str) -> tuple[str, float]:
+    name, _, size = text.rpartition(":")
+    try:
+        return name, float(size)
+    except ValueError as error:
+        said = f"give NAME:SIZE, as in flank:0.1; got {text!r}"
+        raise argparse.ArgumentTypeError(said) from error
+
+
+def _called(text: str) -> tuple[str, str]:
+    new, sign, old = text.partition("=")
+    if not (new and sign and old):
+        raise argparse.ArgumentTypeError(f"give NEW=OLD,..., as in flank=plane1; got {text!r}")
+    return new, old
+
+
 def _bench(bench: argparse.ArgumentParser) -> None:
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.epilog = help_text()
@@ -216,4 +254,6 @@ def _report(report: argparse.ArgumentParser) -> None:
     )
     what = "add the rows of another campaign, also of another machine: a folder or a rows.csv"
     report.add_argument("--merge", action="append", default=[], metavar="FILE", help=what)
+    what = "also write its figures in these formats"
+    report.add_argument("--figures", nargs="+", default=[], choices=NAMES["figures"], help=what)
     report.add_argument("--jobs", type=int, metavar="N", help=JOBS)

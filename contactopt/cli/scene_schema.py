@@ -65,7 +65,7 @@ def _scenes(kind: str) -> list[dict[str, Any]]:
     surfaces: list[Any] = ["0", {"seed": 1}, {"file": ""}]
     pair = {"upper": "a", "lower": "b", "mu": 0.1}
     solve = {"solve": {}, "units": {"length": "mm", "stress": "MPa"}, "kind": kind}
-    made = []
+    made: list[dict[str, Any]] = []
     for shape in shapes.values():
         body = shape | {
             "material": material,
@@ -80,6 +80,8 @@ def _scenes(kind: str) -> list[dict[str, Any]]:
         own = {"materials": {"soft": material}, "steps": [{"name": "press"}, {"name": "push"}]}
         pairs = [pair, pair | {"law": "orthotropic", "mu": [0.1, 0.2], "direction": along}]
         made.append(solve | own | {"bodies": {"a": body, "b": {"rigid": rigid}}, "contacts": pairs})
+    block: dict[str, Any] = {"material": material, **shapes["block"]}
+    made.append({"contacts": "auto", "mu": 0.1, "bodies": {"a": block, "b": block}})
     for height in surfaces:
         half = points | {"height": height, "force": path, "displacement": along}
         bodies = {"b": {"rigid": {}}, "a": {"material": "steel", "half_space": half}}
@@ -108,7 +110,8 @@ def _object(place: tuple[str, ...], found: dict[tuple[str, ...], list[Asked]]) -
         made["additionalProperties"] = _object((*place, "*"), found)
     if asked:
         made["properties"] = {key: _entry(place, key, own, found) for key, own in asked.items()}
-    given = {key for key, own in asked.items() if all(one.needed for one in own) or key == "mu"}
+    given = {key for key, own in asked.items() if all(one.needed for one in own)} - {"mu"}
+    given |= {"mu"} & set(asked) if place else set()  # of the scene only where contacts are found
     needed = sorted(given - {axis for axes in COMPONENTS.values() for axis in axes})
     return made | ({"required": needed} if needed else {})
 

@@ -11,22 +11,32 @@ import numpy as np
 
 from contactopt.cards import force_unit
 from contactopt.figures.plots import contact_line, contact_place
-from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, make_axes
+from contactopt.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    LETTERS,
+    ORANGE,
+    add_legend,
+    make_axes,
+    paper_axes,
+    symbols,
+)
 from contactopt.files.writing import whole_file
 from contactopt.solving.paths import PathResult
 
-FRAMES = 10  # per second
+FRAMES, FILM = 10, 110  # of a film: pictures per second, pixels per inch
 
 
 def loop(path: PathResult, ax: Any = None) -> Any:
     """Shear force against shift where the path has a shear, else normal force against approach."""
     ax = make_axes(ax)
     x, y, labels = _loop(path)
-    ax.plot(x, y, "o-", color=BLUE, ms=3, lw=1)
+    ax.plot(x, y, "o-", color=BLUE)
     ax.plot(x[:1], y[:1], "o", color=GREEN, label="first state")
     ax.plot(x[-1:], y[-1:], "s", color=ORANGE, label="last state")
     ax.set(xlabel=labels[0], ylabel=labels[1])
-    ax.legend(frameon=False)
+    add_legend(ax)
     return ax
 
 
@@ -36,25 +46,23 @@ def energies(path: PathResult, ax: Any = None) -> Any:
     since = {key: value - value[0] for key, value in path.history.items()}
     state = np.arange(1, len(path.states) + 1)
     lost = since["external_work"] - since["elastic_energy"]
-    ax.plot(state, lost, "o", color=GREY, ms=4, mfc="white", label="external work - elastic energy")
+    ax.plot(state, lost, "o", color=GREY, mfc="white", label="external work $-$ elastic energy")
     ax.plot(state, since["friction_work"], color=ORANGE, label="friction work")
     ax.plot(state, since["step_work"], ":", color=GREEN, label="error of the steps")
     force, length = _units(path)
-    ax.set(xlabel="state", ylabel=f"work since the first state [{force} {length}]")
-    ax.legend(frameon=False)
+    ax.set(xlabel="state [-]", ylabel=f"work since the first state [{force} {length}]")
+    add_legend(ax)
     return ax
 
 
 def path_figure(path: PathResult) -> Any:
     """The loop of force and displacement of a load path, and its energies below, as a figure."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.6, 7.2), layout="constrained")
-    above, below = figure.subplots(2, 1)
+    figure, (above, below) = paper_axes(rows=2)
     loop(path, above)
     energies(path, below)
     scene = path.states[-1].scene
-    figure.suptitle(f"{scene.name}, {scene.friction}: {len(path.states)} states")
+    title = f"{scene.name}, {symbols(scene.friction)}, {len(path.states)} states"
+    figure.suptitle(title, fontsize=LETTERS)
     return figure
 
 
@@ -62,11 +70,9 @@ def animate(path: PathResult, file: str | Path) -> None:
     """The path as a GIF: tangential traction within its bounds, and the point on the loop."""
     from matplotlib.animation import FuncAnimation, PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.4, 3.6), layout="constrained")
+    figure, (left, right) = paper_axes(2, wide=True)
     FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2)
     problem, scene = path.reduction.problem, path.states[-1].scene
     line = contact_line(problem)
     x, area = contact_place(problem)[line], problem.areas[line]
@@ -75,20 +81,20 @@ def animate(path: PathResult, file: str | Path) -> None:
         own[np.isinf(own)] = 0.0  # glued contacts have none
     shear = [-s.solution.reactions[line, 1] / area for s in path.states]
     peak = float(np.max(bound))
-    (upper,) = left.plot(x, bound[0], "--", color=GREY, lw=1, label="friction bound, +/- mu p")
-    (lower,) = left.plot(x, -bound[0], "--", color=GREY, lw=1)
-    look = {"color": BLUE, "ms": 2.5, "lw": 1, "label": "traction on the lower body"}
+    (upper,) = left.plot(x, bound[0], "--", color=GREY, label=r"bound $\pm\mu p$")
+    (lower,) = left.plot(x, -bound[0], "--", color=GREY)
+    look = {"color": BLUE, "label": "traction on the lower body"}
     (traction,) = left.plot(x, shear[0], "o-", **look)
-    where = ", y = 0" if problem.dim == 3 else ""
-    left.set(xlabel=f"{scene.components[0]} [{scene.units[0]}]{where}")
-    left.set(ylabel=f"tangential traction [{scene.units[1]}]", ylim=(-1.15 * peak, 1.45 * peak))
-    left.legend(frameon=False, fontsize=8, loc="upper right")
+    where = ", $y$ = 0" if problem.dim == 3 else ""
+    left.set(xlabel=f"${scene.components[0]}$ [{scene.units[0]}]{where}")
+    left.set(ylabel=f"tangential traction [{scene.units[1]}]", ylim=(-1.15 * peak, 1.15 * peak))
+    add_legend(left)
     across, force, labels = _loop(path)
     right.plot(across, force, color=GREY, lw=0.8)
-    (past,) = right.plot([], [], color=BLUE, lw=1.5)
+    (past,) = right.plot([], [], color=BLUE)
     (point,) = right.plot([], [], "o", color=ORANGE)
     right.set(xlabel=labels[0], ylabel=labels[1])
-    figure.suptitle(f"{scene.name}, {scene.friction}")
+    figure.suptitle(f"{scene.name}, {symbols(scene.friction)}", fontsize=LETTERS)
 
     def draw(state: int) -> tuple[Any, ...]:
         upper.set_ydata(bound[state])
@@ -100,7 +106,7 @@ def animate(path: PathResult, file: str | Path) -> None:
 
     film = FuncAnimation(figure, draw, frames=len(path.states))
     with whole_file(file) as beside:
-        film.save(beside, writer=PillowWriter(fps=FRAMES), dpi=80)
+        film.save(beside, writer=PillowWriter(fps=FRAMES), dpi=FILM)
 
 
 def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:

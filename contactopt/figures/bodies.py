@@ -10,7 +10,17 @@ import numpy as np
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
 from contactopt.figures.solids import draw_frame, picture, seen_from
-from contactopt.figures.style import highest_colour, magnification, make_axes
+from contactopt.figures.style import (
+    COLUMN,
+    DPI,
+    HEIGHT,
+    add_colours,
+    dress,
+    highest_colour,
+    magnification,
+    make_axes,
+    symbols,
+)
 from contactopt.meshes.cells import elements_of
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
@@ -33,8 +43,9 @@ def deformed(
         ax = _draw_solid(scene, fields, scale, top, ax)
     else:
         ax = _draw_section(scene, fields, scale, top, ax, _mirror_plane(scene, problem))
-    times = f"\ndisplacements x {scale:g}" if scale != 1 else ""
-    ax.set_title(f"{scene.name}: deformed bodies, {scene.friction}{times}")
+    times = rf", displacements $\times$ {scale:g}" if scale != 1 else ""
+    title = f"{scene.name}, {symbols(scene.friction)}{times}"
+    ax.set_title(title, fontsize=ax.xaxis.label.get_size())
     return ax
 
 
@@ -84,12 +95,13 @@ def _draw_section(
             ax.add_collection(LineCollection(x.T[rim.T], colors="black", linewidths=0.6))
     across, up = scene.components
     ax.autoscale_view()
-    ax.set(xlabel=f"{across} [{scene.units[0]}]", ylabel=f"{up} [{scene.units[0]}]", aspect="equal")
+    length = scene.units[0]
+    ax.set(xlabel=f"${across}$ [{length}]", ylabel=f"${up}$ [{length}]", aspect="equal")
     reach = _reach(scene, fields)
     if reach is not None:
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
-    room = {"ax": ax, "shrink": 0.8} if bar is None else {"cax": bar}
-    ax.figure.colorbar(colours, label=f"von Mises stress [{scene.units[1]}]", extend="max", **room)
+    room = {} if bar is None else {"cax": bar}
+    add_colours(colours, ax, f"von Mises stress [{scene.units[1]}]", extend="max", **room)
     return ax
 
 
@@ -97,8 +109,9 @@ def _placed_axes() -> tuple[Any, Any]:
     """Axes and those of a colour bar at fixed places: a layout takes as long as drawing."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 4.8))
-    return figure.add_axes((0.12, 0.11, 0.68, 0.77)), figure.add_axes((0.84, 0.19, 0.03, 0.65))
+    figure = Figure(figsize=(COLUMN, HEIGHT), dpi=DPI)
+    dress(ax := figure.add_axes((0.13, 0.13, 0.66, 0.79)))
+    return ax, figure.add_axes((0.82, 0.2, 0.03, 0.64))
 
 
 def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
@@ -129,12 +142,12 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     corners, values, lined = (np.concatenate(parts) for parts in zip(*drawn))
     image, extent = picture(corners @ view, values, lined, shade.to_rgba, PIXELS)
     ax.imshow(image, extent=extent, origin="lower", aspect="equal", zorder=2)
-    names = [f"{name} [{scene.units[0]}]" for name in scene.components]
+    names = [f"${name}$ [{scene.units[0]}]" for name in scene.components]
     draw_frame(ax, view, corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), names)
     ax.set_axis_off()
     ax.margins(0.12)
     room = {"extend": "max", "shrink": 0.7, "pad": 0.04}
-    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", **room)
+    add_colours(shade, ax, f"von Mises stress [{scene.units[1]}]", **room)
     return ax
 
 

@@ -6,7 +6,7 @@ result.
 from __future__ import annotations
 
 import html
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,7 +21,7 @@ from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
-from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
+from contactopt.scenes.scene import COMPONENTS, BodyForce, Part, Plate, Scene, Traction
 
 ROLES = ("no use", "support", "load", "plate", "contact")
 
@@ -31,20 +31,68 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
     InputError if the file cannot be written.
     """
     scene = check.scene
-    units = [*scene.units, force_unit(scene.units)]
     pairs = [_pair(*both) for both in zip(scene.pairs, check.posed.couplings)]
-    parts = [body.part for body in check.posed.bodies if isinstance(body, AssembledElastic)]
-    meshes = [
-        body.body.basis.mesh for body in check.posed.bodies if isinstance(body, AssembledElastic)
-    ]
-    items = [item for both in zip(parts, meshes) for item in _boundaries(scene, *both)]
-    items.sort(key=lambda item: item["role"] == 0)
+    elastic = [body for body in check.posed.bodies if isinstance(body, AssembledElastic)]
+    meshes = {body.name: (body.part, body.body.basis.mesh) for body in elastic}
     posed: Any = SimpleNamespace(scene=scene, planes=check.posed.planes)
     planes = [[scene.components.index(own["axis"]), own["place"]] for own in mirrors(posed)]
-    bodies = _bodies(scene, parts, meshes, planes)
+    items = [item for both in meshes.values() for item in _boundaries(scene, *both)]
+    items.sort(key=lambda item: item["role"] == 0)
+    told = "Nothing has been solved yet. This is what will be solved."
+    words = told, check.text, check.notes
+    return _write(scene, list(meshes.values()), (pairs, items), ROLES, planes, words, file)
+
+
+def write_mesh_page(
+    name: str, meshes: Mapping[str, Any], text: str, notes: Sequence[str], file: str | Path
+) -> Path:
+    """Write the bodies of a mesh file with their boundaries, and words about them, as a page.
+    InputError if the file cannot be written.
+    """
+    dim = len(next(iter(meshes.values())).p)
+    own: Any = SimpleNamespace(
+        name=name,
+        units=("length", "stress"),
+        dim=dim,
+        components=COMPONENTS["solid"][:dim],
+        kind="solid",
+        surfaces_of=lambda part: (),
+    )
+    parts: list[Any] = [
+        (SimpleNamespace(name=body, supports=(), loads=()), mesh) for body, mesh in meshes.items()
+    ]
+    names = dict.fromkeys(side for mesh in meshes.values() for side in mesh.boundaries or {})
+    roles = ["none", *names]
+    items = [
+        item | {"name": item["name"].removesuffix(f" ({ROLES[0]})")}
+        for both in parts
+        for item in _boundaries(own, *both)
+    ]
+    for item in items:
+        item["role"] = roles.index(item["name"].partition(": ")[2])
+    told = "This is what the mesh file holds. The list switches each boundary on and off."
+    return _write(own, parts, ([], items), roles, [], (told, f"{name}\n{text}", notes), file)
+
+
+def _write(
+    scene: Any,
+    bodies: list[tuple[Part, Any]],
+    shown: tuple[list[dict[str, Any]], list[dict[str, Any]]],
+    roles: Sequence[str],
+    planes: list[Any],
+    words: tuple[str, str, Sequence[str]],
+    file: str | Path,
+) -> Path:
+    """The page of bodies with their meshes, of pairs and boundaries with their roles, and of words:
+    a sentence, a text and notes.
+    """
+    pairs, items = shown
+    what = "what it is for" if roles is ROLES else "boundary"
+    units = [*scene.units, force_unit(scene.units)]
+    parts, meshes = [part for part, _ in bodies], [mesh for _, mesh in bodies]
     places = [item["places"] for item in (*items, *pairs)]
     box = whole_box(box_of([*places, *(_spatial(mesh.p) for mesh in meshes)]), planes)
-    near = box_of([item["places"] for item in pairs])
+    near = box_of([item["places"] for item in pairs]) if pairs else box
     wide = 0.2 * float(np.ptp(near, axis=0).max())
     data = {
         "units": units,
@@ -57,20 +105,20 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
         "contact": [(near[0] - wide).tolist(), (near[1] + wide).tolist()],
         "scale": 1.0,
         "most_scale": 1.0,
-        "words": {"role": ["what it is for", ""], "gap": ["initial gap", scene.units[0]]},
-        "roles": ROLES,
-        "bodies": bodies,
+        "words": {"role": [what, ""], "gap": ["initial gap", scene.units[0]]},
+        "roles": roles,
+        "bodies": _bodies(scene, parts, meshes, planes),
         "contacts": [_packed(item, scene.dim) for item in (*pairs, *items)],
         "states": 1,
         "moving": False,
         "history": None,
     }
-    lines = "".join(f"<br>{html.escape(text)}" for text in check.text.splitlines()[1:])
+    lines = "".join(f"<br>{html.escape(text)}" for text in words[1].splitlines()[1:])
     body = filled(
         "view.html",
         scene=html.escape(scene.name),
-        certificate="Nothing has been solved yet. This is what will be solved.",
-        remarks="".join(f"<p><strong>{html.escape(note)}</strong></p>" for note in check.notes),
+        certificate=words[0],
+        remarks="".join(f"<p><strong>{html.escape(note)}</strong></p>" for note in words[2]),
         move="move" if scene.dim == 2 else "turn",
         followers="",
         arrows="loads, and normals from the lower to the upper body,",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction
-from contactopt.figures.style import BLUE, ORANGE
+from contactopt.figures.style import BLUE, ORANGE, add_colours, paper_axes
 from contactopt.problem import Solution
 from contactopt.readings.half_space_readings import surface_maps
 
@@ -17,7 +17,6 @@ COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels 
 def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     """Draw pressure, gap, and where there is friction traction, slip and stick, of half-spaces."""
     from matplotlib.colors import ListedColormap
-    from matplotlib.figure import Figure
 
     scene, problem, maps = reduction.scene, reduction.problem, surface_maps(reduction, solution)
     length, stress = scene.units
@@ -31,30 +30,28 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
         two: Any = ListedColormap([BLUE, ORANGE])
         panels += [
             ("traction", closed, traction, f"tangential traction [{stress}]", "viridis"),
-            ("slip", closed, slip, f"tangential displacement [{length}]", "cividis"),
-            ("status", closed, maps["status"], "1 stick, 2 slip", two),
+            ("slip", closed, slip, f"slip [{length}]", "cividis"),
+            ("status", closed, maps["status"], "", two),
         ]
     line = maps["pressure"].ndim == 1
     columns = min(COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(3.6 * columns, (2.8 if line else 4.0) * rows), layout="constrained")
-    axes = np.ravel(figure.subplots(rows, columns))
+    figure, axes = paper_axes(columns, rows, height=1.7 if line else 2.3)
     for (name, where, known, label, colours), ax in zip(panels, axes):
         values = np.where(where, known, np.nan)
-        ax.set_title(name)
         if line:
             ax.plot(problem.chart.places[0], values)
-            ax.set(xlabel=f"{scene.components[0]} [{length}]", ylabel=label)
+            ax.set(xlabel=f"${scene.components[0]}$ [{length}]", ylabel=label)
             continue
         x, y = problem.chart.places
         extent = (x.min(), x.max(), y.min(), y.max())
         look = {"origin": "lower", "interpolation": "nearest", "cmap": colours}
         image = ax.imshow(values.T, extent=extent, **look)
-        ax.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]")
-        bar = figure.colorbar(image, ax=ax, label=label, orientation="horizontal")
+        ax.set(xlabel=f"$x$ [{length}]", ylabel=f"$y$ [{length}]")
+        bar = add_colours(image, ax, label, orientation="horizontal", shrink=1.0)
         if name == "status":
             image.set_clim(0.5, 2.5)
-            bar.set_ticks([1, 2])
+            bar.set_ticks([1, 2], labels=["stick", "slip"])
     for ax in axes[len(panels) :]:
         ax.set_axis_off()
     return figure

@@ -7,13 +7,27 @@ do not.
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.figures.bodies import deformed
 from contactopt.figures.pieces import triangles
-from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, make_axes
+from contactopt.figures.style import (
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    LETTERS,
+    MARK,
+    ORANGE,
+    add_colours,
+    add_legend,
+    make_axes,
+    paper_axes,
+    symbols,
+)
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_edge
@@ -32,7 +46,7 @@ __all__ = [
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
-ARROWS = 1000  # about as many arrows as a map of tractions can show
+ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
@@ -65,8 +79,8 @@ def _in_rows(problem: InterfaceProblem) -> bool:
 def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
     """What the places along the contact line are, a coordinate or arc length, and where it is."""
     if problem.dim == 3:
-        return "x", ", y = 0"
-    return scene.components[0] if _straight(problem) else "arc length s", ""
+        return "$x$", ", $y$ = 0"
+    return f"${scene.components[0]}$" if _straight(problem) else "arc length $s$", ""
 
 
 def _straight(problem: InterfaceProblem) -> bool:
@@ -97,21 +111,21 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     mean = solution.reactions[:, 0].sum() / contact_area(scene, a) if a > 0 else 0.0
     scaled, mean = _about_origin(problem, solution, place, a), mean or 1.0
     unit = a if scaled else 1.0
-    ax.plot(x / unit, p / mean, "o-", color=BLUE, ms=4, lw=1, label="contactopt")
+    ax.plot(x / unit, p / mean, "o-", color=BLUE, label="contactopt")
     if scene.reference is not None:
         fine = np.linspace(x.min(), x.max(), 801)
         with np.errstate(all="ignore"):
             exact = scene.reference.pressure(fine) / mean
         label = f"exact: {scene.reference.label}"
-        ax.plot(fine / unit, exact, color=ORANGE, lw=1.5, label=label, zorder=1)
+        ax.plot(fine / unit, exact, color=ORANGE, label=label, zorder=1)
     name, where = _place_names(scene, problem)
-    over_a = f"{name} / a [-]{where}, a = {a:.4g} {length}"
+    over_a = f"{name} / $a$ [-]{where}, $a$ = {a:.4g} {length}"
     ax.set(
         xlabel=over_a if scaled else f"{name} [{length}]{where}",
-        ylabel=f"p / mean p [-], mean p = {mean:.4g} {stress}",
+        ylabel=rf"pressure $p\,/\,\bar{{p}}$ [-], $\bar{{p}}$ = {mean:.4g} {stress}",
         ylim=(0, 5.0 if _singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
-    ax.legend(edgecolor="none")
+    add_legend(ax)
     return ax
 
 
@@ -141,28 +155,28 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     bound = problem.law.bound_along(solution.reactions)[line] / problem.areas[line]
     bound[np.isinf(bound)] = 0.0  # glued contacts have none
     status = contact_status(problem, solution.reactions)
-    ax.plot(x, bound, color=GREY, lw=1, ls="--", label="friction bound, +/- mu p")
-    ax.plot(x, -bound, color=GREY, lw=1, ls="--")
-    ax.plot(x, t, color=BLUE, lw=1)
+    ax.plot(x, bound, color=GREY, ls="--", label=r"bound $\pm\mu p$")
+    ax.plot(x, -bound, color=GREY, ls="--")
+    ax.plot(x, t, color=BLUE)
     if scene.reference is not None and scene.reference.shear is not None:
         fine = np.linspace(x.min(), x.max(), 801)
         with np.errstate(all="ignore"):
             exact = -scene.reference.shear(fine)
         # singular at the edge of a punch
         exact[np.abs(exact) > 1.1 * bound.max(initial=0.0)] = np.nan
-        ax.plot(fine, exact, color="black", lw=1, label=f"exact: {scene.reference.label}", zorder=3)
+        ax.plot(fine, exact, color="black", label=f"exact: {scene.reference.label}", zorder=3)
     if _singular(scene) and np.any(bound):
         mean = float(np.average(bound, weights=problem.areas[line]))
         ax.set_ylim(-5 * mean, 5 * mean)
     sticking, slipping = status.stick[line], status.slip[line]
     if sticking.any():
-        ax.plot(x[sticking], t[sticking], "o", color=BLUE, ms=5, label="stick")
+        ax.plot(x[sticking], t[sticking], "o", color=BLUE, label="stick")
     if slipping.any():
-        ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
+        ax.plot(x[slipping], t[slipping], "s", color=ORANGE, mfc="white", label="slip")
     name, where = _place_names(scene, problem)
     ax.set(xlabel=f"{name} [{length}]{where}")
     ax.set(ylabel=f"tangential traction\non the upper body [{stress}]")
-    ax.legend(edgecolor="none")
+    add_legend(ax)
     return ax
 
 
@@ -174,31 +188,45 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
         drawn = ax.scatter(x, y, c=values, s=14, cmap="viridis")
     else:
         drawn = ax.tripcolor(x, y, triangles(cells.T), values, shading="gouraud", cmap="viridis")
-    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", aspect="equal")
-    ax.figure.colorbar(drawn, ax=ax, label=label, shrink=0.8)
+    _plane(scene, ax)
+    add_colours(drawn, ax, label)
     return ax
 
 
+def _plane(scene: Scene, ax: Any) -> None:
+    """Name the axes of a surface in 3D."""
+    ax.set(xlabel=f"$x$ [{scene.units[0]}]", ylabel=f"$y$ [{scene.units[0]}]", aspect="equal")
+
+
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows."""
+    """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows, of
+    which the longest is three times their distance.
+    """
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
-    for label, mask, colour, look in (
-        ("stick", status.stick, BLUE, {"marker": "o", "facecolors": BLUE}),
-        ("slip", status.slip, ORANGE, {"marker": "s", "facecolors": "white"}),
-        ("open", status.open, GREY, {"marker": "x"}),
-    ):
+    spacing = np.sqrt(np.ptp(x) * np.ptp(y) / problem.contacts) or 1.0
+    size = min(MARK, 100.0 * spacing / max(np.ptp(x), np.ptp(y)))
+    marks = (
+        ("stick", status.stick, {"marker": ".", "color": BLUE}),
+        ("slip", status.slip, {"marker": "s", "ec": ORANGE, "fc": "white"}),
+        ("open", status.open, {"marker": "x", "color": GREY}),
+    )
+    for label, mask, look in marks:
         if mask.any():
-            ax.scatter(x[mask], y[mask], s=14, color=colour, label=label, **look)
-    t = solution.reactions[:, 1:] / problem.areas[:, None]
-    if np.any(t):
-        shown = np.flatnonzero(status.touching)
-        shown = shown[:: max(1, len(shown) // ARROWS)]
-        ax.quiver(x[shown], y[shown], t[shown, 0], t[shown, 1], color="black", width=0.003)
-    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", aspect="equal")
-    ax.set_title("arrows: tangential traction")
-    ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
+            ax.scatter(x[mask], y[mask], s=size**2, lw=0.5, label=label, **look)
+    t = solution.reactions[:, 1:] / np.where(problem.areas > 0, problem.areas, np.inf)[:, None]
+    largest = float(np.linalg.norm(t, axis=1).max())
+    add_legend(ax)
+    _plane(scene, ax)
+    if largest > 0:
+        every = np.ceil(np.sqrt(status.touching.sum() / ARROWS))
+        row = np.round(problem.chart.places / spacing) % every == 0
+        shown = np.flatnonzero(status.touching & row.all(axis=0))
+        look = {"angles": "xy", "scale_units": "xy", "scale": largest / (3 * spacing * every)}
+        ax.quiver(x[shown], y[shown], t[shown, 0], t[shown, 1], width=0.004, zorder=3, **look)
+        longest = f"largest traction (longest arrow): {largest:.3g} {scene.units[1]}"
+        ax.set_xlabel(f"{ax.get_xlabel()}\n{longest}")
     return ax
 
 
@@ -206,48 +234,44 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
     """Draw pressure above tangential traction of one pair of surfaces, with the map of stick and
     slip in 3D.
 
-    One panel stands above the other, so that all of them can be read where the figure is 400 pixels
-    wide.
+    One panel stands above the other in the width of a journal's column. The title has a status only
+    where the problem was not solved.
     """
-    from matplotlib.figure import Figure
-
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    layout: Any = "constrained" if problem.dim == 3 else None
-    figure = Figure(figsize=(5.6, 3.6 * len(panels)), layout=layout)
-    if problem.dim == 2:
-        figure.subplots_adjust(left=0.19, right=0.97, bottom=0.07, top=0.94, hspace=0.24)
-    for draw, ax in zip(panels, figure.subplots(len(panels), 1)):
+    layout = "constrained" if problem.dim == 3 else None
+    figure, axes = paper_axes(rows=len(panels), layout=layout)
+    if layout is None:
+        figure.subplots_adjust(left=0.21, right=0.97, bottom=0.08, top=0.91, hspace=0.36)
+    for draw, ax in zip(panels, axes):
         draw(scene, problem, solution, ax)
-    figure.suptitle(
-        f"{scene.name}, {scene.friction}: {solution.status}, residual {solution.residual:.1e}"
-    )
+    status = "" if solution.solved else f": {solution.status}"
+    figure.suptitle(f"{scene.name}, {symbols(scene.friction)}{status}", fontsize=LETTERS)
     return figure
 
 
 def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
     """Natural-map residual against outer iterations, one line per solve."""
     ax = make_axes(ax)
-    colours = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
-    for colour, (label, solution) in zip(colours, solutions.items()):
+    for colour, (label, solution) in zip(cycle(COLOURS), solutions.items()):
         residual = [h["residual"] for h in solution.history]
-        ax.semilogy(range(1, len(residual) + 1), residual, "o-", ms=3, color=colour, label=label)
-    ax.set(xlabel="outer iteration", ylabel="natural-map residual [-]")
-    ax.legend(frameon=False)
+        ax.semilogy(range(1, len(residual) + 1), residual, "o-", color=colour, label=label)
+    ax.set(xlabel="outer iteration [-]", ylabel="natural-map residual [-]")
+    add_legend(ax)
     return ax
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
     """Draw what the model leaves of the data, over the standard deviation of the noise."""
     ax = make_axes(ax)
-    for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
+    for (name, measured), colour in zip(found.data.items(), cycle(COLOURS)):
         rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
-        ax.plot(np.arange(len(rest)), rest, "o-", color=colour, lw=0.8, ms=4, label=name)
+        ax.plot(np.arange(len(rest)), rest, "o-", color=colour, label=name)
     ax.axhline(0.0, color=GREY, lw=0.8)
     ax.axhspan(-1.96, 1.96, color=GREY, alpha=0.12, lw=0, label="95 % of normal noise")
-    ax.set(xlabel="state", ylabel="(measured - computed) / noise")
-    ax.set_title("; ".join(f"{name} = {value:.4g}" for name, value in found.values.items()))
-    ax.legend(frameon=False)
+    found_values = "; ".join(f"{name} = {value:.4g}" for name, value in found.values.items())
+    ax.set(xlabel=f"state [-]; {symbols(found_values)}", ylabel="(measured - computed) / noise [-]")
+    add_legend(ax)
     return ax
 
 
@@ -261,11 +285,10 @@ def design(found: Design, ax: Any = None) -> Any:
     mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
     points = "." if problem.dim == 3 else ".-"
     ax.plot(place[order], found.pressure[order], points, color=BLUE, label="pressure")
-    ax.axhline(mean, color=GREY, lw=0.8, label="mean over the contact")
+    ax.axhline(mean, color=GREY, lw=0.8, label=f"mean (largest / mean = {found.unevenness:.4f})")
     ax.set(xlabel=f"place [{scene.units[0]}]", ylabel=f"pressure [{scene.units[1]}]")
     ax.set_ylim(0.0, 1.2 * found.peak)
-    ax.set_title(f"{scene.name}: largest over mean pressure {found.unevenness:.4f}")
-    ax.legend(frameon=False)
+    add_legend(ax)
     return ax
 
 
@@ -275,11 +298,9 @@ def refinement_figure(estimate: Estimate) -> Any:
 
     The dotted line is the last value with its estimated error added.
     """
-    from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
-    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = paper_axes(2, wide=True)
     unknowns = np.array([level.unknowns for level in estimate.levels])
     errors = np.array([np.nan if level.error is None else level.error for level in estimate.levels])
     energy = np.array([level.energy_error for level in estimate.levels])
@@ -289,19 +310,14 @@ def refinement_figure(estimate: Estimate) -> Any:
     if np.any(energy > 0):
         left.plot(unknowns, energy, "s--", color=GREY, mfc="none", label="in the energy norm")
     left.axhline(estimate.target, color=ORANGE, lw=1, label="asked for")
-    left.set(
-        xscale="log",
-        yscale="log",
-        ylabel="estimated relative error [-]",
-        title=f"{len(unknowns)} meshes",
-    )
-    left.legend(frameon=False)
+    left.set(xscale="log", yscale="log", ylabel="estimated relative error [-]")
+    add_legend(left)
     values = np.array([level.value for level in estimate.levels])
     bar = np.nan_to_num(errors) * np.abs(values)
     right.errorbar(unknowns, values, bar, fmt="o-", color=BLUE, capsize=3)
     if estimate.extrapolated is not None:
         right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":")
-    right.set(xscale="log", ylabel=estimate.quantity, title="value, with the estimated error")
+    right.set(xscale="log", ylabel=f"{estimate.quantity}, with its estimated error")
     # all values are shown, and of the error bars those from the second half of the meshes
     late = slice(len(values) // 2, None)
     low = min(values.min(), (values - bar)[late].min())

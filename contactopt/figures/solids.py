@@ -162,22 +162,29 @@ def draw_frame(
     """
     from matplotlib.ticker import MaxNLocator
 
+    letters = ax.xaxis.label.get_size()
     left = np.array([low[0], high[1], low[2]])  # the foot of the upright edge furthest to the left
-    places = ((low, (6, -8), "left"), (low, (-6, -8), "right"), (left, (-6, 0), "right"))
+    places = ((low, (5, -6), "left"), (low, (-5, -6), "right"), (left, (-5, 0), "right"))
     line = {"color": "black", "zorder": 3}
+    lengths = (high - low) * np.linalg.norm(view[:, :2], axis=1)  # as drawn
+    ticks = np.maximum(1, np.round(TICKS * lengths / lengths.max())).astype(int)
     for axis, (foot, shift, align) in enumerate(places):
         end = foot.copy()
         end[axis] = high[axis]
         ends = np.stack([foot, end]) @ view
-        ax.plot(ends[:, 0], ends[:, 1], lw=0.8, **line)
+        ax.plot(ends[:, 0], ends[:, 1], lw=0.6, **line)
         options = {"textcoords": "offset points", "ha": align, "va": "center"}
-        mark = {"marker": "_" if axis == 2 else "|", "ms": 5, "mew": 0.8}
-        for value in MaxNLocator(TICKS, steps=[1, 2, 5, 10]).tick_values(low[axis], high[axis]):
+        mark = {"marker": "_" if axis == 2 else "|", "ms": 4, "mew": 0.6}
+        for value in MaxNLocator(ticks[axis], steps=[1, 2, 5, 10]).tick_values(
+            low[axis], high[axis]
+        ):
             if low[axis] <= value <= high[axis]:
                 place = foot.copy()
                 place[axis] = value
                 x, y, _ = place @ view
                 ax.plot([x], [y], **mark, **line)
-                ax.annotate(f"{value:.6g}", (x, y), shift, fontsize=8, **options)
+                ax.annotate(f"{value:.6g}", (x, y), shift, fontsize=0.85 * letters, **options)
         middle = ends[:, :2].mean(axis=0)
-        ax.annotate(labels[axis], middle, (5 * shift[0], 3 * shift[1]), fontsize=10, **options)
+        ax.annotate(
+            labels[axis], middle, (4 * shift[0], 2.5 * shift[1]), fontsize=letters, **options
+        )

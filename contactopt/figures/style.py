@@ -1,18 +1,26 @@
-"""Colours, axes, magnification and saving that all figures of results share.
+"""How all figures look: sizes, colours, axes, names of lines, magnification and saving.
 
-Colours are those of Okabe and Ito, legible to all.
+A figure is one or two columns of a journal wide, with letters that can be read at this width.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
+# of Okabe and Ito, legible to all; in place of their yellow, too light for a line, Tol's wine
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#882255")
+BLUE, ORANGE, GREEN, GREY = *COLOURS[:3], "#666666"
+MARKS = "os^DvP<>"  # one for each colour
+FAINT = {"color": "#cccccc", "lw": 0.8, "zorder": 0}  # lines beyond the eighth
+COLUMN, HEIGHT = 85 / 25.4, 62 / 25.4  # of a journal's column and of a row of axes [inch]
+LETTERS, LINE, MARK = 7.0, 1.1, 3.2  # sizes [pt]
 FORMATS = ("png", "svg", "pdf")
-DPI = 130
+DPI = 200
 SHARE = 0.08  # of the bodies' size that the largest displacement is drawn as
 # a gap above this fraction of the largest displacement: bodies that were apart would seem to
 # overlap if magnified
@@ -39,13 +47,129 @@ def highest_colour(stresses: list[np.ndarray]) -> float:
     return float(np.quantile(np.concatenate(stresses), TOP)) or 1.0
 
 
+def symbols(text: str) -> str:
+    """A text with the letter mu set as a symbol."""
+    return re.sub(r"\bmu\b", r"$\\mu$", text)
+
+
 def make_axes(ax: Any) -> Any:
     """The axes that were given, or those of a new figure."""
-    if ax is not None:
-        return ax
+    return paper_axes()[1][0] if ax is None else ax
+
+
+def paper_axes(
+    columns: int = 1,
+    rows: int = 1,
+    wide: bool = False,
+    height: float = HEIGHT,
+    layout: str | None = "constrained",
+) -> tuple[Any, np.ndarray]:
+    """A figure as wide as one column of a journal, or as two, and its axes, flat; `height` is that
+    of a row [inch].
+    """
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(6.4, 4.8), layout="constrained").add_subplot()
+    size = (COLUMN * (2 if wide else 1), height * rows)
+    figure = Figure(figsize=size, dpi=DPI, layout=layout)
+    axes = np.ravel(figure.subplots(rows, columns))
+    for ax in axes:
+        dress(ax)
+    return figure, axes
+
+
+def dress(ax: Any, spines: bool = False, letters: float = LETTERS) -> None:
+    """Give axes the letters, lines and colours of a paper; `spines` keeps those above and right."""
+    sizes = {"color": COLOURS, "lw": [LINE] * len(COLOURS), "ms": [MARK] * len(COLOURS)}
+    ax.set_prop_cycle(**sizes)
+    ax.tick_params(which="both", labelsize=letters, width=0.6)
+    ax.tick_params(which="major", length=2.5, pad=2)
+    ax.tick_params(which="minor", length=1.5)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.label.set_size(letters)
+        axis.labelpad = 2
+        axis.offsetText.set_size(letters)
+    for side, spine in ax.spines.items():
+        spine.set_linewidth(0.6)
+        spine.set_visible(spines or side not in ("top", "right"))
+
+
+def add_legend(ax: Any) -> None:
+    """A legend above our own axes, where it is off all lines, in as many columns as there is room
+    for, and in other people's axes, which may have a title, where it is best; none for one line.
+    """
+    labels, letters = ax.get_legend_handles_labels()[1], ax.xaxis.label.get_size()
+    if len(labels) < 2:
+        return
+    if letters != LETTERS:
+        ax.legend(frameon=False)
+        return
+    room = ax.figure.get_figwidth() * 72 * ax.get_position().width / (0.55 * letters)
+    sizes = [len(re.sub(r"\\\w+|\$", "", label)) + 5 for label in labels]  # in characters
+    fitting = (
+        columns
+        for columns in range(len(sizes), 1, -1)
+        if sum(max(part) for part in np.array_split(sizes, columns)) <= room
+    )
+    look = {"frameon": False, "handlelength": 1.6, "columnspacing": 1.0, "borderaxespad": 0.2}
+    where = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": next(fitting, 1)}
+    ax.legend(fontsize=letters, labelspacing=0.2, **look, **where)
+
+
+def add_colours(drawn: Any, ax: Any, label: str, **room: Any) -> Any:
+    """The colour bar of what was drawn on axes, or on several."""
+    first = np.ravel(ax)[0]
+    bar = first.figure.colorbar(drawn, ax=ax, label=label, **({"shrink": 0.8} | room))
+    dress(bar.ax, spines=True, letters=first.xaxis.label.get_size())
+    return bar
+
+
+def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
+    """Write coloured names beside the axes at the heights where their lines end, (x, y, name,
+    colour) each, as far apart as letters are high.
+
+    Places are the nearest ones in the sum of squares: isotonic regression. A dotted line leads from
+    a name to an end that is not beside it. Of equal heights the first stands above.
+    """
+    from scipy.optimize import isotonic_regression
+
+    ax.autoscale_view()
+    shares = ax.transScale + ax.transLimits  # of the axes
+    found = [(*shares.transform(end[:2]), *end) for end in ends if np.all(np.isfinite(end[:2]))]
+    found = sorted(reversed(found), key=lambda end: end[1])
+    if not found:
+        return
+    height = ax.figure.get_figheight() * 72 * ax.get_position().height
+    steps = 1.25 * LETTERS / height * np.arange(len(found))
+    places = isotonic_regression([end[1] for end in found] - steps).x
+    places = np.clip(places, 0.0, max(0.0, 1.0 - steps[-1])) + steps
+    for place, (right, up, x, y, name, colour) in zip(places, found):
+        beside = right > 0.94 and abs(place - up) < LETTERS / height
+        lead = {"arrowstyle": "-", "ls": ":", "lw": 0.5, "color": colour, "relpos": (0, 0.5)}
+        lead |= {"shrinkA": 0, "shrinkB": 2}
+        look = {"color": colour, "va": "center", "fontsize": LETTERS, "annotation_clip": False}
+        where = {"xytext": (1.03, place), "textcoords": "axes fraction"}
+        ax.annotate(name, (x, y), arrowprops=None if beside else lead, **where, **look)
+
+
+def draw_lines(
+    ax: Any,
+    lines: Sequence[tuple[str, Sequence[float], Sequence[float]]],
+    styles: Sequence[str] = (),
+) -> None:
+    """Draw lines (name, x, y) on logarithmic axes, their names beside their right ends, and those
+    beyond the eighth grey and without a name. A style such as "o--" is that of a family of lines.
+    """
+    ends = []
+    for number, (name, x, y) in enumerate(lines):
+        style = styles[number] if styles else MARKS[number % len(MARKS)] + "-"
+        across, up = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        colour = COLOURS[number] if number < len(COLOURS) else FAINT["color"]
+        ax.loglog(across, up, style, color=colour, mfc="white" if "--" in style else colour)
+        shown = np.flatnonzero(up > 0)
+        if number < len(COLOURS) and len(shown):
+            last = shown[np.argmax(across[shown])]
+            ends.append((float(across[last]), float(up[last]), name, colour))
+    label_ends(ax, ends)
 
 
 def save_figure(figure: Any, path: Path) -> None:
@@ -53,8 +177,11 @@ def save_figure(figure: Any, path: Path) -> None:
 
     A PNG is drawn once. Figure.savefig would draw it twice, the first time only to learn its size.
     """
+    import matplotlib
+
     if path.suffix != ".png":
-        figure.savefig(path, dpi=DPI)
+        with matplotlib.rc_context({"pdf.fonttype": 42}):  # letters as journals want them
+            figure.savefig(path)
         return
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import skfem
@@ -40,7 +41,7 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     Parameters
     ----------
     path : File in any format that meshio reads: Gmsh (.msh), VTK (.vtu, .vtk), Abaqus and CalculiX
-        (.inp), XDMF, Nastran, ... A plane mesh may lie across any axis.
+        (.inp), Exodus, MED, XDMF, Nastran, ... A plane mesh may lie across any axis.
     group : Name of the group of elements that is the body, or the number of a group without a name.
         None: all elements.
     scale : Unit of length of the file in that of the scene: 1000 for a file in metres and a scene
@@ -54,8 +55,34 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
         is no such group, or if the mesh has a fault that cannot be repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
-    path = Path(path)
+    return _body(Path(path), read_groups(Path(path)), group, scale)
+
+
+def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
+    """The meshes of all groups of elements of a file, by their names; None for one without groups.
+    For each group that is no body, such as several in one, a sentence says why.
+    """
     groups = read_groups(path)
+    found: dict[str | None, skfem.Mesh] = {}
+    refused: list[str] = []
+    known: dict[Any, str] = {}
+    dim = _place(path, groups)[0]
+    names: list[Any] = [*groups.names(dim)]
+    for group in names or [None]:
+        own = groups.members.get((group, dim), {})
+        same = tuple((i, elements.tobytes()) for i, elements in sorted(own.items()))
+        if known.setdefault(same, group) != group:
+            refused.append(f"group {group!r} is the same as {known[same]!r}")
+            continue
+        try:
+            found[group] = _body(path, groups, group, 1.0)
+        except InputError as error:
+            refused.append(f"group {group!r}: {error}" if group else str(error))
+    return found, refused
+
+
+def _body(path: Path, groups: FileGroups, group: str | None, scale: float) -> skfem.Mesh:
+    """The mesh of a group, or of all elements, of a file."""
     dim, points = _place(path, groups)
     cells = _elements(path, groups, dim, points * scale, group)
     bodies = groups.names(dim)

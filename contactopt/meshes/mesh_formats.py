@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
-from contactopt.meshes.msh4 import read_msh2, read_msh4, version
+from contactopt.meshes.msh4 import read_msh4, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
@@ -32,6 +33,8 @@ TAGS = (
 )
 # formats whose readers end on damaged text; others may not
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
+# formats of which meshio loses names or sets -> our reader
+OWN: dict[str, Callable[[Path], Any]] = {"abaqus": read_inp, "exodus": read_exodus}
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
@@ -94,12 +97,19 @@ def read_groups(path: Path) -> FileGroups:
             if key == "gmsh:geometrical" or values.dtype.kind not in "iu" or values.ndim != 1:
                 continue
             for tag in np.unique(values):
-                name = f"{tag}" if key in TAGS else f"{key}={tag}"
+                own = [f"{tag}" if key in TAGS else f"{key}={tag}"]
                 if key == "gmsh:physical":
-                    name = named.get((int(tag), blocks[i][2]), name)
-                if tag != 0 or key not in TAGS:
+                    own = [named.get((int(tag), blocks[i][2]), own[0])]
+                elif key == "cell_tags":  # of MED: families of elements that share their groups
+                    own = mesh.cell_tags.get(tag, own)
+                for name in own if tag != 0 or key not in TAGS else ():
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
+    families = mesh.point_data.get("point_tags", np.zeros(0))
+    for tag, own in getattr(mesh, "point_tags", {}).items():
+        for name in own:
+            there = np.flatnonzero(families == tag)
+            sets[name] = np.union1d(sets.get(name, there), there)
     return FileGroups(np.asarray(mesh.points), blocks, members, sets)
 
 
@@ -151,16 +161,16 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, C
             " Gmsh's format; save it in version 4.1 or 2.2."
         )
     if binary:  # meshio trusts the counts of damaged files
-        newer = stated != "4.0"
         older = str(stated)[0] == "2"
-        yield "gmsh", partial(read_msh2, path) if older else partial(read_msh4, path, newer)
+        reader = partial(_read_apart, path, "gmsh", size)
+        yield "gmsh", reader if older else partial(read_msh4, path, stated != "4.0")
         return
     for newer in (False, True):  # "4" stands for either
         if stated in (("4", "4.1") if newer else ("4", "4.0")):
             yield "", partial(read_msh4, path, newer)
     for name in sorted(formats, key=lambda name: name not in SAFE):
-        if name == "abaqus":
-            yield name, partial(read_inp, path)
+        if name in OWN:
+            yield name, partial(OWN[name], path)
         elif name in SAFE:
             yield name, partial(meshio.read, path, file_format=name)
         else:

@@ -1,4 +1,4 @@
-"""Gmsh's file formats: 4.0 and 4.1, and 2.2 in binary.
+"""Gmsh's file formats 4.0 and 4.1.
 
 meshio takes 4.0 for 4.1, and reads neither where some elements belong to no group, as in files
 that Gmsh writes with the option Mesh.SaveAll. From damaged binary files it takes counts as they are
@@ -56,50 +56,12 @@ def read_msh4(path: Path, newer: bool) -> Any:
     return _mesh(points, tags, blocks, sets)
 
 
-def read_msh2(path: Path) -> Any:
-    """The same of a binary file of version 2.2."""
-    sections = _sections(path)
-    names = _names(sections)
-    tags, points = sections["Nodes"].records(sections["Nodes"].line(), 3)
-    reader = sections["Elements"]
-    total = reader.line()
-    blocks: list[tuple[int, list[np.ndarray], list[np.ndarray]]] = []  # kind, nodes, groups
-    while total > 0:
-        kind, count, extra = reader.take(3).tolist()
-        size = _nodes_of(kind)
-        if not 0 < count <= total or extra < 0:
-            raise ValueError(f"a block of {count} elements with {extra} tags")
-        total -= count
-        rows = reader.take(count * (1 + extra + size)).reshape(count, -1)
-        if not blocks or blocks[-1][0] != kind:
-            blocks.append((kind, [], []))
-        blocks[-1][1].append(rows[:, 1 + extra :])
-        blocks[-1][2].append(rows[:, 1] if extra else np.zeros(count, dtype=np.int64))
-    joined = [(kind, np.concatenate(rows)) for kind, rows, _ in blocks]
-    sets: dict[str, list[np.ndarray]] = {}
-    for i, (kind, _, parts) in enumerate(blocks):
-        groups, dim = np.concatenate(parts), _dimension(kind)
-        for tag in np.unique(groups[groups != 0]):
-            name = names.get((dim, int(tag)), str(tag))
-            own = sets.setdefault(name, [np.arange(0)] * len(blocks))
-            own[i] = np.flatnonzero(groups == tag)
-    return _mesh(points, tags, joined, sets)
-
-
 def _nodes_of(kind: int) -> int:
     """Number of nodes of an element of a kind of Gmsh."""
     from meshio._common import num_nodes_per_cell
     from meshio.gmsh.common import _gmsh_to_meshio_type
 
     return int(num_nodes_per_cell[_gmsh_to_meshio_type[kind]])
-
-
-def _dimension(kind: int) -> int:
-    from meshio._mesh import topological_dimension
-    from meshio.gmsh.common import _gmsh_to_meshio_type
-
-    # meshio's table lacks some solids
-    return int(topological_dimension.get(_gmsh_to_meshio_type[kind], 3))
 
 
 def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any:
@@ -165,11 +127,6 @@ class _Bytes(_Numbers):
         dtype = np.dtype([("tag", self.order + "i4"), ("x", self.order + "f8", (width,))])
         rows = self._read(count, dtype)
         return rows["tag"].astype(np.int64), rows["x"].astype(float)
-
-    def line(self) -> int:
-        """The count that version 2.2 writes as text before the numbers."""
-        self.place = self.data.index(b"\n") + 1
-        return int(self.data[: self.place])
 
 
 def _sections(path: Path) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.expressions import Expression
+from contactopt.scenes.facing_boundaries import Facing
 from contactopt.scenes.file_surfaces import half_space_shape
 from contactopt.scenes.material_library import Named, material_of
 from contactopt.scenes.scene import (
@@ -37,6 +38,7 @@ class Reading:
     steps      of the load path by name, with the number of states of each; none: every number of an
                array is that of a state
     materials  by name
+    found      pairs of boundaries that face each other, looked for once for all states
     """
 
     folder: Path
@@ -48,6 +50,7 @@ class Reading:
     meshes: dict[str, Any] = field(default_factory=dict)
     steps: tuple[tuple[str, int], ...] = ()
     materials: dict[str, Named] = field(default_factory=dict)
+    found: list[Facing] | None = None
 
     def at_state(self, values: list[float]) -> float:
         """The number of the present state: within a step it grows from that at the end of the step

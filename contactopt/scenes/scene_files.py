@@ -7,8 +7,9 @@ path, one after the other. Every mistake is named with its line.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,14 @@ from contactopt.files.toml_table import Table, change, read_table
 from contactopt.problem.laws import LAWS
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
+from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 from contactopt.scenes.file_bodies import Reading, components_of, function_of, read_body
 from contactopt.scenes.material_library import Named, library, read_materials
 from contactopt.scenes.scene import COMPONENTS, Scene
 
 MOST_STATES = 10_000  # of a step of a load path
+AUTO = "auto"  # in place of the contacts: they are found
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,8 @@ def read_scenes(
         raise top.fail(
             "an accuracy can be asked for only without a load path.", "solve", "accuracy"
         )
-    lines = {pair.name: top.lines["contacts", i] for i, pair in enumerate(first.contacts)}
+    where = top.lines.get(("contacts",), 0)  # of those that are found
+    lines = {c.name: top.lines.get(("contacts", i), where) for i, c in enumerate(first.contacts)}
     lines |= {part.name: top.lines["bodies", part.name] for part in first.bodies}
     return tuple(states), solve, lines
 
@@ -112,7 +117,10 @@ def _scene(
     if bodies is None or not bodies.data:
         raise top.fail("there are no bodies; add a table [bodies.NAME] for each.")
     parts = [read_body(bodies, name, reading) for name in bodies.data]
-    pairs = top.tables("contacts")
+    if isinstance(top.data.get("contacts"), str):
+        pairs = _found(top, parts, reading)
+    else:
+        pairs = top.tables("contacts")
     if not pairs:
         raise top.fail(
             "there are no contacts; add a table [[contacts]]"
@@ -169,6 +177,45 @@ def _steps(top: Table) -> tuple[tuple[str, int], ...]:
                 f"the states of step '{name}' must be {valid}; got {states}.", "steps", i
             )
     return tuple(found)
+
+
+def _found(top: Table, parts: list[Any], reading: Reading) -> list[Table]:
+    """Tables of the pairs of boundaries that face each other, which the log shows as TOML."""
+    top.take("contacts", str, among=(AUTO,))
+    distance = top.take("distance", float, low=0.0)
+    function_of(top, "mu", reading, needed=True)
+    for part in parts:
+        if not part.meshed:
+            raise top.fail(
+                f"pairs are found between bodies with meshes alone; '{part.name}' has none, so name"
+                " its pairs as tables [[contacts]].",
+                "contacts",
+            )
+    if reading.found is None:
+        meshes = {part.name: _free(part) for part in parts}
+        reach = usual_distance(meshes) if distance is None else distance
+        reading.found = facing_boundaries(meshes, reach)
+        within = f"face each other within {reach:.3g} {reading.length}"
+        if not reading.found:
+            raise top.fail(
+                f"no boundaries of two bodies {within}; give a larger distance, or name the"
+                " boundaries that may touch.",
+                "contacts",
+            )
+        toml = as_toml(reading.found, top.data["mu"], reading.length)
+        log.warning("pairs that %s; paste those that are right in place of auto\n%s", within, toml)
+    pairs = [dict(zip(SIDES, map(":".join, pair.sides))) for pair in reading.found]
+    mu = {"mu": top.data["mu"]}
+    return [Table(top.file, top.lines, own | mu, ("contacts",)) for own in pairs]
+
+
+def _free(part: Any) -> Any:
+    """The mesh of a part with those boundaries that neither supports nor loads use."""
+    used = {getattr(own, "boundary", "") for own in (*part.supports, *part.loads)}
+    named = part.mesh.boundaries or {}
+    return replace(
+        part.mesh, _boundaries={name: own for name, own in named.items() if name not in used}
+    )
 
 
 def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:

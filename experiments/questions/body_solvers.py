@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.bodies.body import build_body
@@ -22,7 +21,8 @@ from contactopt.bodies.solvers import make_solver
 from contactopt.bodies.solvers.constants import RTOL
 from contactopt.bodies.solvers.multigrid import conjugate_gradients, nodal_blocks, rigid_motions
 from contactopt.bodies.solvers.system import System
-from experiments.report import write
+from contactopt.figures.style import COLOURS, label_ends, paper_axes
+from experiments.report import figures_alone, save_figures, stored, write
 
 PLAIN = "pyamg's defaults"
 ELEMENTS = {  # across the contact half-width
@@ -32,7 +32,6 @@ ELEMENTS = {  # across the contact half-width
     PLAIN: (8, 12, 16, 24, 32),
 }
 LARGE = {"pardiso": (48,), "multigrid": (48, 64, 80)}
-COLOURS = {"superlu": "#0072B2", "pardiso": "#009E73", "multigrid": "#D55E00", PLAIN: "#999999"}
 
 
 def system(part: str, elements: int) -> tuple[System, np.ndarray]:
@@ -135,38 +134,21 @@ def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def draw(rows: list[dict[str, Any]]) -> Figure:
-    figure = Figure(figsize=(6.8, 6.4), layout="constrained")
-    for ax, key in zip(
-        figure.subplots(2, 2).ravel(), ("setup [s]", "solve [s]", "memory [MiB]", "iterations")
-    ):
-        for name, colour in COLOURS.items():
+def draw(rows: list[dict[str, Any]]) -> Any:
+    figure, axes = paper_axes(2, rows=2, wide=True)
+    keys = ("setup [s]", "solve [s]", "memory [MiB]", "iterations")
+    for ax, key in zip(axes, keys):
+        ends = []
+        for name, colour in zip(dict.fromkeys(row["solver"] for row in rows), COLOURS):
             own = [row for row in rows if row["solver"] == name and row[key]]
             if own:
-                ax.plot(
-                    [r["unknowns"] for r in own],
-                    [r[key] for r in own],
-                    "o-",
-                    ms=3,
-                    color=colour,
-                    label=name,
-                )
-        ax.set(
-            xscale="log",
-            xlabel="unknowns of the body [-]",
-            title=key if "[" in key else f"{key} [-]",
-        )
+                x, y = ([row[column] for row in own] for column in ("unknowns", key))
+                ax.loglog(x, y, "o-", color=colour)
+                ends.append((x[-1], y[-1], name, colour))
+        ax.set(xlabel="unknowns of the body [-]", ylabel=key if "[" in key else f"{key} [-]")
         if key == "iterations":
-            ax.set(ylim=(0, None))
-        else:
-            ax.set(yscale="log")
-        ax.grid(alpha=0.3)
-    figure.legend(
-        *figure.axes[0].get_legend_handles_labels(),
-        loc="outside upper center",
-        ncols=2,
-        frameon=False,
-    )
+            ax.set(yscale="linear", ylim=(0, None))
+        label_ends(ax, ends)
     return figure
 
 
@@ -191,6 +173,9 @@ are close to each other, measured by the size of the mesh around them.
 """
 
 if __name__ == "__main__":
+    if figures_alone():
+        figures = {"cost": draw(stored("body_solvers", "rows"))}
+        raise SystemExit(save_figures("body_solvers", figures))
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--large", action="store_true", help="up to a million unknowns; some ten minutes, 12 GiB"

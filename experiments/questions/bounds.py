@@ -26,6 +26,7 @@ from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.loop import refine
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
+from contactopt.figures.style import COLOURS, LETTERS, MARKS, add_legend, paper_axes
 from contactopt.meshes.mesh_refinement import split
 from contactopt.methods.diagnosis import diagnose
 from contactopt.readings.quantities import find_quantity, value_of
@@ -34,7 +35,7 @@ from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
-from experiments.report import COLOURS, measure, paper_axes
+from experiments.report import measure
 
 LAWS = (("frictionless", 0.0), ("tresca", 10.0), ("coulomb", 0.3))
 COARSE, FINER = {2: 6, 3: 3}, {2: 2, 3: 1}  # elements along an edge, and halvings of the reference
@@ -308,20 +309,20 @@ def _saved(
 def figures(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
     figure, axes = paper_axes(2, wide=True)
     for ax, error, bound, what, line in (
-        (axes[0], "error", "bound", "energy norm, degree", 3),
-        (axes[1], "its error", "its bound", "approach and normal force, degree", 10),
+        (axes[0], "error", "bound", "in the energy norm", 3),
+        (axes[1], "its error", "its bound", "of approach and normal force", 10),
     ):
-        for degree, colour in zip((1, 2), COLOURS):
+        for degree, colour, mark in zip((1, 2), COLOURS, MARKS):
             rows = [row for row in tables["bounds"] if row["degree"] == degree and row[error] != ""]
             x, y = (np.array([abs(row[key]) for row in rows]) for key in (error, bound))
-            ax.loglog(x, y, "o", color=colour, label=f"{what} {degree}", alpha=0.7)
+            ax.loglog(x, y, mark, color=colour, label=f"degree {degree}", mfc="white")
         ends = np.array(ax.get_xlim())
         ax.loglog(ends, ends, "k-", lw=0.8)
         ax.loglog(ends, line * ends, "k:", lw=0.8)
-        ax.text(ends[1], ends[1], " 1", va="center")
-        ax.text(ends[1], line * ends[1], f" {line}", va="center")
-        ax.set(xlabel="error", ylabel="bound")
-        ax.legend(frameon=False)
+        for times in (1, line):
+            ax.text(ends[1], times * ends[1], f" {times}", va="center", fontsize=LETTERS)
+        ax.set(xlabel=f"error {what} [-]", ylabel="bound [-]")
+        add_legend(ax)
     return {"bounds": figure}
 
 

@@ -7,13 +7,24 @@ of stick and slip named.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline, pieces, triangles
-from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+from contactopt.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    LETTERS,
+    ORANGE,
+    add_colours,
+    add_legend,
+    paper_axes,
+    save_figure,
+)
 from contactopt.meshes.cells import elements_of
 from contactopt.solving.follow import follow
 from contactopt.solving.paths import PathResult
@@ -35,20 +46,24 @@ def draw_bodies(ax, path: PathResult, a: float) -> None:  # type: ignore[no-unty
             x, y, cells, body.von_mises, shading="gouraud", cmap="cividis", vmin=0, vmax=top
         )
         rim = outline(kind, elements).T
-        ax.plot(x[rim], y[rim], color="black", lw=1)
-    arrow = {"arrowstyle": "-|>", "lw": 2, "color": ORANGE, "mutation_scale": 18}
+        ax.plot(x[rim], y[rim], color="black", lw=0.6)
+    arrow = {"arrowstyle": "-|>", "lw": 1.5, "color": ORANGE, "mutation_scale": 12}
     middle = float(np.mean([MAGNIFIED * body.displacement[1, 0] for body in bodies]))
     ax.annotate("", (0, 1.3 * a + middle), (0, 2.3 * a + middle), arrowprops=arrow)
     ax.annotate("", (1.2 * a, 1.9 * a + middle), (0.2 * a, 1.9 * a + middle), arrowprops=arrow)
-    ax.text(-0.1 * a, 1.9 * a + middle, "pressed", color="white", ha="right", va="center")
-    ax.text(1.25 * a, 1.9 * a + middle, "pushed", color="white", va="center")
-    ax.set(xlim=(-2.6 * a, 2.6 * a), ylim=(-2.6 * a + middle, 2.6 * a + middle), aspect="equal")
-    ax.set(
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-        title="a rubber cylinder on a flat block, near the contact",
+    ax.text(
+        -0.1 * a,
+        1.9 * a + middle,
+        "pressed",
+        color="white",
+        ha="right",
+        va="center",
+        fontsize=LETTERS,
     )
-    ax.figure.colorbar(colours, ax=ax, label="von Mises stress [MPa]", shrink=0.85)
+    ax.text(1.25 * a, 1.9 * a + middle, "pushed", color="white", va="center", fontsize=LETTERS)
+    ax.set(xlim=(-2.6 * a, 2.6 * a), ylim=(-2.6 * a + middle, 2.6 * a + middle), aspect="equal")
+    ax.set(xlabel="$x$ [mm]", ylabel="$y$ [mm]")
+    add_colours(colours, ax, "von Mises stress [MPa]", shrink=0.85)
 
 
 def draw_tractions(ax, path: PathResult, x: np.ndarray) -> None:  # type: ignore[no-untyped-def]
@@ -62,26 +77,24 @@ def draw_tractions(ax, path: PathResult, x: np.ndarray) -> None:  # type: ignore
         (c, a, "slip", ORANGE),
     ):
         ax.axvspan(low, high, color=colour, alpha=0.12, lw=0)
-        ax.text((low + high) / 2, 1.08 * peak, name, ha="center", color=colour, weight="bold")
-    ax.plot(fine, reference.pressure(fine), color="black", lw=1.2, label="exact")
-    ax.plot(fine, reference.shear(fine), color="black", lw=1.2)
+        place = (low + high) / 2, 1.08 * peak
+        ax.text(*place, name, ha="center", color=colour, weight="bold", fontsize=LETTERS)
+    ax.plot(fine, reference.pressure(fine), color="black", label="exact")
+    ax.plot(fine, reference.shear(fine), color="black")
     r = path.solution.reactions / problem.areas[:, None]
-    ax.plot(x, r[:, 0], "o", ms=4.5, color=BLUE, label="pressure, computed")
-    ax.plot(x, -r[:, 1], "s", ms=4.5, color=GREY, label="friction, computed")
-    ax.set(
-        xlim=(-1.15 * a, 1.15 * a), ylim=(0, 1.22 * peak), xlabel="x [mm]", ylabel="traction [MPa]"
-    )
-    ax.set_title("what the contact carries")
-    ax.legend(frameon=False, loc="center", bbox_to_anchor=(0.5, 0.55))
+    ax.plot(x, r[:, 0], "o", color=BLUE, label="pressure, computed")
+    ax.plot(x, -r[:, 1], "s", color=GREY, label="friction, computed")
+    ax.set(xlim=(-1.15 * a, 1.15 * a), ylim=(0, 1.22 * peak))
+    ax.set(xlabel="$x$ [mm]", ylabel="traction [MPa]")
+    add_legend(ax)
 
 
-def picture() -> Figure:
+def picture() -> Any:
     """Two states are enough: while the push grows, no point turns its slip round."""
     path = follow(scenes.shear_cycle(2, steps=1, shear=SHEAR)[:2])
     assert path.solved
     x = path.reduction.problem.coordinates[0]
-    figure = Figure(figsize=(11, 4.4), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1.15))
+    figure, (left, right) = paper_axes(2, wide=True, height=2.7)
     draw_bodies(left, path, path.reduction.scene.reference.half_width)
     draw_tractions(right, path, x)
     return figure
@@ -90,4 +103,4 @@ def picture() -> Figure:
 if __name__ == "__main__":
     folder = REPORTS / "figures"
     folder.mkdir(parents=True, exist_ok=True)
-    picture().savefig(folder / "contact.png", dpi=110)
+    save_figure(picture(), folder / "contact.png")

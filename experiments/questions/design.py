@@ -9,8 +9,9 @@ import numpy as np
 
 import contactopt
 from contactopt import HalfSpace, Material, Part, Rigid, Scene, Support
+from contactopt.figures.style import COLOURS, GREY, add_legend, label_ends, paper_axes, symbols
 from contactopt.meshes.structured import graded, rename, tensor_mesh
-from experiments.report import write
+from experiments.report import figures_alone, save_figures, write
 
 HALF, FORCE, MATERIAL = 10.0, 100.0, Material(5.0, 0.3)
 
@@ -105,26 +106,26 @@ def measure() -> tuple[list[dict[str, Any]], dict[str, contactopt.Design]]:
 
 
 def figure(kept: dict[str, contactopt.Design]) -> Any:
-    from matplotlib.figure import Figure
-
-    made = Figure(figsize=(10.0, 4.2), layout="constrained")
-    left, right = made.subplots(1, 2)
-    for (name, found), mark in zip(kept.items(), ("o", "-", "s", "--", "^", ":")):
-        x = found.reduction.problem.chart.places[0] / HALF
-        left.plot(x, found.gap - found.gap.min(), mark, ms=3, lw=1.2, label=name, mfc="none")
-        right.plot(x, found.pressure * 2 * HALF / FORCE, mark, ms=3, lw=1.2, mfc="none")
+    made, (left, right) = paper_axes(2, wide=True)
+    scenes, ends = list(dict.fromkeys(name for name, *_ in CASES)), []
+    for (name, _, label, _), found in zip(CASES, kept.values()):
+        x, colour = found.reduction.problem.chart.places[0] / HALF, COLOURS[scenes.index(name)]
+        points = {"ls": "none", "marker": "o", "mfc": "none", "markevery": 3}
+        look = points if label == "free" else {}
+        left.plot(x, found.gap - found.gap.min(), color=colour, **look)
+        pressure = found.pressure * 2 * HALF / FORCE
+        right.plot(x, pressure, color=colour, **look)
+        if label == "free":
+            ends.append((x[-1], pressure[-1], symbols(name), colour))
     x = np.linspace(-0.9999, 0.9999, 400)
-    left.plot(
-        x,
-        known_profile(x) - known_profile(np.zeros(1)),
-        "k",
-        lw=0.8,
-        label="known, uniform pressure, mu = 0",
-    )
-    left.set(xlabel="place / half-width", ylabel="initial gap [mm]")
-    left.legend(frameon=False, fontsize=7)
-    right.axhline(1.05, color="0.5", lw=0.8)
-    right.set(xlabel="place / half-width", ylabel="pressure / mean", ylim=(0.8, 1.2))
+    known = known_profile(x) - known_profile(np.zeros(1))
+    left.plot(x, known, "k:", label=symbols("known, uniform pressure, mu = 0"))
+    left.plot([], [], "o", color=GREY, mfc="none", label="free")
+    left.plot([], [], color=GREY, label="6 polynomials")
+    left.set(xlabel="$x / a$ [-]", ylabel="initial gap [mm]")
+    add_legend(left)
+    right.set(xlabel="$x / a$ [-]", ylabel="pressure / mean pressure [-]", ylim=(0.94, 1.06))
+    label_ends(right, ends)
     return made
 
 
@@ -144,10 +145,8 @@ profile is not known.
 
 if __name__ == "__main__":
     rows, kept = measure()
-    write(
-        "design",
-        "The punch with an even pressure",
-        TEXT,
-        {"designs": rows},
-        {"design": figure(kept)},
-    )
+    figures = {"design": figure(kept)}
+    if figures_alone():
+        save_figures("design", figures)
+    else:
+        write("design", "The punch with an even pressure", TEXT, {"designs": rows}, figures)

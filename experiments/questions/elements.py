@@ -11,17 +11,17 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from contactopt import Material, Part, Rigid, Scene, Support, reduce_bodies, solve
 from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.bodies import elements
-from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.figures.style import BLUE, GREY, ORANGE, label_ends, paper_axes
 from contactopt.meshes.structured import patch, rename, simplices, tensor_mesh
 from contactopt.readings.edges import contact_edge
-from experiments.report import write
+from experiments.report import figures_alone, save_figures, stored, write
 
 RUBBER, RADIUS = Material(5.0, 0.3), 50.0  # MPa; of the sphere, in contact half-widths
 SIZE = {2: 30_000.0, 3: 20.0}  # of the body, in contact half-widths
@@ -206,22 +206,22 @@ def cheapest(rows: list[dict]) -> list[dict[str, object]]:
     return out
 
 
-def draw(rows: list[dict]) -> Figure:
+def draw(rows: list[dict]) -> Any:
     titles = {"peak": "peak pressure", "radius": "contact radius", "approach": "approach"}
-    figure = Figure(figsize=(7.4, 7.0), layout="constrained")
-    for ax, (case, quantity) in zip(figure.subplots(2, 2).ravel(), QUANTITIES):
+    figure, axes = paper_axes(2, rows=2, wide=True)
+    for ax, (case, quantity) in zip(axes, QUANTITIES):
         solid = ("hexahedra", "tetrahedra") if CASES[case] == 3 else ("quads", "triangles")
+        ends = []
         for (shape, degree), (colour, style) in KINDS.items():
             own = series(rows, case, shape, degree)
             x, y = [r["unknowns"] for r in own], np.abs([r[quantity] for r in own])
-            look = {"color": colour, "mfc": "white" if degree == 1 else colour, "ms": 5}
-            ax.loglog(x, y, style, label=f"{solid[shape == 'P']}, degree {degree}", **look)
+            ax.loglog(x, y, style, color=colour, mfc="white" if degree == 1 else colour)
+            ends.append((x[-1], y[-1], f"{solid[shape == 'P']}, degree {degree}", colour))
         for target in TARGETS:
             ax.axhline(target, color=GREY, lw=0.6, ls=":")
-        ax.set(title=case, xlabel="displacement unknowns [-]", xlim=(7e2, 7e4))
-        ax.set_ylabel(f"error of the {titles[quantity]}, relative [-]")
-        if quantity == "peak":
-            ax.legend(frameon=False, fontsize=8)
+        ax.set(xlabel="displacement unknowns [-]", xlim=(7e2, 7e4))
+        ax.set_ylabel(f"error of the {titles[quantity]} [-],\n{case}")
+        label_ends(ax, ends)
     return figure
 
 
@@ -299,4 +299,7 @@ def main(across: dict[tuple[int, int], tuple[int, ...]] = ACROSS) -> None:
 
 
 if __name__ == "__main__":
-    main(QUICK if "--quick" in sys.argv else ACROSS)
+    if figures_alone():
+        save_figures("elements", {"errors": draw(stored("elements", "runs"))})
+    else:
+        main(QUICK if "--quick" in sys.argv else ACROSS)

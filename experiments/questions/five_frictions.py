@@ -15,9 +15,10 @@ import numpy as np
 
 from contactopt import InterfaceProblem, reduce_bodies, scenes, solve
 from contactopt.benchmark.families.packings import packing
+from contactopt.figures.style import draw_lines, paper_axes
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import label_lines, measure, paper_axes, stored
+from experiments.report import measure, stored
 
 TIGHT, LOOSE = 1e-10, 1e-4  # tolerances of the cone solver
 ROUNDS, STILL = 100, 1e-8  # of a fixed point; its last change
@@ -238,7 +239,7 @@ def figure(table: list[dict[str, Any]]) -> Any:
         for law in ("regularised", "compliant", "barrier"):
             own = [r for r in worst(table) if r["law"] == law]
             lines.append((law, [r["parameter"] for r in own], [r[key] for r in own]))
-        label_lines(ax, lines)
+        draw_lines(ax, lines)
         ax.set(xlabel="parameter [-]", ylabel=label)
     return picture
 
@@ -251,8 +252,8 @@ def sides_figure(table: list[dict[str, Any]]) -> Any:
         own = [r for r in table if (r["problem"], r["law"]) == (name, "polygon")]
         shown = [max(r["distance"], SMALL) for r in own]
         lines.append((name, [r["parameter"] for r in own], shown))
-    label_lines(axes[0], lines)
-    axes[0].set(xlabel="sides of the polygon", ylabel="distance to Coulomb's solution [-]")
+    draw_lines(axes[0], lines)
+    axes[0].set(xlabel="sides of the polygon [-]", ylabel="distance to Coulomb's solution [-]")
     axes[0].set_xscale("log", base=2)
     axes[0].set_xticks(SIDES, [str(sides) for sides in SIDES])
     return picture

@@ -12,15 +12,15 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from contactopt import scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.figures.style import draw_lines, paper_axes
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import merged, write
+from experiments.report import figures_alone, merged, save_figures, stored, write
 
 SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch
 FRICTION = (0.1, 0.2, 0.3, 0.4, 0.5)
@@ -93,17 +93,16 @@ def runs(sizes: list[int]) -> list[tuple[int, str, float]]:
     return chosen + [(n, "products", mu) for n in more for mu in (0.3, 0.5)]
 
 
-def draw(rows: list[dict]) -> Figure:
-    figure = Figure(figsize=(6.5, 4.2), layout="constrained")
-    ax = figure.subplots()
-    for way, colour in (("coupled", ORANGE), ("products", BLUE)):
+def draw(rows: list[dict]) -> Any:
+    figure, (ax,) = paper_axes()
+    lines = []
+    for way in WAYS:
         mine = [row for row in rows if row["way"] == way and float(row["mu"]) == FRICTION[-1]]
-        n, cpu = (np.array([float(row[key]) for row in mine]) for key in ("unknowns", "CPU [s]"))
-        ax.loglog(n, cpu, "o-", color=colour, mfc="white", label=way)
-        if way == "coupled":
-            ax.loglog(n, cpu[0] * n / n[0], ":", color=GREY, label="n")
-    ax.set(xlabel="displacement unknowns n [-]", ylabel="CPU, set-up included [s]")
-    ax.legend(frameon=False)
+        lines.append((way, *([float(row[key]) for row in mine] for key in ("unknowns", "CPU [s]"))))
+    _, n, cpu = lines[0]
+    lines.append(("proportional to $n$", n, [cpu[0] * size / n[0] for size in n]))
+    draw_lines(ax, lines, ("o-", "s-", ":"))
+    ax.set(xlabel="displacement unknowns $n$ [-]", ylabel="CPU time with set-up [s]")
     return figure
 
 
@@ -163,6 +162,8 @@ def report(rows: list[dict]) -> str:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--once"]:
         print(json.dumps(once(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]))))
+    elif figures_alone():
+        save_figures("large_punch", {"growth": draw(stored("large_punch", "sizes"))})
     else:
         rows = [isolated(*run) for run in runs([int(size) for size in sys.argv[1:]] or list(SIZES))]
         rows = merged("large_punch", "sizes", rows, KEYS)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.figures.animation import animate, energies, loop
-from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.figures.style import COLOURS, label_ends, paper_axes
 from contactopt.solving.follow import follow
 from contactopt.solving.paths import PathResult
 from experiments.questions.accuracy.sheared import exact_loss, loop_area
-from experiments.report import REPORTS, write
+from experiments.report import REPORTS, figures_alone, save_figures, stored, write
 
 SHEAR = 45.0  # .9 mu force
 STEPS = (1, 2, 4, 8, 16, 32)
@@ -67,29 +67,24 @@ def growing(mu: float, steps: int) -> dict[str, object]:
     }
 
 
-def draw_cycle(path: PathResult) -> Figure:
-    figure = Figure(figsize=(10.8, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
+def draw_cycle(path: PathResult) -> Any:
+    figure, (left, right) = paper_axes(2, wide=True)
     loop(path, left)
     energies(path, right)
     return figure
 
 
-def draw_growing(rows: list[dict]) -> Figure:
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    ax = figure.subplots()
-    for mu, colour in zip(FRICTION, (BLUE, ORANGE, GREY)):
+def draw_growing(rows: list[dict]) -> Any:
+    figure, (ax,) = paper_axes()
+    ends = []
+    for mu, colour in zip(FRICTION, COLOURS):
         chosen = [row for row in rows if row["mu"] == mu]
-        ax.semilogx(
-            [r["increments"] for r in chosen],
-            [r["c / a"] for r in chosen],
-            "o-",
-            color=colour,
-            label=f"mu = {mu:g}",
-        )
-        ax.axhline(chosen[0]["exact"], color=colour, ls="--", lw=1)
-    ax.set(xlabel="load increments [-]", ylabel="stick ratio c / a [-] (dashed: exact)")
-    ax.legend(frameon=False)
+        x, y = ([row[key] for row in chosen] for key in ("increments", "c / a"))
+        ax.semilogx(x, y, "o-", color=colour)
+        ax.axhline(chosen[0]["exact"], color=colour, ls="--", lw=0.8)
+        ends.append((x[-1], y[-1], rf"$\mu$ = {mu:g}", colour))
+    ax.set(xlabel="load increments [-]", ylabel="stick ratio $c / a$ [-] (dashed: exact)")
+    label_ends(ax, ends)
     return figure
 
 
@@ -120,6 +115,10 @@ if __name__ == "__main__":
     (REPORTS / "load_cycle").mkdir(parents=True, exist_ok=True)
     film = follow(scenes.shear_cycle(3, steps=8, shear=SHEAR))
     animate(film, REPORTS / "load_cycle" / "film.gif")
+    if figures_alone():
+        increments = stored("load_cycle", "increments")
+        figures = {"cycle": draw_cycle(film), "growing": draw_growing(increments)}
+        raise SystemExit(save_figures("load_cycle", figures))
     cycles = [cycle(steps) for steps in STEPS]
     increments = [growing(mu, steps) for mu in FRICTION for steps in INCREMENTS]
     write(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from matplotlib.figure import Figure
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce
-from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+from contactopt.benchmark.figure_style import set_ticks
+from contactopt.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, label_ends, paper_axes
 from contactopt.linear.operators import Interface
 from contactopt.meshes.structured import graded, rename, tensor_mesh
 from contactopt.methods.preconditioners import (
@@ -20,7 +22,7 @@ from contactopt.methods.preconditioners import (
     restricted,
     smooth_motions,
 )
-from experiments.report import write
+from experiments.report import figures_alone, save_figures, stored, write
 
 SIZES = (17, 33, 65, 129, 257, 513, 1025)
 DENSE = 260  # contacts up to which condition numbers are computed
@@ -38,7 +40,7 @@ STIFFNESS = (
     (5.0, 5.0, 0.499),
 )
 BODIES = "E1 = {:g}, E2 = {:g}, nu = {:g}"
-COLOURS = {"none": GREY, "p21": ORANGE, "p22": GREEN, "neumann": BLUE}
+LOOKS = {"none": GREY, "p21": ORANGE, "p22": GREEN, "neumann": BLUE}
 
 
 def blocks(
@@ -181,38 +183,26 @@ def in_zone(problem: InterfaceProblem, share: float) -> dict[str, object]:
     return row
 
 
-def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
-    figure = Figure(figsize=(6.4, 8.4), layout="constrained")
-    figure.suptitle(title)
-    for ax, key in zip(figure.subplots(2, 1), ("condition, full", "PCG iterations, full")):
-        for name, colour in COLOURS.items():
+def draw(rows: list[dict], sizes: tuple[int, ...]) -> Any:
+    figure, axes = paper_axes(2, wide=True)
+    for ax, key in zip(axes, ("condition, full", "PCG iterations, full")):
+        ends = []
+        for name, colour in LOOKS.items():
             for suffix, style in (("", "o--"), (", deflated", "s-")):
-                chosen = [
-                    row for row in rows if row["preconditioner"] == name + suffix and row[key] != ""
-                ]
-                if chosen:
-                    k = [row["contacts"] for row in chosen]
-                    ax.loglog(
-                        k,
-                        [row[key] for row in chosen],
-                        style,
-                        color=colour,
-                        mfc="white",
-                        label=name + suffix,
-                    )
+                own = [r for r in rows if r["preconditioner"] == name + suffix and r[key] != ""]
+                if own:
+                    k, y = ([row[column] for row in own] for column in ("contacts", key))
+                    ax.loglog(k, y, style, color=colour, mfc="white" if "--" in style else colour)
+                    ends.append((k[-1], y[-1], name + suffix, colour))
         if key.startswith("condition"):
-            ax.loglog(
-                sizes,
-                [np.log(k) ** 2 for k in sizes],
-                ":",
-                color="black",
-                label="log^2 N (the paper's growth)",
-            )
-            ax.legend(frameon=False, fontsize=8, loc="upper left")
-            ax.set_ylim(top=2e4)
-        ax.set(xlabel="contact nodes N [-]", ylabel=key + " [-]")
-        ax.set_xticks(sizes, [str(k) for k in sizes])
-        ax.minorticks_off()
+            growth = [np.log(k) ** 2 for k in sizes]
+            ax.loglog(sizes, growth, ":", color=COLOURS[6])
+            ends.append((sizes[-1], growth[-1], r"$\log^2 N$ (paper)", COLOURS[6]))
+        ax.set(xlabel="contacts $N$ [-]", ylabel=key.replace(", full", "") + " [-]")
+        ax.set_xticks(sizes, [str(k) for k in sizes], rotation=45)
+        ax.set_xticks([], minor=True)
+        set_ticks(ax.yaxis)
+        label_ends(ax, ends)
     return figure
 
 
@@ -269,7 +259,14 @@ bodies: [the price of friction](../cost_ratio/report.md).
 """
 
 
+def drawn(line: list[dict], surface: list[dict]) -> dict[str, Any]:
+    return {"line": draw(line, SIZES), "surface": draw(surface, tuple(n * n for n in SIDES))}
+
+
 def main() -> None:
+    if figures_alone():
+        tables = (stored("preconditioners", table) for table in ("sizes", "surface"))
+        return save_figures("preconditioners", drawn(*tables))
     rows = [row for k in SIZES for row in by_size(blocks(k, *STIFFNESS[0]))]
     even = [of_bodies(blocks(129, *material), BODIES.format(*material)) for material in STIFFNESS]
     even.append(
@@ -311,10 +308,7 @@ def main() -> None:
         "ratios": ratios,
         "zones": zones,
     }
-    figures = {
-        "line": draw(rows, SIZES, "contact line (2D)"),
-        "surface": draw(surface, tuple(n * n for n in SIDES), "contact surface (3D)"),
-    }
+    figures = drawn(rows, surface)
     write(
         "preconditioners",
         "Preconditioners of the interface operator",

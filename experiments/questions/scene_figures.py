@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contactopt import plots, run
+from contactopt.figures.style import save_figure
 from experiments.report import PAPER, REPORTS
 
 if __name__ == "__main__":
@@ -11,6 +12,6 @@ if __name__ == "__main__":
     for name in PAPER:
         result = run(name)
         picture = plots.deformed(result.scene, result.problem, result.fields).figure
-        picture.savefig(folder / f"{name}-deformed.png", dpi=100)
+        save_figure(picture, folder / f"{name}-deformed.png")
         contact = plots.contact_figure(result.scene, result.problem, result.solution)
-        contact.savefig(folder / f"{name}-pressure.png", dpi=100)
+        save_figure(contact, folder / f"{name}-pressure.png")

@@ -133,7 +133,7 @@ function span(arrays) {
   return low < high ? [low, high] : [low - 0.5, high + 0.5];
 }
 
-const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette(["999999", "0072B2", "009E73", "CC79A7", "D55E00"], true)};
+const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette((data.roles || [0]).map((_, i) => ["999999", "0072B2", "009E73", "CC79A7", "D55E00", "E69F00", "56B4E9", "F0E442"][i % 8]), true)};
 const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
 const BIN = 16;  // pixels, the side of a square of the picture that shows at most one arrow
 const painter = new Painter(view);

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from matplotlib.figure import Figure
+from typing import Any
 
-from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+import numpy as np
+
+from contactopt.benchmark.figure_style import set_ticks
+from contactopt.figures.style import GREY, MARKS, add_legend, draw_lines, paper_axes, symbols
 from experiments.questions.accuracy.corner_orders import CASES, GRADED, UNIFORM, orders
 from experiments.questions.accuracy.measured import (
     FRICTION,
@@ -20,49 +22,35 @@ from experiments.questions.accuracy.measured import (
     stick,
 )
 from experiments.questions.accuracy.sheared import SHEARS, sheared
-from experiments.report import write
+from experiments.report import figures_alone, save_figures, stored, write
 
 
-def draw_orders(errors: dict[str, dict[str, np.ndarray]]) -> Figure:
-    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
-    ax = figure.subplots()
-    for (name, found), colour in zip(errors.items(), (BLUE, ORANGE, GREEN)):
-        ax.loglog(
-            UNIFORM, found["uniform"], "o-", color=colour, mfc="white", label=f"{name}, uniform"
-        )
-        ax.loglog(
-            GRADED[:-1], found["graded"], "s--", color=colour, mfc="white", label=f"{name}, graded"
-        )
+def draw_orders(errors: dict[str, dict[str, np.ndarray]]) -> Any:
+    figure, (ax,) = paper_axes()
+    lines = []
+    for mesh, n in (("uniform", UNIFORM), ("graded", GRADED[:-1])):
+        lines += [(symbols(f"{name}, {mesh}"), n, found[mesh]) for name, found in errors.items()]
+    draw_lines(ax, lines, ["o-"] * len(errors) + ["s--"] * len(errors))
+    set_ticks(ax.xaxis)
     ax.set(
-        xlabel="elements across the half-width n [-]",
-        ylabel="error of the approach [length, unit force]",
+        xlabel="elements across the half-width $n$ [-]",
+        ylabel="error of the approach [length], unit force",
     )
-    ax.legend(frameon=False, fontsize=8)
     return figure
 
 
-def draw_effectivity(rows: list[dict[str, object]]) -> Figure:
-    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-    ax = figure.subplots()
-    styles = dict(zip(("pressure", "width", "approach", "energy", "stick"), "os^vD"))
-    for (quantity, marker), colour in zip(styles.items(), (BLUE, ORANGE, GREEN, GREY, "black")):
+def draw_effectivity(rows: list[dict[str, Any]]) -> Any:
+    figure, (ax,) = paper_axes(height=3.0)
+    for quantity, mark in zip(("pressure", "width", "approach", "energy", "stick"), MARKS):
         chosen = [row for row in rows if row["quantity"] == quantity]
-        true = [abs(float(row["true error"])) for row in chosen]  # type: ignore[arg-type]
-        ax.loglog(
-            true,
-            [row["estimate"] for row in chosen],
-            marker,
-            color=colour,
-            mfc="white",
-            label=quantity,
-        )
+        true = [abs(float(row["true error"])) for row in chosen]
+        ax.loglog(true, [row["estimate"] for row in chosen], mark, mfc="white", label=quantity)
     ends = np.array([5e-5, 2e-2])
-    ax.fill_between(
-        ends, ends / 2, 4 * ends, color=GREY, alpha=0.15, lw=0, label="effectivity .5 to 4"
-    )
-    ax.loglog(ends, ends, color=GREY, lw=1)
+    look = {"color": GREY, "alpha": 0.15, "lw": 0, "label": "effectivity .5 to 4"}
+    ax.fill_between(ends, ends / 2, 4 * ends, **look)
+    ax.loglog(ends, ends, color=GREY, lw=0.8)
     ax.set(xlabel="true relative error [-]", ylabel="estimated relative error [-]")
-    ax.legend(frameon=False, fontsize=8)
+    add_legend(ax)
     return figure
 
 
@@ -171,6 +159,10 @@ if only pressure and width are asked for.
 
 
 def main() -> None:
+    if figures_alone():
+        errors = {name: orders(name)[1] for name in CASES}
+        drawn = {"effectivity": draw_effectivity(stored("accuracy", "effectivity"))}
+        return save_figures("accuracy", drawn | {"orders": draw_orders(errors)})
     table = [hertz(name, elements) for name in KINDS for elements in (SMALL, MODEST)]
     effective = all_effectivities()
     found = {name: orders(name) for name in CASES}

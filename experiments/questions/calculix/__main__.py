@@ -13,7 +13,7 @@ import numpy as np
 from contactopt import solve
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.figures.style import BLUE, GREEN, ORANGE
+from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, add_legend, label_ends, paper_axes
 from experiments.questions.calculix.deck import LEAST
 from experiments.questions.calculix.run import (
     MU,
@@ -26,7 +26,7 @@ from experiments.questions.calculix.run import (
     punch,
     softened,
 )
-from experiments.report import write
+from experiments.report import figures_alone, save_figures, stored, write
 
 ABSENT = (
     "CalculiX is not installed, so nothing was compared: on Debian or Ubuntu `apt-get install"
@@ -188,61 +188,43 @@ stiff spring holds one of them.
 
 def figure(bench: Bench, sweep: list[dict[str, Any]]) -> Any:
     """Error, iterations and time over the penalty factor; crosses: no convergence."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    drawing, axes = plt.subplots(1, 3, figsize=(13, 5.2), layout="constrained")
+    drawing, axes = paper_axes(3, wide=True)
     factors = 10.0 ** np.arange(-1, 10)
     own = [softened(bench.problem, bench.scene, f) for f in factors]
-    for i, (component, line) in enumerate((("normal", "-"), ("tangential", "--"))):
+    ends = []
+    for i, (component, mark) in enumerate((("normal", "o"), ("tangential", "s"))):
         error = [difference(r[:, i], bench.exact.reactions[:, i])[1] for r in own]
-        axes[0].loglog(
-            factors,
-            error,
-            line,
-            color="0.6",
-            label=f"{component}, same law in contactopt",
-            zorder=0,
-        )
+        axes[0].loglog(factors, error, color="0.7", zorder=0)
+        for law, colour in zip(DECADES, (BLUE, ORANGE)):
+            points = [(row["factor"], row[f"{component}, L2"]) for row in converged(sweep, law)]
+            axes[0].loglog(*zip(*points), mark, color=colour, mfc="white" if i else colour)
+        axes[0].plot([], [], mark, color=GREY, mfc="white" if i else GREY, label=component)
+    axes[0].plot([], [], color="0.7", label="same law in contactopt")
     for law, colour in zip(DECADES, (BLUE, ORANGE)):
-        good = converged(sweep, law)
         lost = [row for row in sweep if row["contact"] == law and row["end"] != "converged"]
-        for component, style in (
-            ("normal", {"marker": "o"}),
-            ("tangential", {"marker": "s", "mfc": "none"}),
-        ):
-            points = [(row["factor"], row[f"{component}, L2"]) for row in good]
-            axes[0].loglog(*zip(*points), ls="", color=colour, label=f"{component}, {law}", **style)
         for axis, key in zip(axes[1:], ("iterations", "seconds")):
-            for rows, marker, label in ((good, "o", law), (lost, "x", f"{law}, no convergence")):
-                if rows:
-                    points = [(row["factor"], row[key]) for row in rows]
-                    axis.loglog(*zip(*points), ls="", marker=marker, color=colour, label=label)
+            for rows, mark in ((converged(sweep, law), "o"), (lost, "x")):
+                axis.loglog([r["factor"] for r in rows], [r[key] for r in rows], mark, color=colour)
+        last = max((row for row in sweep if row["contact"] == law), key=lambda r: r["factor"])
+        ends.append((last["factor"], last["seconds"], law, colour))
+    axes[1].plot([], [], "o", color=GREY, label="converged")
+    axes[1].plot([], [], "x", color=GREY, label="no convergence")
     for row in converged(sweep, "mortar"):
         for axis, key in zip(axes, ("normal, L2", "iterations", "seconds")):
-            axis.axhline(
-                row[key],
-                color=GREEN,
-                ls=":",
-                label="normal, mortar" if axis is axes[0] else "mortar",
-            )
-    for axis, title in zip(
-        axes, ("L2 error of nodal forces [-]", "iterations of ccx", "time of ccx [s]")
-    ):
-        axis.set(xlabel="penalty factor K h / E [-]", ylabel=title)
-        axis.legend(
-            fontsize=8,
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            ncol=2 if axis is axes[0] else 1,
-        )
-        axis.grid(alpha=0.3)
+            axis.axhline(row[key], color=GREEN, ls=":")
+        ends.append((factors[-1], row["seconds"], "mortar", GREEN))
+    titles = ("L2 error of nodal forces [-]", "iterations of ccx [-]", "time of ccx [s]")
+    for axis, title in zip(axes, titles):
+        axis.set(xlabel="penalty factor $K h / E$ [-]", ylabel=title)
+        add_legend(axis)
+    label_ends(axes[2], ends)
     return drawing
 
 
 def main() -> None:
+    if figures_alone():
+        sweep = stored("calculix", "rows")
+        return save_figures("calculix", {"penalty": figure(Bench("", punch()), sweep)})
     program = shutil.which("ccx")
     if program is None:
         print(ABSENT)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from contactopt import HalfSpace, Material, Rigid, Scene, Solution, scenes, solve
 from contactopt.analytic import contact_modulus, hertz_line
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+from contactopt.figures.style import COLOURS, draw_lines, label_ends, paper_axes
 from experiments.questions.half_spaces.measured import Row, cpu
 
 MATERIAL = Material(5.0, 0.3)
@@ -64,41 +63,23 @@ def _answer(scene: Scene) -> tuple[Any, Solution]:
     return problem, solve(problem)
 
 
-def draw_speed(charts: list[Row], growth: list[Row]) -> Figure:
+def draw_speed(charts: list[Row], growth: list[Row]) -> Any:
     """Error over time of all models, and products over the size of the grid."""
-    made = Figure(figsize=(11, 4.2), layout="constrained")
-    left, right = made.subplots(1, 2)
-    for name, colour in zip(
-        dict.fromkeys(row["model"] for row in charts), (GREY, ORANGE, BLUE, GREEN)
-    ):
+    figure, (left, right) = paper_axes(2, wide=True)
+    lines = []
+    for name in dict.fromkeys(row["model"] for row in charts):
         own = [row for row in charts if row["model"] == name]
-        left.loglog(
-            [row["CPU s"] for row in own],
-            [row["pressure in L2"] for row in own],
-            "o-",
-            color=colour,
-            label=name,
-        )
-    left.set(xlabel="CPU seconds", ylabel="error of the pressure in L2 [-]", title="Hertz contact")
-    left.legend(frameon=False)
-    for law, colour in (("frictionless", BLUE), ("coulomb", ORANGE)):
+        lines.append((name, *([row[key] for row in own] for key in ("CPU s", "pressure in L2"))))
+    draw_lines(left, lines)
+    left.set(xlabel="CPU time [s]", ylabel="error of the pressure in L2 [-]")
+    ends = []
+    for law, colour in zip(("frictionless", "coulomb"), COLOURS):
         own = [row for row in growth if row["law"] == law]
         points = [row["points"] for row in own]
-        right.semilogx(
-            points, [row["products"] for row in own], "o-", color=colour, label=f"{law}: products"
-        )
-        right.semilogx(
-            points,
-            [row["iterations a step"] for row in own],
-            "o--",
-            color=colour,
-            label=f"{law}: iterations a step",
-        )
-    right.set(
-        xlabel="points",
-        ylabel="on the finest grid",
-        title="rough surface, 16 waves",
-        ylim=(0, None),
-    )
-    right.legend(frameon=False)
-    return made
+        for key, style in (("products", "o-"), ("iterations a step", "s--")):
+            values = [row[key] for row in own]
+            right.semilogx(points, values, style, color=colour)
+            ends.append((points[-1], values[-1], f"{law}: {key}", colour))
+    right.set(xlabel="points [-]", ylabel="number on the finest grid [-]", ylim=(0, None))
+    label_ends(right, ends)
+    return figure

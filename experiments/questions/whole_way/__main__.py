@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from contactopt import scenes, solve
+from contactopt.figures.style import LETTERS, draw_lines, paper_axes
 from contactopt.readings.quantities import value_of
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
@@ -35,7 +36,7 @@ from experiments.questions.whole_way.ours import (
     tamaas,
 )
 from experiments.questions.whole_way.peers import CODES, hertz_line
-from experiments.report import COLUMN, label_lines, measure, paper_axes, stored
+from experiments.report import measure, stored
 
 LARGE, SMALL = 1e4, 20.0  # bodies of graded and of uniform meshes over the half-width
 TOLERANCES = tuple(10.0**-power for power in range(1, 9))
@@ -166,7 +167,7 @@ def speed_figure(table: list[Row], scene: str) -> Any:
             for w in ways
         ]  # fmt: skip
         families = ["o-" if "linear" in w or "quadratic" in w else "s--" for w in ways]
-        label_lines(ax, lines, families)
+        draw_lines(ax, lines, families)
         ax.set(xlabel="CPU time [s]", ylabel=f"relative error of the {label} [-]")
     return picture
 
@@ -183,12 +184,12 @@ def map_figure(table: list[Row]) -> Any:
     for (row, column), value in np.ndenumerate(grid):
         dark = np.log10(max(value, 1e-6)) < np.mean(drawn.get_clim())
         text = f"{100 * value:.2g}" + ("*" if matters[row, column] else "")
-        ax.text(column, row, text, ha="center", va="center", color="w" if dark else "k")
+        look = {"color": "w" if dark else "k", "fontsize": LETTERS}
+        ax.text(column, row, text, ha="center", va="center", **look)
     ax.set_xticks(range(len(TOLERANCES)), [f"$10^{{{np.log10(t):.0f}}}$" for t in TOLERANCES])
     ax.set_yticks(range(len(MESHES)), [str(n) for n in MESHES])
-    ax.set(xlabel="tolerance of the certificate [-]", ylabel="elements across the half-width")
+    ax.set(xlabel="tolerance of the certificate [-]", ylabel="elements across the half-width [-]")
     ax.spines[:].set_visible(False)
-    assert picture.get_figwidth() == COLUMN
     return picture
 
 

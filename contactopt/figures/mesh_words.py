@@ -1,0 +1,61 @@
+"""What a mesh file holds, in words that a scene file takes: bodies, boundaries and facing pairs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
+
+UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
+ZERO = 1e-9  # of the largest coordinate: what rounding leaves of zero
+DEGREE = 4  # of the quadrature of volumes and areas
+
+
+def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[str, Any]]:
+    """The beginning of a scene file in TOML, with the sizes of bodies and boundaries in comments;
+    and the meshes by the names that it gives to the bodies. `meshes` are by the names of groups.
+    """
+    named = {re.sub(r"[^\w-]", "-", group or path.stem): mesh for group, mesh in meshes.items()}
+    solid = any(len(mesh.p) == 3 for mesh in meshes.values())
+    inside, side = ("volume", "area") if solid else ("area", "length")
+    lines = [f'kind = "{"solid" if solid else "plane-strain"}"', UNITS]
+    for (name, mesh), group in zip(named.items(), meshes):
+        low, high = _place(mesh, mesh.p.min(axis=1)), _place(mesh, mesh.p.max(axis=1))
+        lines.append(
+            f"\n[bodies.{name}]  # {mesh.nelements} elements, {inside} {_measure(mesh)[0]:.5g}"
+        )
+        lines += [f"# from {low} to {high}", f'mesh = "{path}"']
+        lines += [] if group is None else [f'group = "{group}"']
+        lines.append('material = "steel"')
+        for boundary, facets in (mesh.boundaries or {}).items():
+            area, middle = _measure(mesh, np.asarray(facets))
+            lines.append(
+                f"# boundary {boundary!r}: {side} {area:.5g}, middle {_place(mesh, middle)}"
+            )
+    pairs = facing_boundaries(named, usual_distance(named)) if len(named) > 1 else []
+    return "\n".join([*lines, *(["", as_toml(pairs, 0.3, "mm")] if pairs else [])]), named
+
+
+def _place(mesh: Any, x: np.ndarray) -> str:
+    """Coordinates in brackets."""
+    shown = np.where(np.abs(x) < ZERO * np.abs(mesh.p).max(), 0.0, x)
+    return "(" + ", ".join(f"{value:.5g}" for value in shown) + ")"
+
+
+def _measure(mesh: Any, facets: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+    """Volume of a mesh, or area of facets, and the middle of it; edges are curved as they are."""
+    from skfem.quadrature import get_quadrature
+
+    mapping = mesh._mapping()
+    if facets is None:
+        X, W = get_quadrature(mesh.refdom, DEGREE)
+        dx, x = np.abs(mapping.detDF(X)) * W, mapping.F(X)
+    else:
+        X, W = get_quadrature(mesh.brefdom, DEGREE)
+        dx, x = np.abs(mapping.detDG(X, find=facets)) * W, mapping.G(X, find=facets)
+    return float(dx.sum()), np.sum(x * dx, axis=(1, 2)) / dx.sum()

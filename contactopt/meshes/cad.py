@@ -1,0 +1,215 @@
+"""Meshes of parts that were drawn in a CAD program: STEP, IGES and BREP files, by Gmsh's kernel.
+
+Each solid is a body, each of its faces a boundary. (Without solids, each face is a body and each
+edge a boundary.) A flat face whose outward normal lies along an axis is called by it, as 'z+', a
+second one 'z+2'; all others by their kind and a number within their body, as 'cylinder1'. So bodies
+may have boundaries of one name, and 'body:name' is one of them.
+
+Source: Gmsh reference manual, version 4.15, chapters "Gmsh API" and "Mesh size fields".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.checks import check_number, meant
+from contactopt.errors import InputError
+
+ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
+SHARE = 15  # usual number of elements along the diagonal of the smallest body
+AROUND = 16  # elements around a full circle, where the size does not make them smaller
+GRID = (np.arange(15) + 0.5) / 15  # parameters of a face among which a place on it is looked for
+FLAT = 1e-5  # a part is plane if it is thinner than this fraction of its size
+ALONG = 1 - 1e-9  # component of a normal that lies along an axis
+
+
+def mesh_part(
+    path: Path,
+    out: Path,
+    size: float | None = None,
+    fine: Mapping[str, float] | None = None,
+    names: Mapping[str, Sequence[str]] | None = None,
+    order: int = 2,
+) -> None:
+    """Mesh a part and write a file of Gmsh, lengths in millimetres unless the part has no unit.
+
+    Parameters
+    ----------
+    path : file of the part, which ends in one of ENDINGS
+    out : file to write, ends in .msh
+    size : of the elements [length]; None: what gives SHARE of them along the smallest body
+    fine : boundary -> size of the elements on it
+    names : new name -> boundaries that are called by it
+    order : 1, straight elements, or 2, curved ones
+
+    Returns
+    -------
+    None. InputError without Gmsh, for a file that it cannot read, and for an unknown boundary.
+    """
+    for what, value in [("the size of elements", size), *(fine or {}).items()]:
+        if value is not None:
+            check_number(what, value, low=0.0)
+    if not path.is_file():
+        raise InputError(f"part '{path}' does not exist.")
+    with _kernel() as gmsh:
+        try:
+            gmsh.model.occ.importShapes(str(path))
+            gmsh.model.occ.synchronize()
+        except Exception as error:  # the class of Gmsh's errors is Exception
+            raise InputError(f"part '{path}' cannot be read: {error}") from error
+        box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+        plane = np.ptp(box[:, 2]) < FLAT * np.ptp(box, axis=0).max()
+        if not plane and not gmsh.model.getEntities(3):  # IGES files hold the faces of a solid
+            gmsh.model.occ.healShapes(makeSolids=True)
+            gmsh.model.occ.synchronize()
+        dim = 2 if plane else 3
+        bodies = _bodies(gmsh, dim)
+        if not bodies:
+            raise InputError(f"part '{path}' holds no solids, nor faces in the plane of x and y.")
+        sides = {
+            f"{body}:{name}": tag
+            for body, own in bodies.items()
+            for name, tag in _sides(gmsh, dim, own).items()
+        }
+        _sizes(gmsh, dim, bodies.values(), size, {n: (_called(sides, n, path), s)
+               for n, s in (fine or {}).items()})  # fmt: skip
+        _groups(gmsh, dim, bodies, sides, {new: [tag for name in own for tag in
+                _called(sides, name, path)] for new, own in (names or {}).items()})  # fmt: skip
+        try:
+            gmsh.model.mesh.generate(dim)
+            if order == 2:
+                gmsh.model.mesh.setOrder(2)
+                gmsh.model.mesh.optimize("HighOrder")
+            gmsh.write(str(out))
+        except Exception as error:
+            raise InputError(
+                f"part '{path}' cannot be meshed: {error}; try smaller elements."
+            ) from error
+
+
+@contextmanager
+def _kernel() -> Iterator[Any]:
+    """Gmsh, silent, with a model of its own."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # OSError: a library of the system is missing
+        raise InputError(
+            f"this needs Gmsh ({error}); install it: pip install 'contactopt[mesh]'."
+        ) from error
+    begun = not gmsh.isInitialized()
+    if begun:
+        gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.add("part")
+    try:
+        yield gmsh
+    finally:
+        gmsh.model.remove()
+        if begun:
+            gmsh.finalize()
+
+
+def _bodies(gmsh: Any, dim: int) -> dict[str, int]:
+    """Name -> entity of each body. Names are those of the file, if they are fit for one."""
+    found: dict[str, int] = {}
+    for _, tag in gmsh.model.getEntities(dim):
+        label = gmsh.model.getEntityName(dim, tag).rpartition("/")[2]
+        name = label if re.fullmatch(r"[A-Za-z][\w-]*", label) else f"body{len(found) + 1}"
+        found[name if name not in found else f"{name}-{len(found) + 1}"] = tag
+    return found
+
+
+def _sides(gmsh: Any, dim: int, body: int) -> dict[str, int]:
+    """Name -> entity of the faces, or edges, of a body."""
+    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
+    for _, tag in gmsh.model.getBoundary([(dim, body)], oriented=False):
+        kind = gmsh.model.getType(dim - 1, tag).lower().replace(" ", "-")
+        way = _direction(gmsh, dim, body, tag) if kind in ("plane", "line") else ""
+        name = way or kind
+        counts[name] = counts.get(name, 0) + 1
+        found[way if way and counts[way] == 1 else f"{name}{counts[name]}"] = tag
+    return found
+
+
+def _direction(gmsh: Any, dim: int, body: int, tag: int) -> str:
+    """The axis along which the outward normal of a flat side lies, as 'z+', or ''."""
+    low, high = (np.array(ends) for ends in gmsh.model.getParametrizationBounds(dim - 1, tag))
+    grid = np.stack(np.meshgrid(*([GRID] * (dim - 1)))).reshape(dim - 1, -1).T
+    places = low + grid * (high - low)
+    here = next((p for p in places if gmsh.model.isInside(dim - 1, tag, p, parametric=True)), None)
+    if here is None:
+        return ""
+    x = np.array(gmsh.model.getValue(dim - 1, tag, here))
+    if dim == 3:
+        normal = np.array(gmsh.model.getNormal(tag, here))
+    else:
+        normal = np.cross(gmsh.model.getDerivative(1, tag, here), [0.0, 0.0, 1.0])
+        normal /= np.linalg.norm(normal)
+    axis = int(np.argmax(np.abs(normal)))
+    if abs(normal[axis]) < ALONG:
+        return ""
+    step = 1e-5 * np.ptp(np.reshape(gmsh.model.getBoundingBox(dim, body), (2, 3)), axis=0).max()
+    outward = normal[axis] * (-1 if gmsh.model.isInside(dim, body, x + step * normal) else 1)
+    return "xyz"[axis] + ("+" if outward > 0 else "-")
+
+
+def _called(sides: Mapping[str, int], name: str, path: Path) -> list[int]:
+    """The entities of a name, with the body's name before it or of all bodies."""
+    found = [tag for key, tag in sides.items() if name in (key, key.partition(":")[2])]
+    if not found:
+        raise InputError(
+            f"part '{path}' has no boundary {name!r}; it has {', '.join(sides)}"
+            + meant(name, [*sides, *(key.partition(":")[2] for key in sides)])
+        )
+    return found
+
+
+def _sizes(
+    gmsh: Any,
+    dim: int,
+    bodies: Iterable[int],
+    size: float | None,
+    fine: Mapping[str, tuple[list[int], float]],
+) -> None:
+    """Sizes of elements; they grow from fine sides into the bodies."""
+    boxes = [np.reshape(gmsh.model.getBoundingBox(dim, tag), (2, 3)) for tag in bodies]
+    usual = min(float(np.linalg.norm(high - low)) for low, high in boxes) / SHARE
+    gmsh.option.setNumber("Mesh.MeshSizeMax", usual if size is None else size)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", AROUND)
+    field, restricted = gmsh.model.mesh.field, []
+    for tags, value in fine.values():
+        constant = field.add("MathEval")
+        field.setString(constant, "F", f"{value:.12g}")
+        restricted.append(field.add("Restrict"))
+        field.setNumber(restricted[-1], "InField", constant)
+        field.setNumbers(restricted[-1], "SurfacesList" if dim == 3 else "CurvesList", tags)
+    if restricted:
+        least = field.add("Min")
+        field.setNumbers(least, "FieldsList", restricted)
+        field.setAsBackgroundMesh(least)
+
+
+def _groups(
+    gmsh: Any,
+    dim: int,
+    bodies: Mapping[str, int],
+    sides: Mapping[str, int],
+    names: Mapping[str, list[int]],
+) -> None:
+    """Physical groups: bodies, and sides by their new names or their own."""
+    for name, tag in bodies.items():
+        gmsh.model.addPhysicalGroup(dim, [tag], name=name)
+    called: dict[str, list[int]] = {new: list(dict.fromkeys(own)) for new, own in names.items()}
+    renamed = {tag for own in called.values() for tag in own}
+    for key, tag in sides.items():
+        if tag not in renamed:
+            called.setdefault(key.partition(":")[2], []).append(tag)
+    for name, tags in called.items():
+        gmsh.model.addPhysicalGroup(dim - 1, tags, name=name)

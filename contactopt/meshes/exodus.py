@@ -1,0 +1,108 @@
+"""Exodus II files (.e, .exo, .ex2): element blocks, node sets and side sets, by their names.
+
+meshio needs netCDF4, and loses side sets and the names of blocks. The files are netCDF: of the
+classic kind, which scipy reads, or HDF5, which h5py reads. Side k of an element is a face of
+contactopt.meshes.inp.FACES, counted from another first one.
+
+Source: L. Schoof and V. Yarberry, EXODUS II: a finite element data model, SAND92-2137.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.meshes.inp import FACES, FACET
+
+# type without its number of nodes -> that number -> type in meshio
+TYPES = {
+    "TRI": {3: "triangle", 6: "triangle6"},
+    "QUA": {4: "quad", 8: "quad8", 9: "quad9"},
+    "TET": {4: "tetra", 10: "tetra10"},
+    "HEX": {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"},
+}
+FIRST = {"tetra": 1, "hexahedron": 2}  # place in FACES of the first side
+# nodes of Exodus in the order of meshio: edges along the third axis come last, then faces, centre
+HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20]
+
+
+def read_exodus(path: Path) -> Any:
+    """The mesh of a file, with blocks and side sets as sets of elements.
+
+    ValueError, KeyError, IndexError or OSError where the file does not keep to the format.
+    """
+    if path.read_bytes()[:3] == b"CDF":
+        from scipy.io import netcdf_file
+
+        with netcdf_file(path, mmap=False) as file:
+            return _mesh(file.variables, lambda variable: variable.elem_type)
+    try:
+        import h5py
+    except ImportError as error:
+        raise ValueError("it is of HDF5; pip install h5py") from error
+    with h5py.File(path) as file:
+        return _mesh(file, lambda variable: variable.attrs["elem_type"])
+
+
+def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -> Any:
+    import meshio
+
+    if "coord" in variables:
+        points = np.array(variables["coord"][:], dtype=float).T
+    else:
+        axes = [f"coord{axis}" for axis in "xyz" if f"coord{axis}" in variables]
+        points = np.stack([np.array(variables[axis][:], dtype=float) for axis in axes], axis=1)
+    cells, starts, sets, end = [], [], {}, 0
+    for name, number in _named(variables, "eb", "connect", "block"):
+        variable = variables[f"connect{number}"]
+        nodes, text = np.array(variable[:], dtype=np.int64) - 1, type_of(variable)
+        kinds = TYPES.get((text if isinstance(text, str) else text.decode())[:3].upper(), {})
+        starts.append(end)
+        end += len(nodes)
+        kind = kinds.get(nodes.shape[1], "")
+        if kind.startswith("hexahedron"):
+            nodes = nodes[:, HEXAHEDRON[: nodes.shape[1]]]
+        cells.append((kind, nodes))
+        sets[name] = {len(cells) - 1: np.arange(len(nodes))}
+    for name, number in _named(variables, "ss", "elem_ss", "side"):
+        elements = np.array(variables[f"elem_ss{number}"][:], dtype=np.int64) - 1
+        sides = np.array(variables[f"side_ss{number}"][:], dtype=np.int64) - 1
+        sets[name] = {}
+        for (kind, nodes), start in list(zip(cells, starts)):
+            faces = FACES.get(kind.rstrip("0123456789"), ())
+            own = (elements >= start) & (elements < start + len(nodes))
+            for side in range(len(faces)) if own.any() else ():
+                here = elements[own & (sides == side)] - start
+                first = FIRST.get(kind.rstrip("0123456789"), 0)
+                facets = nodes[here][:, list(faces[(side + first) % len(faces)])]
+                sets[name][len(cells)] = np.arange(len(facets))
+                cells.append((FACET[facets.shape[1]], facets))
+    known = [i for i, (kind, _) in enumerate(cells) if kind]
+    of_cells = {
+        name: [own.get(i, np.zeros(0, dtype=int)) for i in known] for name, own in sets.items()
+    }
+    of_points = {
+        name: np.array(variables[f"node_ns{number}"][:], dtype=np.int64) - 1
+        for name, number in _named(variables, "ns", "node_ns", "nodes")
+    }
+    return meshio.Mesh(points, [cells[i] for i in known], cell_sets=of_cells, point_sets=of_points)
+
+
+def _named(variables: Mapping[str, Any], kind: str, key: str, word: str) -> list[tuple[str, int]]:
+    """Name and number, from 1, of each block or set that is there; without a name its word and
+    its own number.
+    """
+    ids = {"eb": "eb_prop1", "ss": "ss_prop1", "ns": "ns_prop1"}[kind]
+    found = []
+    count = len(variables[ids][:]) if ids in variables else 0
+    for number in range(1, count + 1):
+        name = ""
+        if f"{kind}_names" in variables:
+            letters = np.asarray(variables[f"{kind}_names"][number - 1]).astype("S1")
+            name = b"".join(letters.tolist()).split(b"\0")[0].decode(errors="replace").strip()
+        if f"{key}{number}" in variables:
+            found.append((name or f"{word} {variables[ids][number - 1]}", number))
+    return found
