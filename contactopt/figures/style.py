@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def paper_axes(
     rows: int = 1,
     wide: bool = False,
     height: float = HEIGHT,
-    layout: str | None = "constrained",
+    layout: Literal["constrained"] | None = "constrained",
 ) -> tuple[Any, np.ndarray]:
     """A figure as wide as one column of a journal, or as two, and its axes, flat; `height` is that
     of a row [inch].
@@ -163,7 +163,7 @@ def draw_lines(
     for number, (name, x, y) in enumerate(lines):
         style = styles[number] if styles else MARKS[number % len(MARKS)] + "-"
         across, up = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        colour = COLOURS[number] if number < len(COLOURS) else FAINT["color"]
+        colour = COLOURS[number] if number < len(COLOURS) else str(FAINT["color"])
         ax.loglog(across, up, style, color=colour, mfc="white" if "--" in style else colour)
         shown = np.flatnonzero(up > 0)
         if number < len(COLOURS) and len(shown):
