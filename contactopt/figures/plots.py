@@ -239,9 +239,9 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
     """
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    layout = "constrained" if problem.dim == 3 else None
-    figure, axes = paper_axes(rows=len(panels), layout=layout)
-    if layout is None:
+    placed = problem.dim == 3
+    figure, axes = paper_axes(rows=len(panels), placed=placed)
+    if not placed:
         figure.subplots_adjust(left=0.21, right=0.97, bottom=0.08, top=0.91, hspace=0.36)
     for draw, ax in zip(panels, axes):
         draw(scene, problem, solution, ax)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -62,15 +62,16 @@ def paper_axes(
     rows: int = 1,
     wide: bool = False,
     height: float = HEIGHT,
-    layout: Literal["constrained"] | None = "constrained",
+    placed: bool = True,
 ) -> tuple[Any, np.ndarray]:
-    """A figure as wide as one column of a journal, or as two, and its axes, flat; `height` is that
-    of a row [inch].
+    """A figure as wide as one column of a journal, or as two, and its axes, flat.
+
+    `height` is that of a row [inch]. Matplotlib finds the places of the axes if `placed`.
     """
     from matplotlib.figure import Figure
 
     size = (COLUMN * (2 if wide else 1), height * rows)
-    figure = Figure(figsize=size, dpi=DPI, layout=layout)
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained" if placed else None)
     axes = np.ravel(figure.subplots(rows, columns))
     for ax in axes:
         dress(ax)
