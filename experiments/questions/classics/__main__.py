@@ -12,8 +12,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from contactopt.figures.style import COLOURS, MARKS, add_legend, paper_axes
 from experiments.questions.classics.table import classics, measured
-from experiments.report import COLOURS, markdown, merged, paper_axes, save, stored, write
+from experiments.report import markdown, merged, save, stored, write
 
 NAME, TABLE, KEYS = "classics", "values", ("scene", "quantity")
 DIGITS = 1e-5  # that count as five
@@ -35,17 +36,17 @@ def shown(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def draw(rows: list[dict[str, Any]]) -> Figure:
-    figure, (ax,) = paper_axes(wide=True, rows=2)
+    figure, (ax,) = paper_axes(wide=True, height=0.13 * len(rows) + 0.6)
     names = [f"{row['scene']}, {row['quantity']}" for row in rows]
     for number, (name, label) in enumerate((("first", "degree 1"), ("second", "degree 2"))):
         own = [row[f"{name} bar"] for row in rows]
-        ax.semilogx(own, names, "os"[number], color=COLOURS[number], label=f"bar of {label}")
+        ax.semilogx(own, names, MARKS[number], color=COLOURS[number], label=f"bar of {label}")
     apart = [max(abs(row["first limit"] / row["second limit"] - 1), 1e-8) for row in rows]
     ax.semilogx(apart, names, "|", color="black", ms=8, label="difference of the two")
     ax.axvline(DIGITS, color="#bbbbbb", lw=0.8)
     ax.invert_yaxis()
     ax.set(xlabel="share of the value [-]")
-    ax.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.3, 1.08), ncols=3)
+    add_legend(ax)
     return figure
 
 
