@@ -31,24 +31,37 @@ def indented(
     zone: float,
     size: tuple[float, float],
     growth: float,
+    kink: float = 0.0,
 ) -> Scene:
     """A rigid profile x -> height over its lowest point, pressed by a force per length, or on the
     ring by the whole force, on a block of half-width size[0] and height size[1].
 
     zone    first guess of the half-width of contact
     growth  ratio of neighbouring elements on the first mesh, away from contact
+    kink    where the profile has one, which becomes a node
     """
 
     def mesh(elements: int, zone: float | None) -> Any:
         assert zone is not None
-        h = zone / elements
-        contact = h * np.arange(elements + int(np.ceil((MARGIN - 1) * elements)) + 1)
-        rest = size[0] - contact[-1]
-        across = np.concatenate([contact, contact[-1] + graded(rest, h, growth)[1:]])
-        return _block(across, graded(size[1], h, growth), contact[-1])
+        across, last = _across(kink, zone, elements, size[0], growth)
+        return _block(across, graded(size[1], zone / elements, growth), last)
 
     indenter = Rigid(name, (0.0, 1.0), lambda x: profile(x[0]), {_up(kind): -force})
     return _on_base(name, kind, indenter, mesh, 0.0, zone)
+
+
+def _across(
+    kink: float, zone: float, elements: int, size: float, growth: float
+) -> tuple[np.ndarray, float]:
+    """Places of nodes from 0 to a size, and the last of them that may touch; `kink` and `zone` are
+    among them.
+    """
+    h = zone / elements
+    near = np.linspace(0.0, kink, max(1, round(kink / h)) + 1)[:-1] if kink else np.empty(0)
+    between = np.linspace(kink, zone, max(1, round((zone - kink) / h)) + 1)
+    beyond = zone + h * np.arange(1, int(np.ceil((MARGIN - 1) * elements)) + 1)
+    far = beyond[-1] + graded(size - beyond[-1], h, growth)[1:]
+    return np.concatenate([near, between, beyond, far]), float(beyond[-1])
 
 
 def flat(name: str, kind: str, mu: float, size: tuple[float, float], ratio: float) -> Scene:
@@ -99,14 +112,9 @@ def receding(loaded: float, size: float, zone: float, growth: float) -> Scene:
 
     def mesh(elements: int, zone: float | None) -> Any:
         assert zone is not None
-        h = zone / elements
-        near = np.linspace(0.0, loaded, max(1, round(loaded / h)) + 1)
-        between = np.linspace(loaded, zone, max(1, round((zone - loaded) / h)) + 1)
-        beyond = zone + h * np.arange(1, int(np.ceil((MARGIN - 1) * elements)) + 1)
-        far = beyond[-1] + graded(size - beyond[-1], h, growth)[1:]
-        across = np.concatenate([near, between[1:], beyond, far])
-        layer = rename(tensor_mesh(across, np.linspace(0, 1, round(1 / h) + 1)), axis="x-")
-        layer = patch(layer, "y-", "contact", [beyond[-1]])
+        across, last = _across(loaded, zone, elements, size, growth)
+        up = np.linspace(0, 1, round(elements / zone) + 1)
+        layer = patch(rename(tensor_mesh(across, up), axis="x-"), "y-", "contact", [last])
         return patch(layer, "y+", "loaded", [loaded])
 
     load = Traction("loaded", (0.0, -0.5 / loaded))

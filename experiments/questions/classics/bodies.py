@@ -15,6 +15,7 @@ from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Suppor
 from experiments.questions.classics.blocks import UNIT
 
 STEEL, ALUMINIUM = Material(210e3, 0.3), Material(70e3, 0.3)
+FIT = 1e-5  # interference [mm]
 
 
 def smooth(scene: Scene) -> Scene:
@@ -101,5 +102,5 @@ def lug(elements: int) -> Scene:
 
 
 def fit(kind: str, elements: int) -> Scene:
-    """Steel shaft and hub, pressed together without friction."""
-    return scenes.press_fit(kind, interference=1e-4, mu=0.0, elements=elements)
+    """Steel shaft and hub, pressed together without friction, by so little that Lame is exact."""
+    return scenes.press_fit(kind, interference=FIT, mu=0.0, elements=elements)

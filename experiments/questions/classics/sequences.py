@@ -3,10 +3,11 @@ what the sequence converges to.
 
 From three values in a row, v0, v1 and v2, follows the order p of the error, 2^p = (v1 - v0) / (v2 -
 v1), and the limit v2 + (v2 - v1) / (2^p - 1). The bar of a limit is what it differs from the limit
-one mesh earlier, and at least a FLOOR of what it differs from the last value. Where the order is
-not between SLOWEST and FASTEST there is no limit: the last value stands. Its bar is the last step, and
-at least LUCK times the step before, since a small step can be luck. Where contact ends by itself, the edge is put on a node of every mesh, so that the sequence
-sees one and the same error.
+one mesh earlier, or from the last value without such a limit, and at least a FLOOR of the latter.
+Where the order is not between SLOWEST and FASTEST there is no limit: the last value stands. Its bar
+is the last step, and at least LUCK times the step before: a small step can be luck, and an error of
+first order is still as large. Where contact ends by itself, the edge is put on a node of every
+mesh, so that the sequence sees one and the same error.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import Options, solve_scene
 from contactopt.solving.zone import solve_zone
 
-SLOWEST, FASTEST, FLOOR, LUCK = 0.7, 5.0, 0.2, 0.1
+SLOWEST, FASTEST, FLOOR, LUCK = 0.7, 5.0, 0.2, 0.5
 EXACT = 1e-10  # relative step below which a sequence stands still
 TIGHT = Options(tol=1e-12)
 
@@ -82,8 +83,10 @@ def follow_way(way: Way, quantities: Sequence[str]) -> tuple[dict[str, Limit], i
     start, scene = time.process_time(), replace(way.scene, degree=way.degree)
     found: dict[str, list[float]] = {quantity: [] for quantity in quantities}
     zone, unknowns = scene.zone, 0
-    if zone is not None and len(scene.pairs) == 1:  # on the second mesh
-        zone = solve_zone(split_scene(scene, way.base, 1), way.base, TIGHT).zones[-1]
+    if zone is not None and len(scene.pairs) == 1:
+        for level in (way.levels - 2, way.levels - 1):
+            fine = replace(split_scene(scene, way.base, level), zone=zone)
+            zone = solve_zone(fine, way.base, TIGHT).zones[-1]
     for level in range(way.levels):
         solved = solve_scene(split_scene(scene, way.base, level), way.base, zone, TIGHT)
         unknowns = solved.reduction.dofs

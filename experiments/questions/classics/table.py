@@ -23,6 +23,7 @@ from experiments.questions.classics.sequences import Limit, Way, follow_way
 
 PLANE, DISC = "plane-strain", "axisymmetric"
 ALL = ("approach", "pressure", "width")
+TAPERED = 0.15  # radius of the flat end of the tapered punch
 LOADED = 0.5  # half-width of the load on the receding layer
 
 
@@ -40,9 +41,11 @@ class Classic:
     exact: dict[str, float]
 
 
-def _indented(name: str, kind: str, profile: Any, force: float, zone: float, high: float) -> Any:
+def _indented(
+    name: str, kind: str, profile: Any, force: float, zone: float, high: float, kink: float = 0.0
+) -> Any:
     size = (1.0 if high == 1 else 10 * high, high)
-    return lambda growth, elements: indented(name, kind, profile, force, zone, size, growth)
+    return lambda growth, elements: indented(name, kind, profile, force, zone, size, growth, kink)
 
 
 def _flat(kind: str, mu: float, size: float) -> Any:
@@ -57,13 +60,17 @@ def classics() -> list[Classic]:
     def parabola(x: np.ndarray) -> np.ndarray:
         return np.asarray(x**2 / 2)
 
+    def taper(x: np.ndarray) -> np.ndarray:
+        return np.maximum(x - TAPERED, 0.0) / 2
+
     block = (1.25, 8, 5, 1), (1.4, 6, 4, 2)
     two = (1.2, 8, 4, 1), (1.2, 6, 3, 2)
+    small = (1.2, 8, 5, 1), (1.2, 6, 4, 2)
     corner = (1.5, 5, 4, 1), (1.6, 4, 3, 2)
     far = (1.8, 5, 4, 1), (2.0, 4, 3, 2)
     beta = dundurs(None, UNIT)[1]
     steel = bodies.STEEL
-    lame = press_fit(1e-4, 10.0, 20.0, 40.0, steel, steel)
+    lame = press_fit(bodies.FIT, 10.0, 20.0, 40.0, steel, steel)
     line = flat_punch_line_friction(1.0, 1.0, 0.3, beta)
     disc = flat_punch_axisymmetric_friction(1.0, 1.0, 1.0, 0.3, beta)
     layer = {"pressure": receding_peak(LOADED), "width": receding_half_width(LOADED)}
@@ -99,6 +106,20 @@ def classics() -> list[Classic]:
             block,
             {},
         ),
+        Classic(
+            "wedge on block",
+            _indented("wedge", PLANE, lambda x: x / 4, 0.05, 0.18, 1.0),
+            ("approach", "width"),
+            block,
+            {},
+        ),
+        Classic(
+            "tapered punch on block",
+            _indented("punch", DISC, taper, 0.05, 0.25, 1.0, TAPERED),
+            ("approach", "width"),
+            block,
+            {},
+        ),
         Classic("flat disc on block", _flat(DISC, 0.0, 2.0), ("approach",), corner, {}),
         Classic("flat strip on block", _flat(PLANE, 0.0, 2.0), ("approach",), corner, {}),
         Classic("Spence's disc, mu = .3", _flat(DISC, 0.3, 1e3), ("stick",), far, _ratio(disc)),
@@ -117,14 +138,14 @@ def classics() -> list[Classic]:
             ((0, 8, 4, 1), (0, 6, 4, 2)),
             {"pressure": float(lame.peak or 0)},
         ),
-        Classic("ball in rigid cup", lambda growth, elements: bodies.cup(), ALL, two, {}),
+        Classic("ball in rigid cup", lambda growth, elements: bodies.cup(), ALL, small, {}),
         Classic("ball on block", lambda growth, elements: bodies.ball(), ALL, two, {}),
         Classic("NAFEMS roller", lambda growth, elements: bodies.roller(), ALL, two, {}),
         Classic(
             "pin in lug",
             lambda growth, elements: bodies.lug(elements),
             ("pressure", "width"),
-            two,
+            small,
             {},
         ),
         Classic(
