@@ -188,7 +188,7 @@ def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float
     nodes for each number.
     """
     last = end.distance[end.inside].max()
-    x, p = end.distance / last, pressure[end.contact] / pressure[end.contact].max()
+    x, p = end.distance / last, pressure[end.contact]
     innermost, far = np.sort(x[end.inside])[-OUTER:].min(), 1 + FAR * end.step / last
     found = [(end.step / last, np.nan)]
     for share in SHARES:
@@ -196,7 +196,7 @@ def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float
         weights = np.sqrt(areas[end.contact[fitted]] / areas[end.contact].max())
         spare = len(np.unique(x[fitted])) - SPARE
         for degree in range(min(spare, HIGHEST + 1)):
-            found.append(_fitted_root(x[fitted], p[fitted], weights, degree, far))
+            found.append(_fitted_root(x[fitted], p[fitted] / p[fitted].max(), weights, degree, far))
     edge = min(found)[1]
     return None if np.isnan(edge) else float(last * edge)
 

@@ -34,6 +34,13 @@ def receding_peak(loaded: float, terms: int = TERMS) -> float:
     return float(d @ (-1.0) ** np.arange(terms + 1))
 
 
+def kernels(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """S and N."""
+    with np.errstate(over="ignore"):
+        squeezed = 2 * np.sinh(s / 2) ** 2 / (np.sinh(s) + s)
+        return squeezed, 2 * np.cosh(s / 2) ** 2 / (np.sinh(s) - s)
+
+
 def _solved(loaded: float, terms: int) -> tuple[float, np.ndarray]:
     b = float(brentq(lambda b: _pressure(b, loaded, terms).sum(), 0.5, loaded + 1.0))
     return b, _pressure(b, loaded, terms)
@@ -43,9 +50,7 @@ def _pressure(b: float, loaded: float, terms: int) -> np.ndarray:
     """The coefficients d_j."""
     t, w = np.polynomial.legendre.leggauss(NODES)
     k, w = (t + 1) * FAR / 2, w * FAR / 2
-    with np.errstate(over="ignore"):
-        squeezed = 2 * np.sinh(k / 2) ** 2 / (np.sinh(k) + k)
-        bent = 2 * np.cosh(k / 2) ** 2 / (np.sinh(k) - k)
+    squeezed, bent = kernels(k)
     own, other = (squeezed + bent) / 2 - 1, (squeezed - bent) / 2
     x = np.cos(np.pi * (np.arange(terms) + 0.5) / (2 * terms + 1)) * b  # all but the centre
     wave = (np.cos(np.outer(x, k)) - 1) * w / k  # (place, wave number)

@@ -3,10 +3,10 @@ what the sequence converges to.
 
 From three values in a row, v0, v1 and v2, follows the order p of the error, 2^p = (v1 - v0) / (v2 -
 v1), and the limit v2 + (v2 - v1) / (2^p - 1). The bar of a limit is what it differs from the limit
-one mesh earlier, or from the last value without such a limit, and at least a FLOOR of the latter.
-Where the order is not between SLOWEST and FASTEST there is no limit: the last value stands. Its bar
-is the last step, and at least LUCK times the step before: a small step can be luck, and an error of
-first order is still as large. Where contact ends by itself, the edge is put on a node of every
+one mesh earlier, and at least a FLOOR of what it differs from the last value; the last step where
+there is no such limit. Where the order is not between SLOWEST and FASTEST there is no limit: the
+last value stands. Its bar is the last step, and at least LUCK times the step before: a small step
+can be luck, and an error of first order is still as large. Where contact ends by itself, the edge is put on a node of every
 mesh, so that the sequence sees one and the same error.
 """
 
@@ -65,7 +65,7 @@ def limit_of(values: Sequence[float]) -> Limit:
         bar = max(step, abs(values[-2] - values[-3]) * LUCK)
         return Limit(tuple(values), values[-1], bar, np.nan)
     before = found[-2][0] if len(found) > 1 else np.nan
-    bar = abs(last - before) if np.isfinite(before) else abs(last - values[-1])
+    bar = abs(last - before) if np.isfinite(before) else step
     return Limit(tuple(values), last, max(bar, FLOOR * abs(last - values[-1])), order)
 
 

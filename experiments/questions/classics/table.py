@@ -159,8 +159,13 @@ def classics() -> list[Classic]:
 
 
 def measured(number: int) -> list[dict[str, Any]]:
-    """The rows of one of the classics, by its number: both ways to all of its quantities."""
-    classic, found = classics()[number], []
+    """The rows of one of the classics, by its number."""
+    return rows_of(classics()[number])
+
+
+def rows_of(classic: Classic) -> list[dict[str, Any]]:
+    """Both ways to all quantities of a classic."""
+    found = []
     for growth, base, levels, degree in classic.ways:
         way = Way(classic.scene(growth, base), base, levels, degree)
         found.append((way, *follow_way(way, classic.quantities)))
