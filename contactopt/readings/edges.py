@@ -79,11 +79,11 @@ def contact_zone(
     Where contact ends by itself on a line, its edge is the zero of a root times a polynomial, which
     fit the pressure over the outer part of the half-width, without the last two nodes. On a
     surface, where too few nodes are left, and where the other end is a corner, a straight line
-    through p^2 against x^2 goes through the rings of nodes next to the edge. Where every node touches, or
-    where contact ends at a corner, the edge is that of the contact surface. A reading on a surface
-    counts only where the disc of that radius has the area of the zone to within an element. The
-    uncertainty is half of what the fit and the straight line differ, WITHIN of an element at
-    least. Where areas of nodes are counted, it is that of the nodes at the edge.
+    through p^2 against x^2 goes through the rings of nodes next to the edge. Where every node
+    touches, or where contact ends at a corner, the edge is that of the contact surface. A reading
+    on a surface counts only where the disc of that radius has the area of the zone to within an
+    element. The uncertainty is half of what the fit and the straight line differ, WITHIN of an
+    element at least. Where areas of nodes are counted, it is that of the nodes at the edge.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas

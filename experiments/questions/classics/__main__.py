@@ -53,9 +53,7 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
 def report(rows: list[dict[str, Any]]) -> None:
     agree = sum(row["apart over bars"] <= 1 for row in rows)
     five = sum(row["relative bar"] <= DIGITS and row["apart over bars"] <= 1 for row in rows)
-    seconds = sum(
-        {row["scene"]: row["first CPU s"] + row["second CPU s"] for row in rows}.values()
-    )
+    seconds = sum({row["scene"]: row["first CPU s"] + row["second CPU s"] for row in rows}.values())
     known = [row for row in rows if row["exact"] != ""]
     within = sum(abs(row["off exact"]) <= row["relative bar"] for row in known)
     found = (

@@ -7,11 +7,11 @@ With p under the layer, q on it, s = k h and hats for cosine transforms, the low
     v(x) = (2 / (pi E')) int_0^oo [p^ (S + N) / 2 + q^ (S - N) / 2] cos(kx) dk / k,
     S = 2 sinh^2(s/2) / (sinh s + s),    N = 2 cosh^2(s/2) / (sinh s - s),
 
-the sum of what squeezes the layer and what bends it. p = sum_j d_j T_2j(x/b) / sqrt(1 - x^2/b^2)
-with p^(k) = pi b sum_j (-1)^j d_j J_2j(kb) balances the load if pi b d_0 = 1. v is even on the base:
-v(x) = v(0) at as many places gives the other d_j. (S + N) / 2 - 1 decays exponentially; the 1 is the
-half-plane, whose part is 2 b d_j T_2j(x/b) / (2 j E'). The pressure ends with a root where sum_j d_j
-= 0, which is the equation for b. E' cancels.
+the sum of what squeezes the layer and what bends it. With p = sum_j d_j T_2j(x/b) / sqrt(1 -
+x^2/b^2), p^(k) = pi b sum_j (-1)^j d_j J_2j(kb) balances the load if pi b d_0 = 1. v is even on the
+base: v(x) = v(0) at as many places gives the other d_j. (S + N) / 2 - 1 decays exponentially; the 1
+is the half-plane, whose part is 2 b d_j T_2j(x/b) / (2 j E'). The pressure ends with a root where
+sum_j d_j = 0, which is the equation for b. E' cancels.
 """
 
 from __future__ import annotations

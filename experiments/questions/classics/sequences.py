@@ -6,8 +6,8 @@ v1), and the limit v2 + (v2 - v1) / (2^p - 1). The bar of a limit is what it dif
 one mesh earlier, and at least a FLOOR of what it differs from the last value; the last step where
 there is no such limit. Where the order is not between SLOWEST and FASTEST there is no limit: the
 last value stands. Its bar is the last step, and at least LUCK times the step before: a small step
-can be luck, and an error of first order is still as large. Where contact ends by itself, the edge is put on a node of every
-mesh, so that the sequence sees one and the same error.
+can be luck, and an error of first order is still as large. Where contact ends by itself, the edge
+is put on a node of every mesh, so that the sequence sees one and the same error.
 """
 
 from __future__ import annotations
