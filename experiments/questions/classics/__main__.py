@@ -121,7 +121,7 @@ second order and give five digits or six, and so do peaks in the middle of a smo
 peak under the punch x^4 is off the middle, and between two nodes.
 
 **How a width is read.** The zero of a parabola through p^2 over x^2 is exact where the pressure is
-that of Hertz. Under the punch x^4 it was 1.8 % too far out on any mesh, although both ways agreed.
+that of Hertz. Under the punch x^4 it stays more than 1 % too far out on any mesh, on both ways.
 A root times a polynomial, which fit the pressure over the share of the half-width that leaves the
 least standard error, has no such limit. `tests/test_edges.py` has the pressures.
 
