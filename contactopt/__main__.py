@@ -2,9 +2,16 @@
 
 import atexit
 import os
+import signal
 import sys
 
 INTERRUPTED = 130
+
+
+def _left(*_: object) -> None:
+    """Ctrl-C while the modules are being imported."""
+    os.write(2, b"contactopt: interrupted\n")
+    os._exit(INTERRUPTED)
 
 
 def main() -> int:
@@ -13,9 +20,13 @@ def main() -> int:
         # Ranks share the cores: one BLAS thread each, set before NumPy is loaded.
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             os.environ.setdefault(name, "1")
+    usual = signal.getsignal(signal.SIGINT)
+    if usual == signal.default_int_handler:  # a module that is interrupted may fail otherwise
+        signal.signal(signal.SIGINT, _left)
     try:
         from contactopt.cli import main
 
+        signal.signal(signal.SIGINT, usual)
         code = main()
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)

@@ -67,3 +67,11 @@ def unit_square() -> MeshQuad:
     return MeshQuad.init_tensor(np.linspace(0, 1, 4), np.linspace(0, 1, 4)).with_boundaries(
         {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 1, "left": lambda x: x[0] == 0}
     )
+
+
+@pytest.fixture
+def without_sweeps(monkeypatch):
+    """The package as it is installed without a C compiler: no Gauss-Seidel sweeps come first."""
+    from contactopt.methods.kernels.gauss_seidel import Sweeps
+
+    monkeypatch.setattr(Sweeps, "can", staticmethod(lambda problem: False))

@@ -214,7 +214,7 @@ def test_fallbacks_are_told(caplog):
     assert solve(problem).notes == ()  # the notes of one solve are its own
 
 
-def test_the_default_says_when_it_changes_its_method():
+def test_the_default_says_when_it_changes_its_method(without_sweeps):
     """Rigid bodies that share forces among too many contacts: Newton's first steps get nowhere."""
     solution = solve(rigid_bodies(bodies=4, contacts=12, mu=0.8, seed=0))
     assert solution.solved and any(

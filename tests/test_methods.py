@@ -85,7 +85,7 @@ def test_open_contacts_carry_nothing(name):
 
 
 @pytest.mark.parametrize("name", sorted(set(ALL) - OTHER_LAW))
-def test_a_start_at_the_solution_is_kept(name):
+def test_a_start_at_the_solution_is_kept(name, without_sweeps):
     """One iteration from there, and more than one without it, but for the pivots of Lemke, which
     take no start.
     """

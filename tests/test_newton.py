@@ -270,7 +270,7 @@ def test_load_scales_the_answer_where_there_is_no_gap(factor):
     assert np.allclose(b.reactions / factor, a.reactions, atol=1e-8)
 
 
-def test_auto_leaves_newton_when_it_cycles(monkeypatch):
+def test_auto_leaves_newton_when_it_cycles(monkeypatch, without_sweeps):
     """The chain: a Newton method that repeats itself is given up at the first repetition."""
     problem, _ = dimensionless(rigid_bodies(6, 14, 0.7, seed=1))
     wrong = np.ones(problem.q.shape)

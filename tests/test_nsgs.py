@@ -1,13 +1,19 @@
+from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
+from contactopt.methods.kernels.gauss_seidel import MODULE, Sweeps
 from contactopt.methods.nsgs import NSGS, Local
 from contactopt.problem import natural_map_residual
+from contactopt.problem.laws.bilateral import Bilateral
+from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.problem.laws.mixed import Mixed
 
 LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
 
@@ -106,3 +112,49 @@ def test_fclib(name):
 def test_bad_relaxation(relaxation):
     with pytest.raises(InputError, match="relaxation"):
         NSGS(relaxation)
+
+
+COMPILED = pytest.mark.skipif(
+    find_spec(MODULE) is None, reason="the package was installed without a C compiler"
+)
+
+
+@COMPILED
+@pytest.mark.parametrize("dim,sparse", [*product((2, 3), (False, True))])
+@pytest.mark.parametrize("relaxation", [1.0, 1.4])
+def test_compiled_sweeps_are_those_in_python(dim, sparse, relaxation, request):
+    """On a loose, unsymmetric problem whose contacts open, stick, slip and are bilateral."""
+    rng = np.random.default_rng(dim)
+    k = 12
+    B = rng.normal(size=(k * dim, k * dim // 2)) * (rng.random((k * dim, k * dim // 2)) < 0.3)
+    Q = B @ B.T + 0.1 * np.diag(rng.random(k * dim))
+    Q += 0.02 * np.triu(Q, 1)
+    mu = np.where(np.arange(k) % 4 == 0, 0.0, rng.uniform(0.1, 1.2, k))
+    held = np.arange(k) % 5 == 0
+    members = np.flatnonzero(held), np.flatnonzero(~held)
+    law = Mixed((Bilateral(mu[held]), Coulomb(mu[~held])), members)
+    q = rng.normal(size=(k, dim)) - 0.5
+    q[held, 0] = 3.0  # pulled apart
+    problem = InterfaceProblem(sp.csr_array(Q) if sparse else Q, q, law=law)
+    assert Sweeps.can(problem)
+    fast = NSGS(relaxation).iterate(problem)
+    fast_points = [next(fast)[0] for _ in range(6)]
+    request.getfixturevalue("without_sweeps")
+    slow = NSGS(relaxation).iterate(problem)
+    for reached in fast_points:
+        np.testing.assert_allclose(reached, next(slow)[0], rtol=0, atol=1e-11)
+    assert (fast_points[-1][:, 0] == 0).any() and (fast_points[-1][:, 0] < 0).any()
+
+
+@pytest.mark.parametrize("name", ["cube", "chain"])
+def test_the_default_method_needs_no_compiler(name, cube, request):
+    from contactopt.benchmark.families.rigid_blocks import rigid_blocks
+
+    problem = cube if name == "cube" else rigid_blocks(shape="chain", size=4, mu=0.7, tilt=0.1)
+    fast = solve(problem)
+    request.getfixturevalue("without_sweeps")
+    slow = solve(problem)
+    assert fast.solved and slow.solved
+    Q = problem.Q.toarray() if sp.issparse(problem.Q) else problem.Q
+    gap = (Q @ (fast.reactions - slow.reactions).ravel()).ravel()  # forces may not be unique
+    assert np.abs(gap).max() <= 1e-6 * np.abs(problem.q).max()

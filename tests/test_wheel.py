@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -35,7 +36,7 @@ def wheel(tmp_path_factory) -> Path:
         *(ROOT / name for name in ("pyproject.toml", "README.md", "LICENSE")),
     ]
     for path in names:
-        if path.is_file() and "__pycache__" not in path.parts:
+        if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".so":
             target = source / path.relative_to(ROOT)
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(path.read_bytes())
@@ -49,6 +50,8 @@ def test_it_holds_the_package_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     modules = {str(p.relative_to(ROOT)) for p in ROOT.joinpath("contactopt").rglob("*.py")}
     assert modules <= set(names)
+    built = [name for name in names if name.startswith("contactopt/methods/kernels/sweeps.")]
+    assert len(built) == (shutil.which("cc") is not None), "the sweeps in C, and not their source"
     assert "contactopt/py.typed" in names, "users' type checkers look for it"
     assert {name.split("/")[0].split("-")[0] for name in names} == {"contactopt"}
 

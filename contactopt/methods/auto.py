@@ -1,7 +1,9 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the
 proximal loop.
 
-0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
+0. Where the problem is small, has no plates, and the package was compiled: as many sweeps of the
+   nonsmooth Gauss-Seidel method as cost less than a few steps of what follows.
+   Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
    falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
@@ -42,6 +44,7 @@ from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
+from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import block_matrix
@@ -49,6 +52,7 @@ from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
 from contactopt.methods.notes import note
+from contactopt.methods.nsgs import NSGS
 from contactopt.methods.preconditioners import find_preconditioner
 from contactopt.methods.proximal import Pace, Proximal, proximal_iterates
 from contactopt.problem import InterfaceProblem, infeasibility
@@ -89,10 +93,12 @@ class Auto(Method):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        sparse = sp.issparse(problem.Q)
+        sparse, sweeping = sp.issparse(problem.Q), problem
         if sparse and problem.q.size <= constants.SMALL:
             problem = problem.altered(Q=problem.Q.toarray())
         loose = sparse and not (problem.symmetric and definite(problem.Q))
+        swept = _Swept(sweeping, start, constants.LOOSELY_SWEPT if loose else constants.SWEPT)
+        yield from swept.points(constants.FIRST_SWEEPS)
         if loose:
             reached = start or at_rest(problem)
         else:
@@ -113,7 +119,47 @@ class Auto(Method):
                     return
                 reached = yield from _newton(problem, None, None)  # its steps are exact now
             note(logger, NO_PROGRESS)
-        yield from _Robust(problem, loose).iterates(start, reached)
+        yield from _Robust(problem, loose, swept).iterates(start, reached)
+
+
+class _Swept:
+    """Gauss-Seidel sweeps as long as they are cheap; a change of the forces of `good` ends them."""
+
+    def __init__(self, problem: InterfaceProblem, start: Iterate | None, good: float):
+        self.problem, self.good = problem, good
+        self.r = np.array((start or at_rest(problem))[0], order="C")
+        self.count, self.before, self.change = constants.SWEEPS, np.inf, np.inf
+        self.share = 1.0  # of each local change, which becomes smaller where sweeps go in a circle
+
+    def points(self, budget: float) -> Iterator[Iterate]:
+        """Points that sweeps reach if they converge within a number of multiplications.
+
+        Each round has twice as many sweeps as the last one. Beyond the budget it goes on only if
+        its rate of convergence says that the rest takes at most a few budgets.
+        """
+        problem, spent = self.problem, 0.0
+        explicit = isinstance(problem.Q, np.ndarray) or sp.issparse(problem.Q)
+        size = problem.Q.nnz if sp.issparse(problem.Q) else problem.q.size**2
+        cost = size + constants.LOCAL * problem.contacts
+        if not explicit or constants.FEWEST_SWEEPS * cost > budget or not NSGS.compiled(problem):
+            return
+        sweeps = Sweeps(problem)
+        while self.change > constants.SWEPT:
+            if spent + self.count * cost > budget:
+                rest = self.count / 2 * self.rounds()
+                if not spent + rest * cost <= constants.BEYOND * budget:
+                    break
+            self.before, self.change = self.change, sweeps(self.r, self.count, self.share)
+            if self.change > constants.CIRCLE * self.before:
+                self.share *= constants.LESS
+            spent, self.count = spent + self.count * cost, 2 * self.count
+            if self.change <= self.good:
+                yield self.r.copy(), np.zeros(0)
+
+    def rounds(self) -> float:
+        """Rounds as long as the last one that are left, by its rate of convergence."""
+        gain = np.log(self.change / self.before)
+        return max(np.log(self.good / self.change) / gain, 1.0) if gain < 0 else np.inf
 
 
 class _Robust:
@@ -121,7 +167,8 @@ class _Robust:
     its iterates, and returns the best of its points or a better one that it was given.
     """
 
-    def __init__(self, problem: InterfaceProblem, loose: bool):
+    def __init__(self, problem: InterfaceProblem, loose: bool, swept: _Swept):
+        self.swept = swept
         self.problem, self.matrix = problem, block_matrix(problem.Q, problem.dim)
         self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
@@ -145,6 +192,7 @@ class _Robust:
                 reached = yield from self.proximal(
                     reached, 1, constants.LEAST_ALPHA, aim=residual / 2
                 )
+        yield from self.swept.points(constants.MORE_SWEEPS)
         if self.conic:
             for full in (True, False):
                 path = interior_iterates(problem, self.matrix, Path(full))

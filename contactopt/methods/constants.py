@@ -10,6 +10,15 @@ from rounding, from the literature or from a proof stand beside the code that us
 from __future__ import annotations
 
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
+# Multiplications that sweeps may cost (1e6 take 1.3 ms), at first, and where Newton's method
+# or the first proximal loop has failed.
+FIRST_SWEEPS, MORE_SWEEPS = 1e6, 1e7
+SWEEPS = 8  # in the first round of them
+LOCAL = 40.0  # multiplications that a local problem is worth
+BEYOND = 3.0  # times that number which sweeps may cost that converge
+FEWEST_SWEEPS = 60  # for which there must be room
+CIRCLE, LESS = 0.7, 0.9  # sweeps whose change falls by less take this share of it from then on
+SWEPT, LOOSELY_SWEPT = 1e-14, 1e-10  # change of a sweep over the forces that ends them
 NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically
 PATIENCE = 6  # Newton steps without progress
 FEW_ENTRIES = 5000  # unknowns of an operator whose entries are asked for without progress

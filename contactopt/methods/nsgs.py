@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, inf
 from typing import ClassVar
 
 import numpy as np
@@ -26,7 +26,8 @@ import scipy.sparse as sp
 from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import Interface
-from contactopt.methods.method import Iterate, Method
+from contactopt.methods.kernels.gauss_seidel import Sweeps
+from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws.law import Law
@@ -56,10 +57,21 @@ class NSGS(Method):
     def solves(self, law: Law) -> bool:
         return law.proportional and not law.dilatant
 
+    @staticmethod
+    def compiled(problem: InterfaceProblem) -> bool:
+        """Whether compiled sweeps can solve the problem."""
+        return NSGS().solves(problem.law) and Sweeps.can(problem)
+
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         (k, dim), V, s = problem.q.shape, problem.V, problem.s
-        r, lam = start or (np.zeros((k, dim)), np.zeros(len(s)))
-        r = r.copy()
+        r, lam = start or at_rest(problem)
+        r = np.array(r, order="C")
+        if Sweeps.can(problem):
+            sweeps = Sweeps(problem)
+            while True:
+                check_time()
+                sweeps(r, 1, self.relaxation)
+                yield r.copy(), lam
         flat = r.reshape(-1)  # a view: changes with r
         tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
         motions = V.reshape(k, dim, -1)
@@ -137,6 +149,8 @@ class Local:
         (b1, b2), ((s11, s12), (s21, s22)), (w1, w2) = b, self.S, self.w
         low, level = 0.0, 0.0
         high = hypot(b1, b2) * (1 + mu * hypot(w1, w2)) / (mu * abs(press))
+        if high == inf:  # no friction to speak of
+            return [0.0, 0.0]
         for _ in range(STEPS):
             det = (s11 + level) * (s22 + level) - s12 * s21
             t1, t2 = (s12 * b2 - (s22 + level) * b1) / det, (s21 * b1 - (s11 + level) * b2) / det

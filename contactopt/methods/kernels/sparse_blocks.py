@@ -84,6 +84,19 @@ class DenseBlocks:
         return factorised(assembled(self.Q, left, added, kept))
 
 
+def blocks_of(Q: sp.csr_array, d: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns (b,) of the d x d blocks of Q, row after row, the blocks (b, d, d), and
+    the place (k,) of each diagonal block, which is there even if it is zero.
+    """
+    filled, own = sp.bsr_array(Q, blocksize=(d, d)), np.arange(Q.shape[0] // d)
+    rows = np.repeat(own, np.diff(filled.indptr))
+    keys = np.concatenate([rows * len(own) + filled.indices, own * len(own) + own])
+    unique, where = np.unique(keys, return_inverse=True)
+    blocks = np.zeros((len(unique), d, d))
+    blocks[where[: len(rows)]] = filled.data
+    return unique // len(own), unique % len(own), blocks, where[len(rows) :]
+
+
 class SparseBlocks:
     """Q (n, n) by its d x d blocks, with the places of their entries in the columns of an LU
     factorisation.
@@ -96,16 +109,7 @@ class SparseBlocks:
 
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
-        # Blocks are numbered row by row, and every diagonal block is there, because something will
-        # be added.
-        filled, own = sp.bsr_array(Q, blocksize=(d, d)), np.arange(self.k)
-        rows = np.repeat(own, np.diff(filled.indptr))
-        keys = np.concatenate([rows * self.k + filled.indices, own * self.k + own])
-        unique, where = np.unique(keys, return_inverse=True)
-        self.rows, self.columns = unique // self.k, unique % self.k
-        self.blocks = np.zeros((len(unique), d, d))
-        self.blocks[where[: len(rows)]] = filled.data
-        self.home = where[len(rows) :]
+        self.rows, self.columns, self.blocks, self.home = blocks_of(Q, d)
         self.unknown, self.entries = self._arranged()
 
     def _arranged(self) -> tuple[np.ndarray, sp.csc_array]:
