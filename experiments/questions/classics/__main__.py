@@ -80,7 +80,8 @@ def report(rows: list[dict[str, Any]], defaults: list[dict[str, Any]]) -> None:
     good, judged = (sum(row["within"] in kinds for row in defaults) for kinds in (YES, JUDGED))
     found = (
         f"**Findings.** There are {len(rows)} values, and in {agree} of them the two ways agree"
-        f" within the sum of their bars (not: {', '.join(apart) or 'none'}). {five} of these have a bar of at most {DIGITS:g} of the"
+        f" within the sum of their bars (not: {', '.join(apart) or 'none'}). {five} of these"
+        f" have a bar of at most {DIGITS:g} of the"
         f" value. An exact value is known for {len(known)}, and {within} lie within their bar of"
         f" it. All took {seconds:.0f} s of CPU. On their default meshes, named scenes are within"
         f" .1 % for forces and pressures, and .2 % for widths, in {good} of {judged} quantities"
