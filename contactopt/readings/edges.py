@@ -30,6 +30,7 @@ from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import ContactStatus, contact_status
 from contactopt.readings.constants import (
     FAR,
+    FITTED_WITHIN,
     HIGHEST,
     NEAR,
     OUTER,
@@ -82,7 +83,7 @@ def contact_zone(
     through p^2 against x^2 goes through the rings of nodes next to the edge. Where every node
     touches, or where contact ends at a corner, the edge is that of the contact surface. A reading
     on a surface counts only where the disc of that radius has the area of the zone to within an
-    element. The uncertainty is half of what the fit and the straight line differ, WITHIN of an
+    element. The uncertainty is half of what the fit and the straight line differ, and a share of an
     element at least. Where areas of nodes are counted, it is that of the nodes at the edge.
     """
     touching = contact_status(problem, reactions).touching
@@ -97,7 +98,8 @@ def contact_zone(
                 return edge, end.step / 2 if line is None else abs(edge - line) / 2
         return None if line is None else (line, end.step / 2)
 
-    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read)
+    least = FITTED_WITHIN if problem.dim == 2 else WITHIN
+    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read, least)
 
 
 def stick_edge(
@@ -146,17 +148,23 @@ def stick_edge(
             return None
         return float(np.mean(edges)), float(np.ptp(edges) if len(edges) > 1 else end.step) / 2
 
-    width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read)
+    width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read, WITHIN)
     return min(width, contact), uncertainty
 
 
 def _half_width(
-    scene: Scene, problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray, read: Reader
+    scene: Scene,
+    problem: InterfaceProblem,
+    inside: np.ndarray,
+    weights: np.ndarray,
+    read: Reader,
+    least: float,
 ) -> tuple[float, float]:
     """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its
     uncertainty [length].
 
     weights  (k,) by which the centre of a zone on a surface is averaged
+    least    uncertainty of a reading, in elements
     """
     area = float(problem.areas[inside].sum())
     counted = equivalent_half_width(scene, area)
@@ -174,7 +182,7 @@ def _half_width(
     ends = [patch for patch in found if patch is not None]
     if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
         return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
-    uncertainty = sum(patch.copies * max(patch.uncertainty, WITHIN * patch.step) for patch in ends)
+    uncertainty = sum(patch.copies * max(patch.uncertainty, least * patch.step) for patch in ends)
     if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
