@@ -1,10 +1,13 @@
-"""Checks of numbers that a user gives, each with one sentence that says what is wrong."""
+"""Checks of numbers that a user gives, each with one sentence that says what is wrong; and warnings
+that are given once.
+"""
 
 from __future__ import annotations
 
+import logging
 import os
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
@@ -21,6 +24,8 @@ RESERVED = {
     *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)),
 }
 LONGEST_NAME = 100  # characters
+# modules whose warnings are of bodies
+OF_BODIES = ("coupling.mortar", "bodies.rigid", "meshes.mesh_repair", "meshes.mesh_refinement")
 
 
 def check_number(
@@ -172,3 +177,25 @@ def meant(name: str, known: Iterable[str]) -> str:
     """
     near = get_close_matches(name, known, 1)
     return f"; did you mean {near[0]!r}?" if near else "."
+
+
+@contextmanager
+def said_once() -> Iterator[None]:
+    """Within, what is wrong with a body or a pair of bodies is said once, and not of each of its
+    meshes.
+    """
+    said: set[Any] = set()
+
+    def new(record: logging.LogRecord) -> bool:
+        what = record.msg, *(record.args if isinstance(record.args, tuple) else ())[:2]
+        if what in said:
+            return False
+        said.add(what)
+        return True
+
+    with ExitStack() as after:
+        for name in OF_BODIES:
+            logger = logging.getLogger(f"contactopt.{name}")
+            logger.addFilter(new)
+            after.callback(logger.removeFilter, new)
+        yield

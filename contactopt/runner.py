@@ -14,7 +14,7 @@ import numpy as np
 
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import count
-from contactopt.checks import meant
+from contactopt.checks import meant, said_once
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, write
@@ -185,6 +185,7 @@ def states_of(
     return _states(scene, file, changes), {} if file is None else file.solve
 
 
+@said_once()
 def _scene_file(scene: Any, changes: dict[str, Any]) -> SceneFile | None:
     """The scene file that the name of a scene stands for, with changes of its entries; None for all
     other scenes.
@@ -261,6 +262,7 @@ def _dealt(states: tuple[Scene, ...], team: Team, note: Note) -> tuple[Scene, ..
     return tuple(spread(state, team) for state in states)
 
 
+@said_once()
 def _solved(
     states: tuple[Scene, ...], options: RunOptions, limits: Limits, how: Options
 ) -> tuple[Solved, Estimate | None]:

@@ -13,13 +13,14 @@ from conftest import MATERIAL, block, two_blocks
 from contactopt import InputError, Part, Plate, Rigid, Scene, Support, run
 from contactopt.accuracy import refine
 from contactopt.accuracy.corners import filled, re_entrant
-from contactopt.accuracy.indicators import element_errors, pressure_errors
+from contactopt.accuracy.indicators import element_errors, pressure_errors, read_once
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.meshes.mesh_refinement import bent, boundary_curves
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.scenes.refined_scenes import split_scene
+from contactopt.solving import solve_states
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
 
@@ -267,6 +268,17 @@ def test_one_mesh_reads_a_quantity_with_its_error(scene, quantity):
     error = abs(found[quantity]["value"] / exact - 1)
     assert 0 < error <= found[quantity]["error"] <= 10 * error
     assert found["energy"]["error"] < 0.01
+
+
+def test_the_last_state_of_a_path_is_read_with_its_error():
+    """Without friction a path forgets its states: value and error are those of its last load."""
+    light, full = (make_scene("punch-2d", mu=0.0, elements=4, force=f) for f in (50.0, 100.0))
+    path, alone = (
+        read_once(solve_states(states), "von_mises:punch:contact")
+        for states in ((light, full), (full,))
+    )
+    assert path["error"] == pytest.approx(alone["error"]) and 0 < path["error"] < 1
+    assert path["value"] == pytest.approx(alone["value"])
 
 
 def test_what_one_mesh_cannot_tell_is_not_invented(capsys, tmp_path):

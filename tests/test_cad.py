@@ -1,5 +1,6 @@
 """Parts from CAD files: named, meshed, shown, and solved as the same bodies made by ourselves."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -134,6 +135,40 @@ def test_the_page_has_a_colour_for_each_boundary(parts):
 def test_what_is_not_there_is_told(parts, options, words, capsys):
     assert main(["mesh", str(parts), "--no-page", *options]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_new_names_take_a_size_and_shapes_are_told(parts, capsys):
+    """The edges on the bore are as fine as asked for by its new name; a flat boundary has its
+    outward normal, a round one its radius.
+    """
+    asked = ["--name", "bore=cylinder1", "--fine", "bore:0.25", "--size", "0.8", "--no-page", "-q"]
+    assert main(["mesh", str(parts), *asked]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"'bore': .*, radius 0\.5, hollow\n", told)
+    assert re.search(r"'z\+': .*, normal \(0, 0, 1\)\n", told)
+    cube = load_mesh("parts.msh", "body1")
+    edges = cube.p[:, cube.facets[:2, cube.boundaries["bore"]]]
+    assert np.linalg.norm(edges[:, 0] - edges[:, 1], axis=0).mean() < 0.35
+
+
+def test_the_face_on_which_no_element_fits_is_told(tmp_path, monkeypatch):
+    """The fillet at the foot of a pin touches the edges of the top of its block."""
+    import gmsh
+
+    monkeypatch.chdir(tmp_path)
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    occ = gmsh.model.occ
+    block, pin = occ.addBox(-6, -9, -6, 23, 9, 12), occ.addCylinder(0, 0, 0, 0, 9, 0, 4)
+    ((_, body),), _ = occ.fuse([(3, block)], [(3, pin)])
+    occ.synchronize()
+    foot = [tag for _, tag in gmsh.model.getEntities(1) if gmsh.model.getType(1, tag) == "Circle"]
+    occ.fillet([body], [tag for tag in foot if abs(occ.getCenterOfMass(1, tag)[1]) < 1e-6], [2.0])
+    occ.synchronize()
+    gmsh.write("foot.brep")
+    gmsh.finalize()
+    with pytest.raises(InputError, match=r"No element fits on body1:\S+: mend it, or try smaller"):
+        mesh_part(Path("foot.brep"), Path("foot.msh"))
 
 
 def test_faces_of_iges_files_become_a_solid_and_plane_parts_stay_plane(tmp_path, monkeypatch):

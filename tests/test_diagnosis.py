@@ -335,7 +335,7 @@ def test_condition_times_certificate_bounds_the_error_of_forces(dim, plate, seed
     assert ratios and 0.1 * factor < max(ratios) <= 1.01 * factor
 
 
-def test_a_small_certificate_of_wrong_forces_is_remarked():
+def test_a_small_certificate_of_wrong_forces_is_remarked(without_sweeps):
     """mu = 1 - 1e-9 of a node with the threshold 1: r_n = 1 is the one solution."""
     wedge = InterfaceProblem([[1, -1], [-1, 2]], [[-1e-9, -5.0]], 1 - 1e-9)
     answer = solve(wedge)

@@ -548,6 +548,23 @@ def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
     assert any("'Both' is the same as" in told or "same as 'Both'" in told for told in refused)
 
 
+def test_sets_of_the_elements_of_a_body_are_no_bodies(tmp_path):
+    """Abaqus writes an internal set of elements for each surface. A set of all elements of two
+    bodies is none either, and hides none.
+    """
+    path = tmp_path / "strip.inp"
+    nodes = "\n".join(f"{i + 3 * j + 1}, {i}, {j}" for j in range(2) for i in range(3))
+    path.write_text(
+        f"*Node\n{nodes}\n11, 5, 0\n12, 6, 0\n13, 6, 1\n14, 5, 1\n"
+        "*Element, type=CPE4, elset=Strip\n1, 1, 2, 5, 4\n2, 2, 3, 6, 5\n"
+        "*Element, type=CPE4, elset=Block\n3, 11, 12, 13, 14\n*Elset, elset=All\n1, 2, 3\n"
+        "*Elset, elset=_Over_S3, internal\n2\n*Surface, type=ELEMENT, name=Over\n_Over_S3, S3\n"
+    )
+    bodies, refused = load_bodies(path)
+    assert list(bodies) == ["Strip", "Block"] and set(bodies["Strip"].boundaries) == {"Over"}
+    assert "group '_Over_S3' is a part of 'Strip'" in refused and len(refused) == 2
+
+
 def exodus_bricks(path, hdf5):
     """Two bricks of twenty nodes, one on the other, and a tetrahedron beside them."""
     places = np.array([

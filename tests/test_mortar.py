@@ -22,6 +22,7 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.elements import FACES, weight_at
+from contactopt.checks import said_once
 from contactopt.coupling import segments
 from contactopt.coupling.faces import Faces, cross, evaluate
 from contactopt.coupling.facing import Facets, facing_pairs
@@ -307,6 +308,19 @@ def test_initial_overlap_is_reported_with_its_size(caplog):
     caplog.clear()
     mortar(line(grid(4), 1, False), line(grid(6), 1, True))
     assert not caplog.text
+
+
+def test_an_overlap_is_told_once_for_all_meshes_of_a_run(caplog):
+    def overlaps(*sizes):
+        caplog.clear()
+        for size in sizes:
+            upper = line(grid(size), 1, False, y=lambda x: -0.02 * x)
+            mortar(upper, line(grid(size + 2), 1, True))
+        return caplog.text.count("overlap initially")
+
+    with said_once():
+        assert overlaps(4, 5, 8) == 1
+    assert overlaps(4, 5) == 2
 
 
 def test_turned_mirrored_moved_and_in_other_units():

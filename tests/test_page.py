@@ -267,6 +267,12 @@ def test_bodies_and_colours_are_on_the_canvas_at_once(folder, name, width):
         assert seen["share"] > 0.15 and seen["colours"] > 50
         assert browser.ask("document.documentElement.scrollWidth <= window.innerWidth")
         browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
+        chart, drawn = (
+            browser.ask(f"document.querySelector('{which}').clientWidth")
+            for which in ("#contact-chart", "#contact-chart .main-svg")
+        )
+        assert drawn > 0.95 * chart  # not cut
+        assert browser.ask("draws") == 1  # what nobody asked to be drawn again is not
         whole = browser.ask(SAME)
         browser.ask("document.getElementById('near').click()")
         scale = browser.ask("painter.scale")
@@ -285,7 +291,10 @@ def exposed(folder):
     mark = 'performance.mark("drawn");'
     assert mark in text
     file = folder / "exposed.html"
-    file.write_text(text.replace(mark, f"Object.assign(window, {{painter, room}}); {mark}"))
+    text = text.replace(mark, f"Object.assign(window, {{painter, room}}); {mark}")
+    begin = "painter.begin();"
+    assert begin in text
+    file.write_text(text.replace(begin, f"window.draws = (window.draws || 0) + 1; {begin}"))
     return file
 
 

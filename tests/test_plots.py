@@ -5,9 +5,20 @@ from itertools import combinations
 import numpy as np
 import pytest
 from conftest import two_blocks
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from contactopt import plots, reduce_bodies, run, scenes, solve
+from contactopt import (
+    HalfSpace,
+    Material,
+    Rigid,
+    Scene,
+    plots,
+    reduce_bodies,
+    run,
+    scenes,
+    solve,
+)
 from contactopt.figures.solids import nearest, picture
 from contactopt.figures.style import COLUMN, draw_lines, paper_axes, save_figure
 
@@ -39,6 +50,30 @@ def test_the_pressure_curve_is_the_pressure():
     assert np.argmax(p) <= 2 and p[-1] == 0
     assert 1.4 < p.max() < 1.6  # Hertz: 3/2 of the mean
     assert x[-1] == pytest.approx(1.25, rel=0.05)
+
+
+def test_a_small_contact_zone_is_drawn_alone():
+    """A light cylinder on a wide base: what touches fills a third of the picture, not a tenth."""
+    cylinder = Rigid("cylinder", gap=lambda x: x[0] ** 2 / 20, force={"y": -0.1})
+    base = HalfSpace("base", Material(E=5.0, nu=0.3), (np.linspace(-5, 5, 65),))
+    result = run(Scene("line", cylinder, base, mu=0.3))
+    touching = result.solution.reactions[:, 0] > 0
+    zone = np.ptp(plots.contact_place(result.problem)[touching])
+    assert zone < np.ptp(plots.contact_place(result.problem)) / 6
+    shown = plots.traction(result.scene, result.problem, result.solution).get_xlim()
+    assert np.ptp(shown) <= 3.5 * zone
+
+
+def test_the_legend_is_above_a_power_of_ten():
+    """In pascals the values of an axis have a power of ten in common, which stands above it."""
+    result = run("press-fit")
+    units = replace(result.scene, units=("m", "Pa"))
+    large = replace(result.solution, reactions=1e9 * result.solution.reactions)
+    ax = plots.traction(units, result.problem, large)
+    FigureCanvasAgg(ax.figure).draw()
+    power, legend = ax.yaxis.get_offset_text(), ax.get_legend()
+    assert power.get_text()
+    assert legend.get_window_extent().y0 >= power.get_window_extent().y1
 
 
 def test_a_rigid_punch_is_drawn_with_its_exact_curve():

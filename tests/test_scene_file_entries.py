@@ -155,6 +155,7 @@ def test_steps_have_names_and_grow_from_the_step_before(tmp_path):
         ('steps = ["press"]\n', "values for 2 steps, but there are 1"),
         ('steps = [{ name = "press", states = 0 }]\n', "states of step 'press' must be"),
         ("steps = [1]\n", "every entry of 'steps'"),
+        ("steps = 1\n", "'steps' must be an array; got 1"),
     ):
         with pytest.raises(InputError, match=said):
             read_scene_file(written(tmp_path, wrong + steps))

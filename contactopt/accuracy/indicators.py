@@ -114,6 +114,8 @@ def read_once(solved: Solved, name: str) -> dict[str, float | None]:
     Returns
     -------
     "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
+        Of a load path it is the error of the last state, after the slip that the states before it
+        found on this mesh.
 
     Raises
     ------
@@ -123,8 +125,9 @@ def read_once(solved: Solved, name: str) -> dict[str, float | None]:
     reading = read(quantity, solved)
     size = np.inf
     elastic = [part for part in solved.reduction.scene.parts if part.elastic]
-    if solved.path is None and all(part.meshed for part in elastic):
-        errors = element_errors(solved, quantity, reading.value)
+    if all(part.meshed for part in elastic):
+        last = solved if solved.path is None else _state(solved, -1)
+        errors = element_errors(last, quantity, reading.value)
         size = np.inf if errors.unsigned else errors.size
     size += reading.uncertainty
     known = np.isfinite(size) and reading.value != 0 and not reading.missing
@@ -142,14 +145,20 @@ def along_path(solved: Solved, quantity: Quantity, value: float) -> ElementError
         return element_errors(solved, quantity, value)
     energy = replace(quantity, name=ENERGY)
     found = []
-    for number, state in enumerate(solved.path.states):
-        reduction = solved.reduction.loaded(state.scene)
-        reduction = replace(reduction, problem=solved.path.problem(number))
-        one = replace(solved, reduction=reduction, solution=state.solution, path=None)
-        found.append(element_errors(one, energy, value))
+    for number in range(len(solved.path.states)):
+        found.append(element_errors(_state(solved, number), energy, value))
     bodies = tuple(np.max(own, axis=0) for own in zip(*(each.bodies for each in found)))
     worst = max(each.energy for each in found)
     return ElementErrors(value, bodies, worst, unsigned=True)
+
+
+def _state(solved: Solved, number: int) -> Solved:
+    """One state of a load path as a scene of its own, after the slip of the states before it."""
+    assert solved.path is not None
+    state = solved.path.states[number]
+    reduction = solved.reduction.loaded(state.scene)
+    reduction = replace(reduction, problem=solved.path.problem(number))
+    return replace(solved, reduction=reduction, solution=state.solution, path=None)
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:

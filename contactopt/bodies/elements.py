@@ -167,7 +167,7 @@ def contact_trace(
     # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape
     # functions at all of them.
     phi, rule = _cell_rule(name, places, cells, degree)
-    at = _face_basis(basis.mesh, shape, boundary, rule)
+    at = face_basis(basis.mesh, shape, boundary, rule)
     N, node = _face_shapes(at, shape, boundary, places)
     split = (len(boundary), len(cells), phi.shape[1])  # face, cell, point
     flat = np.asarray(at.dx)
@@ -207,7 +207,7 @@ def face_nodes(
     shape, places = SHAPES[name][1][degree](), FACES[name][2]
     if degree == 1:
         places = places[:, : FACES[name][1].doflocs.shape[0]]
-    at = _face_basis(basis.mesh, shape, boundary, (places, np.ones(places.shape[1])))
+    at = face_basis(basis.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     return _face_shapes(at, shape, boundary, places)[1], np.asarray(at.normals).mean(axis=2)
 
 
@@ -222,7 +222,7 @@ def _cell_rule(
     return phi, (everywhere, np.tile(share / len(cells), len(cells)))
 
 
-def _face_basis(
+def face_basis(
     mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: Rule
 ) -> skfem.FacetBasis:
     """FacetBasis that finds the places on elements to the rounding of the coordinates; scikit-fem
@@ -243,7 +243,7 @@ def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Values (face, j, point) of the face's shape functions at `at`, and their nodes."""
-    nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
+    nodal = face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     # Of the element's shape functions, the one of a node is that which is 1 there.
     local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)
     N = np.take_along_axis(

@@ -85,10 +85,10 @@ def write_html(
         f"<title>{html.escape(title)}</title><style>{texts['page.css']}</style></head><body>",
         body,
         f'<script type="text/plain" id="data">{encoded}</script>',
-        f'<script type="text/plain" id="plotly">{packed}</script>',
         f"<script>{texts['start.js']}\nstart(async () => {{\n"
         + "\n".join(texts[name] for name in programs)
         + "\n});</script>",
+        f'<script type="text/plain" id="plotly">{packed}</script>',  # not before the picture
         "</body></html>\n",
     ]
     with whole_file(file) as beside:

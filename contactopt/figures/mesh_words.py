@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.elements import face_basis
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
 ZERO = 1e-9  # of the largest coordinate: what rounding leaves of zero
 DEGREE = 4  # of the quadrature of volumes and areas
+SHAPE = 0.02  # by how much a boundary may be off a plane or a circle [of 1, of its radius]
 
 
 def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[str, Any]]:
@@ -36,6 +38,7 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
             area, middle = _measure(mesh, np.asarray(facets))
             lines.append(
                 f"# boundary {boundary!r}: {side} {area:.5g}, middle {_place(mesh, middle)}"
+                + _shape(mesh, np.asarray(facets))
             )
     pairs = facing_boundaries(named, usual_distance(named)) if len(named) > 1 else []
     return "\n".join([*lines, *(["", as_toml(pairs, 0.3, "mm")] if pairs else [])]), named
@@ -59,3 +62,24 @@ def _measure(mesh: Any, facets: np.ndarray | None = None) -> tuple[float, np.nda
         X, W = get_quadrature(mesh.brefdom, DEGREE)
         dx, x = np.abs(mapping.detDG(X, find=facets)) * W, mapping.G(X, find=facets)
     return float(dx.sum()), np.sum(x * dx, axis=(1, 2)) / dx.sum()
+
+
+def _shape(mesh: Any, facets: np.ndarray) -> str:
+    """The outward normal of a flat boundary; the radius of a circle, a cylinder or a sphere, whose
+    points are x = c + R n with the normal n across its axis.
+    """
+    from skfem.quadrature import get_quadrature
+
+    basis = face_basis(mesh, mesh.elem(), facets, get_quadrature(mesh.brefdom, DEGREE))
+    x, n = (f.reshape(len(mesh.p), -1) for f in (basis.global_coordinates(), basis.normals))
+    mean = n.mean(axis=1, keepdims=True)
+    if np.abs(n - mean).max() < SHAPE:
+        return f", normal {_place(mesh, (mean / np.linalg.norm(mean)).ravel())}"
+    values, axes = np.linalg.eigh(n @ n.T / n.shape[1])
+    if len(n) == 3 and values[0] < SHAPE**2:
+        x, n = (axes[:, 1:].T @ field for field in (x, n))
+    x, n = x - x.mean(axis=1, keepdims=True), n - n.mean(axis=1, keepdims=True)
+    radius = np.sum(x * n) / np.sum(n * n)
+    if np.abs(x - radius * n).max() > SHAPE * abs(radius):
+        return ""
+    return f", radius {abs(radius):.4g}" + (", hollow" if radius < 0 else "")

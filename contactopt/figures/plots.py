@@ -46,6 +46,7 @@ __all__ = [
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
+SMALL = 6.0  # parts of a contact line of which the contact zone fills one, if it is drawn alone
 ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
@@ -125,8 +126,24 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         ylabel=rf"pressure $p\,/\,\bar{{p}}$ [-], $\bar{{p}}$ = {mean:.4g} {stress}",
         ylim=(0, 5.0 if _singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
+    ax.set_xlim(*_shown(problem, solution, place, unit))
     add_legend(ax)
     return ax
+
+
+def _shown(
+    problem: InterfaceProblem, solution: Solution, place: np.ndarray, unit: float = 1.0
+) -> tuple[float | None, float | None]:
+    """The limits of the places that are drawn: all, or those about a small zone that touches."""
+    touching = place[contact_status(problem, solution.reactions).touching]
+    extent = float(np.ptp(touching)) if len(touching) else 0.0
+    if extent == 0 or SMALL * extent > np.ptp(place):
+        return None, None
+    low, high = touching.min() - extent, touching.max() + extent
+    return (
+        low / unit if low > place.min() else None,
+        high / unit if high < place.max() else None,
+    )
 
 
 def _about_origin(
@@ -176,6 +193,7 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     name, where = _place_names(scene, problem)
     ax.set(xlabel=f"{name} [{length}]{where}")
     ax.set(ylabel=f"tangential traction\non the upper body [{stress}]")
+    ax.set_xlim(*_shown(problem, solution, place))
     add_legend(ax)
     return ax
 
@@ -188,14 +206,17 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
         drawn = ax.scatter(x, y, c=values, s=14, cmap="viridis")
     else:
         drawn = ax.tripcolor(x, y, triangles(cells.T), values, shading="gouraud", cmap="viridis")
-    _plane(scene, ax)
+    _plane(scene, problem, ax)
     add_colours(drawn, ax, label)
     return ax
 
 
-def _plane(scene: Scene, ax: Any) -> None:
-    """Name the axes of a surface in 3D."""
-    ax.set(xlabel=f"$x$ [{scene.units[0]}]", ylabel=f"$y$ [{scene.units[0]}]", aspect="equal")
+def _plane(scene: Scene, problem: InterfaceProblem, ax: Any) -> None:
+    """Name the axes of a surface in 3D, which are x and y where it lies across z."""
+    places, unit = problem.chart.places, scene.units[0]
+    flat = np.allclose(places, problem.coordinates[:2], atol=STRAIGHT * np.ptp(places))
+    first, second = ("$x$", "$y$") if flat else ("$s$ on the surface", "$t$ on the surface")
+    ax.set(xlabel=f"{first} [{unit}]", ylabel=f"{second} [{unit}]", aspect="equal")
 
 
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
@@ -218,7 +239,7 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
     t = solution.reactions[:, 1:] / np.where(problem.areas > 0, problem.areas, np.inf)[:, None]
     largest = float(np.linalg.norm(t, axis=1).max())
     add_legend(ax)
-    _plane(scene, ax)
+    _plane(scene, problem, ax)
     if largest > 0:
         every = np.ceil(np.sqrt(status.touching.sum() / ARROWS))
         row = np.round(problem.chart.places / spacing) % every == 0

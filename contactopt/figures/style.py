@@ -112,7 +112,10 @@ def add_legend(ax: Any) -> None:
         if sum(max(part) for part in np.array_split(sizes, columns)) <= room
     )
     look = {"frameon": False, "handlelength": 1.6, "columnspacing": 1.0, "borderaxespad": 0.2}
-    where = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": next(fitting, 1)}
+    power = ax.yaxis.get_major_formatter()
+    power.set_locs(ax.get_yticks())  # a power of ten that all have in common stands above the axis
+    top = 1.07 if power.get_offset() else 1.0
+    where = {"loc": "lower left", "bbox_to_anchor": (0, top), "ncols": next(fitting, 1)}
     ax.legend(fontsize=letters, labelspacing=0.2, **look, **where)
 
 

@@ -77,10 +77,13 @@ def mesh_part(
             for body, own in bodies.items()
             for name, tag in _sides(gmsh, dim, own).items()
         }
-        _sizes(gmsh, dim, bodies.values(), size, {n: (_called(sides, n, path), s)
-               for n, s in (fine or {}).items()})  # fmt: skip
-        _groups(gmsh, dim, bodies, sides, {new: [tag for name in own for tag in
-                _called(sides, name, path)] for new, own in (names or {}).items()})  # fmt: skip
+        new = {
+            name: [tag for old in own for tag in _called(sides, old, path)]
+            for name, own in (names or {}).items()
+        }
+        at = {n: (new.get(n) or _called(sides, n, path), s) for n, s in (fine or {}).items()}
+        _sizes(gmsh, dim, bodies.values(), size, at)
+        _groups(gmsh, dim, bodies, sides, new)
         try:
             gmsh.model.mesh.generate(dim)
             if order == 2:
@@ -88,8 +91,11 @@ def mesh_part(
                 gmsh.model.mesh.optimize("HighOrder")
             gmsh.write(str(out))
         except Exception as error:
+            elements = gmsh.model.mesh.getElements
+            bare = [name for name, tag in sides.items() if not elements(dim - 1, tag)[1]]
+            how = f"No element fits on {', '.join(bare)}: mend it, or try" if bare else "Try"
             raise InputError(
-                f"part '{path}' cannot be meshed: {error}; try smaller elements."
+                f"part '{path}' cannot be meshed ({error}). {how} smaller elements."
             ) from error
 
 

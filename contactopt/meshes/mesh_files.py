@@ -65,20 +65,30 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
     groups = read_groups(path)
     found: dict[str | None, skfem.Mesh] = {}
     refused: list[str] = []
-    known: dict[Any, str] = {}
     dim = _place(path, groups)[0]
-    names: list[Any] = [*groups.names(dim)]
-    for group in names or [None]:
-        own = groups.members.get((group, dim), {})
-        same = tuple((i, elements.tobytes()) for i, elements in sorted(own.items()))
-        if known.setdefault(same, group) != group:
-            refused.append(f"group {group!r} is the same as {known[same]!r}")
+    names: list[Any] = [*groups.names(dim)] or [None]
+    own = {group: _numbers(groups.members.get((group, dim), {})) for group in names}
+    order = sorted(names, key=lambda name: -len(own[name]))
+    for number, group in enumerate(order):
+        whole = (other for other in order[:number] if np.isin(own[group], own[other]).all())
+        sizes = {other: len(own[other]) for other in whole}
+        larger = next((o for o in sizes if o in found or sizes[o] == len(own[group])), None)
+        if larger is not None:
+            how = "the same as" if sizes[larger] == len(own[group]) else "a part of"
+            refused.append(f"group {group!r} is {how} {larger!r}")
             continue
         try:
             found[group] = _body(path, groups, group, 1.0)
         except InputError as error:
             refused.append(f"group {group!r}: {error}" if group else str(error))
-    return found, refused
+    return {group: found[group] for group in names if group in found}, refused
+
+
+def _numbers(members: Mapping[int, np.ndarray]) -> np.ndarray:
+    """Different numbers of the elements of a group, which it gives by their blocks."""
+    return np.concatenate(
+        [np.zeros(0, dtype=np.int64), *((i << 40) + own for i, own in members.items())]
+    )
 
 
 def _body(path: Path, groups: FileGroups, group: str | None, scale: float) -> skfem.Mesh:

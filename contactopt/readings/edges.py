@@ -196,6 +196,8 @@ def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float
     nodes for each number.
     """
     last = end.distance[end.inside].max()
+    if np.sum(end.inside) <= OUTER:  # one contact alone may be at the centre
+        return None
     x, p = end.distance / last, pressure[end.contact]
     innermost, far = np.sort(x[end.inside])[-OUTER:].min(), 1 + FAR * end.step / last
     found = [(end.step / last, np.nan)]

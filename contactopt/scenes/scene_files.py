@@ -163,7 +163,8 @@ def _materials(top: Table, folder: Path) -> dict[str, Named]:
 
 def _steps(top: Table) -> tuple[tuple[str, int], ...]:
     """Names and numbers of states of the steps of a load path."""
-    if all(isinstance(name, str) for name in top.data.get("steps", ())):
+    given = top.data.get("steps", [])
+    if not isinstance(given, list) or all(isinstance(name, str) for name in given):
         found = [(name, 1) for name in top.take("steps", list, [])]
     else:
         found = []

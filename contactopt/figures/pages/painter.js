@@ -15,9 +15,16 @@ function palette(colours, bands = false) {  // 256 colours as bytes, between the
 class Painter {
   constructor(canvas) { this.canvas = canvas; this.context = canvas.getContext("2d", {willReadFrequently: true}); }
 
-  begin() {  // an empty picture, as large as the canvas is on the screen
-    const dense = Math.min(window.devicePixelRatio || 1, 2), width = Math.max(1, Math.round(this.canvas.clientWidth * dense)), height = Math.max(1, Math.round(this.canvas.clientHeight * dense));
-    if (!this.image || width !== this.width || height !== this.height) {
+  wanted() {  // pixels per pixel of the page, width and height of the canvas as it is on the screen
+    const dense = Math.min(window.devicePixelRatio || 1, 2);
+    return [dense, ...[this.canvas.clientWidth, this.canvas.clientHeight].map((length) => Math.max(1, Math.round(length * dense)))];
+  }
+
+  fits() { const [, width, height] = this.wanted(); return width === this.width && height === this.height; }
+
+  begin() {  // an empty picture, as large as the canvas is
+    const [dense, width, height] = this.wanted();
+    if (!this.fits()) {
       Object.assign(this, {width, height, depth: new Float32Array(width * height), owner: new Int32Array(width * height), image: this.context.createImageData(width, height)});
       this.pixels = new Uint32Array(this.image.data.buffer);
       Object.assign(this.canvas, {width, height});
@@ -52,11 +59,13 @@ class Painter {
       if (top > bottom) continue;
       const bz = pz[b] + towards - az, cz = pz[c] + towards - az, zx = (bz * cy - cz * by) / area, zy = (cz * bx - bz * cx) / area;
       const av = (values[a] - low) * step, bv = (values[b] - values[a]) * step, cv = (values[c] - values[a]) * step, vx = (bv * cy - cv * by) / area, vy = (cv * bx - bv * cx) / area;
-      const light = lit ? 0.62 + 0.38 / Math.sqrt(1 + zx * zx + zy * zy) : 1, ends = [[0, 0, bx, by], [bx, by, cx, cy], [cx, cy, 0, 0]];
+      const light = lit ? 0.62 + 0.38 / Math.sqrt(1 + zx * zx + zy * zy) : 1;
       for (let y = top; y <= bottom; y++) {
         const down = y + 0.5 - ay;
         let left = Infinity, right = -Infinity;
-        for (const [x1, y1, x2, y2] of ends) if ((y1 <= down) !== (y2 <= down)) { const x = x1 + ((down - y1) * (x2 - x1)) / (y2 - y1); left = Math.min(left, x); right = Math.max(right, x); }
+        if ((down >= 0) !== (down >= by)) left = right = (down * bx) / by;  // where the sides of the triangle cross the line
+        if ((down >= 0) !== (down >= cy)) { const x = (down * cx) / cy; left = Math.min(left, x); right = Math.max(right, x); }
+        if ((down >= by) !== (down >= cy)) { const x = bx + ((down - by) * (cx - bx)) / (cy - by); left = Math.min(left, x); right = Math.max(right, x); }
         const from = Math.max(0, Math.ceil(ax + left - 0.5001)), to = Math.min(width - 1, Math.floor(ax + right - 0.4999));
         for (let x = from, k = y * width + from; x <= to; x++, k++) {
           const across = x + 0.5 - ax, z = az + zx * across + zy * down;
@@ -151,4 +160,7 @@ function ticks(low, high, most) {  // round numbers between two numbers
   return Array.from({length: Math.max(0, Math.min(count, 50))}, (_, i) => (first + i) * step);
 }
 
-const short = (value) => String(Number(value.toPrecision(6))).replace("-", "\u2212");
+function short(value) {  // as on an axis: 70000000 is 7e7
+  const rounded = Number(value.toPrecision(6));
+  return (Math.abs(rounded) < 1e6 ? String(rounded) : rounded.toExponential().replace("e+", "e")).replace("-", "\u2212");
+}

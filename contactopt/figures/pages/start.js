@@ -9,6 +9,7 @@ function element(name, text = "", attributes = {}) {
 }
 
 function bytes(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);  // browsers of 2025, ten times as fast
   const letters = atob(text), made = new Uint8Array(letters.length);
   for (let i = 0; i < letters.length; i++) made[i] = letters.charCodeAt(i);
   return made;
@@ -34,7 +35,8 @@ async function unsqueezed(name) {  // the text that an element of this name hold
   return new Response(stream).text();
 }
 
-async function plotly() {  // unpacks the library of charts
+async function plotly() {  // unpacks the library of charts, which stands at the end of the page
+  if (document.readyState === "loading") await new Promise((then) => document.addEventListener("DOMContentLoaded", then));
   const script = document.createElement("script");
   script.textContent = await unsqueezed("plotly");
   document.head.append(script);

@@ -58,8 +58,15 @@ function placed(item) {  // places of the nodes of all images shown, one image a
 
 const whole = (item, name) => (now.whole ? item[name] : Int32Array.from([...item[name], ...item[`cut_${name}`]]));  // with what lies in the planes of symmetry
 
-const repeated = (values, name = "") => (shownImages().length === 1 ? values : Float32Array.from(shownImages().flatMap((image) => [...values].map((value) => sign(name, image) * value))));
-const numbered = (cells, length) => (shownImages().length === 1 ? cells : Int32Array.from(shownImages().flatMap((_, k) => [...cells].map((node) => node + k * length))));
+function imaged(numbers, change) {  // those of all images shown, one image after the other: factor * number + shift
+  const all = shownImages(), many = numbers.length, made = new numbers.constructor(many * all.length);
+  if (all.length === 1) return numbers;
+  all.forEach((image, k) => { const [factor, shift] = change(image, k); for (let i = 0; i < many; i++) made[k * many + i] = factor * numbers[i] + shift; });
+  return made;
+}
+
+const repeated = (values, name = "") => imaged(values, (image) => [sign(name, image), 0]);
+const numbered = (cells, length) => imaged(cells, (_, k) => [1, k * length]);
 
 function facing(cells, length) {  // triangles of all images: those of a mirror image turn the other way round
   const made = numbered(cells, length);
@@ -452,10 +459,10 @@ listen();
 stateWords();
 show(now.box);
 performance.mark("drawn");
-new ResizeObserver(requestDraw).observe(view);
+new ResizeObserver(() => { if (!painter.fits()) requestDraw(); }).observe(view);  // it also calls at once
 for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
 if (data.words) return;
-await new Promise((then) => setTimeout(then, 30));  // the picture is on the screen before the charts are made
+await new Promise((then) => requestAnimationFrame(() => setTimeout(then)));  // the picture is on the screen before the charts are made
 await plotly();
 drawContact();
 drawPath();
