@@ -18,6 +18,7 @@ from contactopt.readings.quantities import ROWS, Quantity, value_of
 from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Part, Support
 from contactopt.solving.limits import Limits
+from contactopt.solving.zone import solve_zone
 
 
 def punch(**changes):
@@ -83,6 +84,16 @@ def test_the_fitted_peak_is_hertz_where_the_axis_node_is_not():
     assert abs(nodal / scene.reference.peak - 1) > 5e-3
     peak = value_of("pressure", reduction, solution)
     assert peak == pytest.approx(scene.reference.peak, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", ["sphere", "cylinder-2d"])
+def test_the_half_width_of_a_round_body_is_of_second_order(name):
+    """A linear elastic body on a rigid one: sheared elements would move the edge by .3 of one."""
+    scene = scenes.make_scene(name, mu=0.0, rigid="foundation")
+    solved = [solve_zone(scene, elements) for elements in (16, 32, 64)]
+    widths = [value_of("width", one.reduction, one.solution) for one in solved]
+    assert abs(widths[1] / widths[2] - 1) < 3e-4
+    assert abs(widths[0] - widths[1]) > 3 * abs(widths[1] - widths[2])
 
 
 def test_the_peak_of_an_exact_ellipse_is_exact():

@@ -98,11 +98,11 @@ def errors(scene, **changes):
 def test_pin_in_bush_is_perssons():
     scene = scenes.pin_in_bush(elements=12)
     coarse, result = errors(scene, degree=2)
-    fine, _ = errors(scenes.pin_in_bush(elements=24), degree=2)
+    fine, finer = errors(scenes.pin_in_bush(elements=24), degree=2)
     assert coarse < 0.012 and fine < 0.002
-    assert result.summary["contact_half_width"] == pytest.approx(
-        scene.reference.half_width, rel=2e-3
-    )
+    for found, off in ((result, 6e-3), (finer, 1e-3)):
+        half_width = found.summary["contact_half_width"]
+        assert half_width == pytest.approx(scene.reference.half_width, rel=off)
     assert result.summary["max_pressure"] == pytest.approx(scene.reference.peak, rel=3e-3)
     _, linear = errors(scene)
     np.testing.assert_allclose(

@@ -38,6 +38,24 @@ def test_edges_of_exact_tractions_in_a_line(c):
     assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=1e-9)
 
 
+@pytest.mark.parametrize("a", [0.987, 1.0, 1.013])
+@pytest.mark.parametrize(
+    "pressure, off",
+    [
+        (lambda s: (1 + 2 * s**2) * np.sqrt(1 - s**2), 1e-9),  # a punch x^4 on a half-plane
+        (lambda s: np.arccosh(1 / np.maximum(s, 1e-3)), 2e-3),  # a wedge, and a cone
+        (lambda s: np.sqrt(1 - s**2) * np.exp(-3 * s), 2e-3),
+    ],
+)
+def test_edges_under_other_profiles(pressure, off, a):
+    """Their squared pressures are no straight lines over x^2."""
+    x = np.linspace(-1.25, 1.25, 101)
+    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
+    p = np.where(np.abs(x) < a, pressure(np.minimum(np.abs(x) / a, 1.0)), 0.0)
+    r = 0.025 * np.stack([p, 0 * p], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(a, rel=off)
+
+
 def test_edges_of_exact_tractions_on_a_surface():
     grid = np.linspace(-1.25, 1.25, 31)
     x = np.stack(np.meshgrid(grid, grid)).reshape(2, -1)

@@ -146,8 +146,10 @@ def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad
     mesh = tensor_mesh(x / x[-1], y)
     s, t = mesh.p
     # The sides away from the contact are divided evenly: even fractions of the same node numbers.
-    s_even = np.interp(s, x / x[-1], np.linspace(0, 1, len(x)))
-    t_even = np.interp(t, y, np.linspace(0, 1, len(y)))
+    # Towards the contact the lines become upright and level: sheared elements there would move the
+    # edge of contact by a share of an element, which is an error of first order.
+    s_even = s + t * (np.interp(s, x / x[-1], np.linspace(0, 1, len(x))) - s)
+    t_even = t + s * (np.interp(t, y, np.linspace(0, 1, len(y))) - t)
     lower = _arc(radius, np.arcsin(s / np.sqrt(2)))
     right = _arc(radius, np.pi / 4 * (1 + t_even))
     left = np.stack([np.zeros_like(t), radius * t])

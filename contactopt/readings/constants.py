@@ -10,14 +10,20 @@ saves.
 # error
 SMOOTH = 3, 6
 NEAR = 1, 2  # the same where the values are straight only next to the edge
-INNER = 0.3  # share of the half-width from which on the squared pressure on a line is fitted
+# shares of the half-width from which on the pressure on a line is fitted by a root times a
+# polynomial, and the highest degree of this
+SHARES, HIGHEST = (0.3, 0.5, 0.7, 0.85), 3
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
+SPARE = 3  # nodes that it has beyond its degree, at least one more
+FAR = 3.0  # elements beyond the last node within which it finds the edge
+STEPS, SETTLED, SINGULAR = 20, 1e-12, 1e-12  # of its iteration
 # nodes to which the square of the pressure is fitted around a peak, by dimension
 FITTED = {2: 5, 3: 13}
 NEIGHBOURS = {2: 5, 3: 9}  # nodes among which a local maximum is the largest, itself among them
 MOST_PEAKS = 8  # local maxima that are looked at
-# least uncertainty of an edge that is read between nodes, over the distance of the nodes
-WITHIN = 0.05
+# least uncertainty of an edge that is read between nodes, over the distance of the nodes: by a
+# straight line, and by a root times a polynomial
+WITHIN, FITTED_WITHIN = 0.05, 0.025
 
 # The zone loop (contactopt.solving.zone).
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element

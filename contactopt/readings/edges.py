@@ -22,12 +22,26 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 from scipy.spatial import KDTree
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import ContactStatus, contact_status
-from contactopt.readings.constants import INNER, NEAR, OUTER, SMOOTH, WITHIN
+from contactopt.readings.constants import (
+    FAR,
+    FITTED_WITHIN,
+    HIGHEST,
+    NEAR,
+    OUTER,
+    SETTLED,
+    SHARES,
+    SINGULAR,
+    SMOOTH,
+    SPARE,
+    STEPS,
+    WITHIN,
+)
 from contactopt.readings.patches import End, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
@@ -63,14 +77,14 @@ def contact_zone(
     """Read the half-width of the contact zone of one pair of surfaces, and its uncertainty
     [length]; both are 0 without contact.
 
-    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against
-    x^2 over the outer part of the half-width, without the last two nodes, weighted by the nodal
-    areas. On a surface, where fewer than three nodes are left, and where the other end is a corner,
-    a straight line goes through the rings of nodes next to the edge. Where every node touches, or
-    where contact ends at a corner, the edge is that of the contact surface. A reading on a surface
-    counts only where the disc of that radius has the area of the zone to within an element. The
-    uncertainty is half of what the parabola and the straight line differ, WITHIN of an element at
-    least. Where areas of nodes are counted, it is that of the nodes at the edge.
+    Where contact ends by itself on a line, its edge is the zero of a root times a polynomial, which
+    fit the pressure over the outer part of the half-width, without the last two nodes. On a
+    surface, where too few nodes are left, and where the other end is a corner, a straight line
+    through p^2 against x^2 goes through the rings of nodes next to the edge. Where every node
+    touches, or where contact ends at a corner, the edge is that of the contact surface. A reading
+    on a surface counts only where the disc of that radius has the area of the zone to within an
+    element. The uncertainty is half of what the fit and the straight line differ, and a share of an
+    element at least. Where areas of nodes are counted, it is that of the nodes at the edge.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
@@ -79,12 +93,13 @@ def contact_zone(
         line = end.inner(pressure, SMOOTH)
         line = None if line is None else end.clip(line)
         if problem.dim == 2 and end.free:
-            edge = _zero_of_parabola(end, pressure, problem.areas)
+            edge = _end_of_pressure(end, pressure, problem.areas)
             if edge is not None:
                 return edge, end.step / 2 if line is None else abs(edge - line) / 2
         return None if line is None else (line, end.step / 2)
 
-    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read)
+    least = FITTED_WITHIN if problem.dim == 2 else WITHIN
+    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read, least)
 
 
 def stick_edge(
@@ -133,17 +148,23 @@ def stick_edge(
             return None
         return float(np.mean(edges)), float(np.ptp(edges) if len(edges) > 1 else end.step) / 2
 
-    width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read)
+    width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read, WITHIN)
     return min(width, contact), uncertainty
 
 
 def _half_width(
-    scene: Scene, problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray, read: Reader
+    scene: Scene,
+    problem: InterfaceProblem,
+    inside: np.ndarray,
+    weights: np.ndarray,
+    read: Reader,
+    least: float,
 ) -> tuple[float, float]:
     """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its
     uncertainty [length].
 
     weights  (k,) by which the centre of a zone on a surface is averaged
+    least    uncertainty of a reading, in elements
     """
     area = float(problem.areas[inside].sum())
     counted = equivalent_half_width(scene, area)
@@ -161,33 +182,61 @@ def _half_width(
     ends = [patch for patch in found if patch is not None]
     if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
         return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
-    uncertainty = sum(patch.copies * max(patch.uncertainty, WITHIN * patch.step) for patch in ends)
+    uncertainty = sum(patch.copies * max(patch.uncertainty, least * patch.step) for patch in ends)
     if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
 
 
-def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
-    """Where a parabola through p^2 over x^2, over the outer part of the half-width, is first zero;
-    None if it is not.
-
-    With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three
-    nodes leave a line.
+def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
+    """Where sqrt(c^2 - x^2) times a polynomial in x is zero, fitted to the pressure over an outer
+    share of the half-width; None without such a fit. Of all shares and degrees the fit with the
+    least standard error of c counts: a degree that is too low leaves a rest, and a high one has few
+    nodes for each number.
     """
-    x, inside = end.distance, end.inside
-    last = x[inside].max()
-    innermost = np.sort(x[inside])[-OUTER:].min()
-    fitted = inside & (x >= INNER * last) & (x < innermost)
-    nodes = len(np.unique(x[fitted]))
-    if nodes < 3:
+    last = end.distance[end.inside].max()
+    if np.sum(end.inside) <= OUTER:  # one contact alone may be at the centre
         return None
-    square, weights = pressure[end.contact[fitted]] ** 2, np.sqrt(areas[end.contact[fitted]])
-    place = (x[fitted] / last) ** 2
-    fit = np.polyfit(place, square / square.max(), min(nodes - 2, 2), w=weights / weights.max())
-    zeros = np.roots(fit)
-    beyond = zeros.real[np.isreal(zeros) & (zeros.real > place.max())]
-    return float(last * np.sqrt(beyond.min())) if len(beyond) else None
+    x, p = end.distance / last, pressure[end.contact]
+    innermost, far = np.sort(x[end.inside])[-OUTER:].min(), 1 + FAR * end.step / last
+    found = [(end.step / last, np.nan)]
+    for share in SHARES:
+        fitted = end.inside & (x >= share) & (x < innermost)
+        weights = np.sqrt(areas[end.contact[fitted]] / areas[end.contact].max())
+        spare = len(np.unique(x[fitted])) - SPARE
+        for degree in range(min(spare, HIGHEST + 1)):
+            found.append(_fitted_root(x[fitted], p[fitted] / p[fitted].max(), weights, degree, far))
+    edge = min(found)[1]
+    return None if np.isnan(edge) else float(last * edge)
+
+
+def _fitted_root(
+    x: np.ndarray, p: np.ndarray, weights: np.ndarray, degree: int, far: float
+) -> tuple[float, float]:
+    """The standard error of c, and c, at which sqrt(c^2 - x^2) times a polynomial of a degree fits
+    values p best, by the method of Gauss and Newton for c^2; infinity and nan where c is beyond
+    `far`.
+    """
+    none, square = (np.inf, np.nan), (1 + far) ** 2 / 4
+    basis = chebvander(2 * (x - x.min()) / np.ptp(x) - 1, degree) * weights[:, None]
+    fit = np.linalg.lstsq(basis * np.sqrt(square - x**2)[:, None], p * weights)[0]
+    for _ in range(STEPS):
+        root = np.sqrt(square - x**2)[:, None]
+        q, r = np.linalg.qr(np.hstack([basis * root, (basis @ fit)[:, None] / (2 * root)]))
+        if np.abs(np.diag(r)).min() < SINGULAR:
+            return none
+        known = q.T @ (p * weights)
+        fit, step = np.split(np.linalg.solve(r, known), [-1])
+        new = max(square + float(step[0]), (square + float(x.max()) ** 2) / 2)
+        if not new < far**2:
+            return none
+        settled, square = abs(new - square) <= SETTLED * square, new
+        if settled:
+            rest = np.sum((p * weights - q @ known) ** 2) / (len(x) - degree - 2)
+            edge = float(np.sqrt(square))
+            return float(np.sqrt(rest)) / abs(r[-1, -1]) / (2 * edge), edge
+    return none
 
 
 def _directions(problem: InterfaceProblem, r_t: np.ndarray, status: ContactStatus) -> np.ndarray:

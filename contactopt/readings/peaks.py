@@ -139,21 +139,24 @@ def _fitted_top(
 ) -> Peak:
     """The peak of the pressure near a node.
 
-    Beside an axis the value is that of the widest fit that agrees with all narrower ones within
-    their uncertainties (after Lepski): the nodes next to the axis are poor, and those farther away
-    mend a smooth pressure.
+    Linear elements of size h have an error of about h / m^2 of the pressure on the m-th ring around
+    an axis, because u_z / h^2 of their nodes grows there like log m, which the nodes of the contact
+    surface, held at its gap, cannot follow. It is of first order, but smooth enough for a narrow
+    fit to follow it. Beside an axis the value is therefore that of the widest of fits, each twice
+    as wide as the one before, until it changes by more than it did the last time: what the rings
+    spoil fades with the width, and what the pressure lacks of an ellipse grows. A fit to m times as
+    many contacts is sqrt(m) times less uncertain than its contacts scatter.
     """
     count, widest = FITTED[problem.dim], 0
     if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
         widest = len(_surroundings(problem)[1])
     first = made = _fit_to(count, problem, pressure, usable, top)
-    best, found = replace(made, uncertainty=made.value), list[Peak]()
-    while np.isfinite(made.uncertainty) and all(
-        abs(made.value - one.value) <= made.uncertainty + one.uncertainty for one in found
-    ):
-        best = made
-        found.append(best)
-        count *= 2
+    best, change = replace(made, uncertainty=made.value), np.inf
+    while np.isfinite(made.uncertainty) and abs(made.value - best.value) <= change:
+        if count > FITTED[problem.dim]:
+            change = abs(made.value - best.value)
+        share = FITTED[problem.dim] / count
+        best, count = replace(made, uncertainty=made.uncertainty * share**0.5), 2 * count
         if count > widest:
             break
         made = _fit_to(count, problem, pressure, usable, top)

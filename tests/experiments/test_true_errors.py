@@ -1,10 +1,11 @@
 """Estimated errors against true errors on half-spaces, whose solutions are exact."""
 
+import numpy as np
 import pytest
 
 from contactopt import scenes
 from contactopt.accuracy import refine
-from contactopt.readings.quantities import value_of
+from contactopt.readings.quantities import find_quantity, value_of
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import flat, indenter
 from experiments.questions.accuracy.measured import effectivity, exact
@@ -65,3 +66,19 @@ def test_hertz_within_a_thousandth_on_5000_unknowns(kind):
         assert value_of(quantity, reduction, solution) == pytest.approx(
             exact(scene)[quantity], rel=1e-3
         )
+
+
+@pytest.mark.parametrize("elements", [32, 64])
+def test_the_peak_beside_an_axis_is_of_second_order(elements):
+    """The pressure on the first ring of linear elements is of first order."""
+    scene = indenter("axisymmetric", size=100.0, elements=elements, loop=False)
+    solved = solve_zone(scene)
+    problem, r = solved.reduction.problem, solved.solution.reactions
+    ring = problem.areas > 0
+    ring &= problem.coordinates[0] < 1.5 * scene.reference.half_width / elements
+    share = (r[ring, 0] / problem.areas[ring]) / scene.reference.peak
+    assert ring.sum() == 2 and np.all(share < 1 - 0.04 / elements)
+    read = find_quantity("pressure", scene).read(solved.reduction, solved.solution)
+    error = abs(read.value / scene.reference.peak - 1)
+    assert error < 0.25 / elements**2
+    assert error < read.uncertainty / read.value < 1e-3

@@ -1,0 +1,1 @@
+"""The classics with error bars."""
