@@ -8,10 +8,13 @@ import sys
 INTERRUPTED = 130
 
 
-def _left(*_: object) -> None:
-    """Ctrl-C while the modules are being imported."""
-    os.write(2, b"contactopt: interrupted\n")
-    os._exit(INTERRUPTED)
+PRESSED: list[int] = []  # signals of Ctrl-C
+
+
+def _interrupt(number: int, frame: object) -> None:
+    """Ctrl-C, remembered: a module that it interrupts while being imported may fail otherwise."""
+    PRESSED.append(number)
+    raise KeyboardInterrupt
 
 
 def main() -> int:
@@ -20,15 +23,15 @@ def main() -> int:
         # Ranks share the cores: one BLAS thread each, set before NumPy is loaded.
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             os.environ.setdefault(name, "1")
-    usual = signal.getsignal(signal.SIGINT)
-    if usual == signal.default_int_handler:  # a module that is interrupted may fail otherwise
-        signal.signal(signal.SIGINT, _left)
+    if signal.getsignal(signal.SIGINT) == signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         from contactopt.cli import main
 
-        signal.signal(signal.SIGINT, usual)
         code = main()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ImportError) as error:
+        if isinstance(error, ImportError) and not PRESSED:
+            raise
         print("contactopt: interrupted", file=sys.stderr)
         code = INTERRUPTED
     # the program that reads the output, such as `head`, wants no more of it

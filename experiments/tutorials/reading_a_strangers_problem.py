@@ -168,7 +168,7 @@ spread = np.ptp([answer.reactions[:, 0] for answer in answers.values()], axis=0)
 assert spread.max() > 0.005
 
 # %% [markdown]
-# The four methods find different impulses, but the *same motion*: friction takes $\mu g$ times the
+# The methods find different impulses, but the *same motion*: friction takes $\mu g$ times the
 # time step off the speed, against the direction of the motion. The front corners carry more,
 # because friction at the floor tips the cube forwards. All four answers are certified, because the
 # certificate asks whether the laws hold, and not whether one answer looks like another.
@@ -275,7 +275,7 @@ folder.cleanup()
 # twist = np.zeros((4, 3))
 # twist[:, 0] = [1.0, -1.0, -1.0, 1.0]
 # assert np.allclose(problem.Q @ twist.ravel(), 0.0)
-# difference = answers["nsgs"].reactions - answers["auto"].reactions
+# difference = answers["admm"].reactions - answers["nsgs"].reactions
 # assert np.linalg.norm(difference[:, 0]) > 0.005
 # # two answers differ by such a change
 # assert np.allclose(problem.Q @ difference.ravel(), 0.0, atol=1e-8)
