@@ -6,8 +6,6 @@ import signal
 import sys
 
 INTERRUPTED = 130
-
-
 PRESSED: list[int] = []  # signals of Ctrl-C
 
 

@@ -1,10 +1,10 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the
 proximal loop.
 
-0. Where the problem is small, has no plates, and the package was compiled: as many sweeps of the
-   nonsmooth Gauss-Seidel method as cost less than a few steps of what follows.
-   Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual
-   falls.
+0. Where the problem is small, has no plates, and the package was installed with a compiler: as
+   many sweeps of the nonsmooth Gauss-Seidel method as cost less than a few steps of what follows.
+   Where stages 1 and 2 fail, the sweeps go on for ten times as long. Where Q is a convolution,
+   as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
    circle near a solution, a few proximal steps break out of it.
@@ -141,7 +141,9 @@ class _Swept:
         explicit = isinstance(problem.Q, np.ndarray) or sp.issparse(problem.Q)
         size = problem.Q.nnz if sp.issparse(problem.Q) else problem.q.size**2
         cost = size + constants.LOCAL * problem.contacts
-        if not explicit or constants.FEWEST_SWEEPS * cost > budget or not NSGS.compiled(problem):
+        if not explicit or constants.FEWEST_SWEEPS * cost > budget:
+            return
+        if not (NSGS().solves(problem.law) and Sweeps.can(problem)):
             return
         sweeps = Sweeps(problem)
         while self.change > constants.SWEPT:

@@ -10,8 +10,8 @@ from rounding, from the literature or from a proof stand beside the code that us
 from __future__ import annotations
 
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
-# Multiplications that sweeps may cost (1e6 take 1.3 ms), at first, and where Newton's method
-# or the first proximal loop has failed.
+# Multiplications that sweeps may cost (1e6 take about a millisecond), at first, and where Newton's
+# method or the first proximal loop has failed.
 FIRST_SWEEPS, MORE_SWEEPS = 1e6, 1e7
 SWEEPS = 8  # in the first round of them
 LOCAL = 40.0  # multiplications that a local problem is worth

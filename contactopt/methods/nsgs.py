@@ -57,11 +57,6 @@ class NSGS(Method):
     def solves(self, law: Law) -> bool:
         return law.proportional and not law.dilatant
 
-    @staticmethod
-    def compiled(problem: InterfaceProblem) -> bool:
-        """Whether compiled sweeps can solve the problem."""
-        return NSGS().solves(problem.law) and Sweeps.can(problem)
-
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         (k, dim), V, s = problem.q.shape, problem.V, problem.s
         r, lam = start or at_rest(problem)
@@ -148,8 +143,9 @@ class Local:
             return [way * mu * abs(press) / (1 + mu * sign * self.w[0] * way)]
         (b1, b2), ((s11, s12), (s21, s22)), (w1, w2) = b, self.S, self.w
         low, level = 0.0, 0.0
-        high = hypot(b1, b2) * (1 + mu * hypot(w1, w2)) / (mu * abs(press))
-        if high == inf:  # no friction to speak of
+        bound = mu * abs(press)
+        high = hypot(b1, b2) * (1 + mu * hypot(w1, w2)) / bound if bound > 0 else inf
+        if not high < inf:  # no friction to speak of
             return [0.0, 0.0]
         for _ in range(STEPS):
             det = (s11 + level) * (s22 + level) - s12 * s21

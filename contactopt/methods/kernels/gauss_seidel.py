@@ -6,24 +6,21 @@ The formulas are those of contactopt.methods.nsgs, which does the same in Python
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
-
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.methods.kernels.sparse_blocks import blocks_of
 from contactopt.problem import InterfaceProblem
 
-MODULE = "contactopt.methods.kernels.sweeps"
+try:
+    from contactopt.methods.kernels import sweeps  # type: ignore[attr-defined]
+except ImportError:  # installed without a compiler
+    sweeps = None
 NONE = np.zeros(0, dtype=np.int64)
 
 
 class Sweeps:
-    """Sweeps over the contacts of a problem without plates, whose Q is an array or sparse.
-
-    work  entries of Q that a sweep multiplies
-    """
+    """Sweeps over the contacts of a problem without plates, whose Q is an array or sparse."""
 
     def __init__(self, problem: InterfaceProblem):
         Q, (k, dim) = problem.Q, problem.q.shape
@@ -32,17 +29,15 @@ class Sweeps:
             places = np.searchsorted(rows, np.arange(k + 1)), columns, home
         else:
             blocks, places = np.asarray(Q), (NONE, NONE, NONE)
-        self.work = blocks.size
         both = (problem.law.lowest != 0).astype(np.uint8)
         integers = [np.ascontiguousarray(place, dtype=np.int64) for place in places]
         reals = [np.ascontiguousarray(array, float) for array in (blocks, problem.mu, problem.q)]
         self.fixed = dim, *integers, reals[0], reals[1], both, reals[2]
-        self.sweep = import_module(MODULE).sweep
 
     @staticmethod
     def can(problem: InterfaceProblem) -> bool:
         """Whether there is compiled code, and the problem has no plates."""
-        return not len(problem.s) and find_spec(MODULE) is not None
+        return not len(problem.s) and sweeps is not None
 
     def __call__(self, r: np.ndarray, count: int, share: float = 1.0) -> float:
         """Sweep `count` times, and change r (k, dim) in place.
@@ -51,4 +46,4 @@ class Sweeps:
 
         Returns the change of the last sweep over the forces.
         """
-        return float(self.sweep(*self.fixed, r, count, share))
+        return float(sweeps.sweep(*self.fixed, r, count, share))

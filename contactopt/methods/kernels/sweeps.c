@@ -1,10 +1,10 @@
 /* Sweeps of the nonsmooth Gauss-Seidel method over contacts without plates, compiled.
 
 The formulas and their order are those of contactopt.methods.nsgs, which says them in full, so that
-both give the same forces but for rounding. Here r (k, dim) changes in place. Q is an array, or known
-by its blocks of dim x dim, row after row: those of contact i are blocks[first[i] : first[i + 1]],
-and columns[] says which contacts they belong to. home[i] is the place of block (i, i). An array has
-no columns. */
+both give the same forces but for rounding. Here r (k, dim) changes in place. Q is an array, or
+known by its blocks of dim x dim, row after row. Those of contact i are first[i] <= place <
+first[i + 1]; columns[place] is the contact that the block couples it to, and home[i] the place of
+its own block. An array has no columns. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -62,7 +62,8 @@ static void slip_in_the_plane(const Local *at, double b, double press, double *r
     r[0] = press - at->w[0] * t;
 }
 
-/* The multiplier `level` of the last sweep is tried before Newton's steps, and kept for the next. */
+/* The multiplier `level` of the last sweep is tried before Newton's steps, and kept for the
+next. */
 static void slip_in_space(Local *at, double b1, double b2, double press, double *r)
 {
     double s11 = at->S[0], s12 = at->S[1], s21 = at->S[2], s22 = at->S[3];
@@ -191,7 +192,8 @@ static PyObject *sweep(PyObject *self, PyObject *args)
     if (at != NULL) {
         Py_BEGIN_ALLOW_THREADS;
         for (Py_ssize_t i = 0; i < Q.k; i++) {
-            const double *W = Q.entries + (Q.columns ? Q.home[i] * dim * dim : i * dim * (Q.k * dim + 1));
+            Py_ssize_t own = Q.columns ? Q.home[i] * dim * dim : i * dim * (Q.k * dim + 1);
+            const double *W = Q.entries + own;
             at[i] = local_of(dim, W, Q.columns ? dim : Q.k * dim, ((double *)mu.buf)[i],
                              ((uint8_t *)bilateral.buf)[i]);
         }
