@@ -24,6 +24,11 @@ from experiments.report import template, write
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
 USERS = {
+    "FIRST_SWEEPS MORE_SWEEPS SWEEPS LOCAL BEYOND FEWEST_SWEEPS CIRCLE LESS SWEPT LOOSELY_SWEPT": (
+        "auto",
+        "auto",
+        ("rigid", "packing"),
+    ),
     "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH "
     "ROUND SPARSE_ROUND PATHS TURNING EAGER_ALPHA GENTLE_ALPHA LARGER": (
         "auto",
