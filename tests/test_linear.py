@@ -396,7 +396,7 @@ def test_factors_are_freed_whatever_thread_made_them():
     """
     scene = scenes.flat_punch(3)
     arguments = system(scene, scene.lower, 8)
-    threads, sizes = threading.active_count(), []
+    before, sizes = set(threading.enumerate()), []  # threads of other tests may end meanwhile
     for _ in range(12):
         with ThreadPoolExecutor(1) as pool:
             solver = pool.submit(make_solver, "superlu", arguments).result()
@@ -404,9 +404,9 @@ def test_factors_are_freed_whatever_thread_made_them():
         del solver
         end = time.monotonic() + 30
         # its thread frees them, and ends
-        while threading.active_count() > threads and time.monotonic() < end:
+        while set(threading.enumerate()) - before and time.monotonic() < end:
             time.sleep(0.01)
-        assert threading.active_count() == threads
+        assert not set(threading.enumerate()) - before
         sizes.append(resident())
     assert stored > 40
     assert sizes[-1] - sizes[3] < 2 * stored  # eight would be left
