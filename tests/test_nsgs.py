@@ -156,6 +156,66 @@ def test_compiled_sweeps_are_those_in_python(dim, sparse, relaxation, request):
     assert (fast_points[-1][:, 0] == 0).any() and (fast_points[-1][:, 0] < 0).any()
 
 
+def anderson(problem, memory, count):
+    """Sweeps each of which starts from the combination of the last results whose changes would
+    cancel best, by plain least squares.
+    """
+    sweep, x, results, changes = Sweeps(problem), np.zeros(problem.q.size), [], []
+    for _ in range(count):
+        r = x.reshape(problem.q.shape).copy()
+        sweep(r, 1)
+        results, changes = [*results, r.ravel()][-memory - 1 :], [*changes, r.ravel() - x]
+        changes = changes[-memory - 1 :]
+        x = r.ravel()
+        if len(results) > 1:
+            steps = [np.diff(np.array(parts), axis=0).T for parts in (changes, results)]
+            x = x - steps[1] @ np.linalg.lstsq(steps[0], changes[-1], rcond=None)[0]
+    return results[-1].reshape(problem.q.shape)
+
+
+@COMPILED
+@pytest.mark.parametrize("dim", [2, 3])
+def test_accelerated_sweeps_are_those_of_anderson(dim):
+    rng = np.random.default_rng(dim)
+    k = 8
+    B = rng.normal(size=(k * dim, k * dim))
+    problem = InterfaceProblem(B @ B.T / k + np.eye(k * dim), rng.normal(size=(k, dim)) - 1, 0.4)
+    for memory, count in ((3, 2), (3, 6), (3, 9), (12, 9)):
+        r = np.zeros(problem.q.shape)
+        _, done = Sweeps(problem, memory)(r, count)
+        assert done == count
+        np.testing.assert_allclose(r, anderson(problem, memory, count), rtol=0, atol=1e-9)
+
+
+@COMPILED
+def test_accelerated_sweeps_go_on_where_they_ended():
+    from contactopt.benchmark.families.rigid_blocks import rigid_blocks
+
+    problem = rigid_blocks(shape="stack", size=6)
+    once, parts = np.zeros(problem.q.shape), np.zeros(problem.q.shape)
+    Sweeps(problem, 8)(once, 20)
+    sweeps = Sweeps(problem, 8)
+    for count in (1, 7, 12):
+        sweeps(parts, count)
+    np.testing.assert_array_equal(once, parts)
+
+
+@COMPILED
+@pytest.mark.parametrize("heavier", [1.0, 1000.0])
+def test_acceleration_saves_most_sweeps(heavier):
+    """Of stacks, through which plain sweeps hand a change on by one block each."""
+    from contactopt.benchmark.families.rigid_blocks import rigid_blocks
+
+    problem = rigid_blocks(shape="stack", size=6, points=3, heavier=heavier)
+    r = np.zeros(problem.q.shape)
+    change, done = Sweeps(problem, 16)(r, 400, enough=1e-11)
+    assert change <= 1e-11 and done < 200
+    assert natural_map_residual(problem, r, np.zeros(0)) < 1e-8
+    plain = np.zeros(problem.q.shape)
+    Sweeps(problem)(plain, 10 * done)
+    assert natural_map_residual(problem, plain, np.zeros(0)) > 1e-6
+
+
 @pytest.mark.parametrize("name", ["cube", "chain"])
 def test_the_default_method_needs_no_compiler(name, cube, request):
     from contactopt.benchmark.families.rigid_blocks import rigid_blocks

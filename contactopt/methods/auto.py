@@ -1,8 +1,8 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the
 proximal loop.
 
-0. Where the problem is small, has no plates, and the package was installed with a compiler: as
-   many sweeps of the nonsmooth Gauss-Seidel method as cost less than a few steps of what follows.
+0. Where the problem has no plates, and the package was installed with a compiler: FIRST_SWEEPS
+   sweeps of the nonsmooth Gauss-Seidel method, accelerated after Anderson, if they cost little.
    Where stages 1 and 2 fail, the sweeps go on for ten times as long. Where Q is a convolution,
    as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
@@ -97,8 +97,8 @@ class Auto(Method):
         if sparse and problem.q.size <= constants.SMALL:
             problem = problem.altered(Q=problem.Q.toarray())
         loose = sparse and not (problem.symmetric and definite(problem.Q))
-        swept = _Swept(sweeping, start, constants.LOOSELY_SWEPT if loose else constants.SWEPT)
-        yield from swept.points(constants.FIRST_SWEEPS)
+        swept = _Swept(sweeping, start)
+        yield from swept.points(constants.FIRST_SWEEPS, constants.SWEEPING)
         if loose:
             reached = start or at_rest(problem)
         else:
@@ -123,45 +123,33 @@ class Auto(Method):
 
 
 class _Swept:
-    """Gauss-Seidel sweeps as long as they are cheap; a change of the forces of `good` ends them."""
+    """Accelerated Gauss-Seidel sweeps, as long as they are cheap."""
 
-    def __init__(self, problem: InterfaceProblem, start: Iterate | None, good: float):
-        self.problem, self.good = problem, good
+    def __init__(self, problem: InterfaceProblem, start: Iterate | None):
+        self.problem = problem
         self.r = np.array((start or at_rest(problem))[0], order="C")
-        self.count, self.before, self.change = constants.SWEEPS, np.inf, np.inf
-        self.share = 1.0  # of each local change, which becomes smaller where sweeps go in a circle
 
-    def points(self, budget: float) -> Iterator[Iterate]:
-        """Points that sweeps reach if they converge within a number of multiplications.
-
-        Each round has twice as many sweeps as the last one. Beyond the budget it goes on only if
-        its rate of convergence says that the rest takes at most a few budgets.
+    def points(self, most: int, budget: float) -> Iterator[Iterate]:
+        """Points that `most` sweeps reach within a number of multiplications, if they converge: the
+        second has all digits, and the first most of them where each sweep is dear.
         """
-        problem, spent = self.problem, 0.0
+        problem = self.problem
         explicit = isinstance(problem.Q, np.ndarray) or sp.issparse(problem.Q)
         size = problem.Q.nnz if sp.issparse(problem.Q) else problem.q.size**2
         cost = size + constants.LOCAL * problem.contacts
-        if not explicit or constants.FEWEST_SWEEPS * cost > budget:
+        left = int(min(most, budget / cost))
+        if not explicit or left < constants.FEWEST_SWEEPS:
             return
         if not (NSGS().solves(problem.law) and Sweeps.can(problem)):
             return
-        sweeps = Sweeps(problem)
-        while self.change > constants.SWEPT:
-            if spent + self.count * cost > budget:
-                rest = self.count / 2 * self.rounds()
-                if not spent + rest * cost <= constants.BEYOND * budget:
-                    break
-            self.before, self.change = self.change, sweeps(self.r, self.count, self.share)
-            if self.change > constants.CIRCLE * self.before:
-                self.share *= constants.LESS
-            spent, self.count = spent + self.count * cost, 2 * self.count
-            if self.change <= self.good:
-                yield self.r.copy(), np.zeros(0)
-
-    def rounds(self) -> float:
-        """Rounds as long as the last one that are left, by its rate of convergence."""
-        gain = np.log(self.change / self.before)
-        return max(np.log(self.good / self.change) / gain, 1.0) if gain < 0 else np.inf
+        sweeps = Sweeps(problem, constants.SWEEPS_KEPT)
+        change, done = sweeps(self.r, left, enough=constants.NEARLY_SWEPT)
+        if change > constants.NEARLY_SWEPT:
+            return
+        if done * cost > constants.LOOK:
+            yield self.r.copy(), np.zeros(0)
+        sweeps(self.r, 2 * done, enough=constants.SWEPT)  # the last digits take less than the first
+        yield self.r.copy(), np.zeros(0)
 
 
 class _Robust:
@@ -194,7 +182,7 @@ class _Robust:
                 reached = yield from self.proximal(
                     reached, 1, constants.LEAST_ALPHA, aim=residual / 2
                 )
-        yield from self.swept.points(constants.MORE_SWEEPS)
+        yield from self.swept.points(constants.MORE_SWEEPS, np.inf)
         if self.conic:
             for full in (True, False):
                 path = interior_iterates(problem, self.matrix, Path(full))

@@ -10,15 +10,14 @@ from rounding, from the literature or from a proof stand beside the code that us
 from __future__ import annotations
 
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
-# Multiplications that sweeps may cost (1e6 take about a millisecond), at first, and where Newton's
-# method or the first proximal loop has failed.
-FIRST_SWEEPS, MORE_SWEEPS = 1e6, 1e7
-SWEEPS = 8  # in the first round of them
-LOCAL = 40.0  # multiplications that a local problem is worth
-BEYOND = 3.0  # times that number which sweeps may cost that converge
+# Sweeps at first, and where Newton's method or the first proximal loop has failed; multiplications
+# that they may cost at first (1e6 take about a millisecond).
+FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 5000, 2e7
+LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
-CIRCLE, LESS = 0.7, 0.9  # sweeps whose change falls by less take this share of it from then on
-SWEPT, LOOSELY_SWEPT = 1e-14, 1e-10  # change of a sweep over the forces that ends them
+SWEEPS_KEPT = 16  # last sweeps that the next one starts from
+NEARLY_SWEPT, SWEPT = 1e-7, 1e-13  # change of a sweep over the forces: most digits, all digits
+LOOK = 3e5  # multiplications that the certificate of a point is worth
 NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically
 PATIENCE = 6  # Newton steps without progress
 FEW_ENTRIES = 5000  # unknowns of an operator whose entries are asked for without progress

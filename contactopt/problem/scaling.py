@@ -130,7 +130,10 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, held.astype(float))
     elif sp.issparse(problem.Q):
-        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(held.astype(float)))
+        rows = problem.Q
+        Q = sp.csr_array((rows.data / compliance, rows.indices, rows.indptr), shape=rows.shape)
+        if held.any():
+            Q = sp.csr_array(Q + sp.diags_array(held.astype(float)))
     else:
         Q = problem.Q / compliance
         Q[held, held] = 1.0

@@ -24,7 +24,7 @@ from experiments.report import template, write
 HOME = "contactopt.methods"
 # names of constants -> module that uses them, method that is run, kinds of problems that feel them
 USERS = {
-    "FIRST_SWEEPS MORE_SWEEPS SWEEPS LOCAL BEYOND FEWEST_SWEEPS CIRCLE LESS SWEPT LOOSELY_SWEPT": (
+    "FIRST_SWEEPS MORE_SWEEPS SWEEPING LOCAL FEWEST_SWEEPS SWEEPS_KEPT NEARLY_SWEPT SWEPT LOOK": (
         "auto",
         "auto",
         ("rigid", "packing"),

@@ -2,6 +2,10 @@
 with a compiler.
 
 The formulas are those of contactopt.methods.nsgs, which does the same in Python, much more slowly.
+Sweeps may be accelerated: each then starts from the combination of the last results whose changes
+would cancel best (Anderson's acceleration).
+
+Source: Walker, Ni (2011), Anderson acceleration for fixed-point iterations.
 """
 
 from __future__ import annotations
@@ -9,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.methods.kernels.sparse_blocks import blocks_of
 from contactopt.problem import InterfaceProblem
 
 try:
@@ -20,30 +23,35 @@ NONE = np.zeros(0, dtype=np.int64)
 
 
 class Sweeps:
-    """Sweeps over the contacts of a problem without plates, whose Q is an array or sparse."""
+    """Sweeps over the contacts of a problem without plates, whose Q is an array or sparse.
 
-    def __init__(self, problem: InterfaceProblem):
+    memory  number of last sweeps that the next one starts from, at most 32; 0: not accelerated
+    """
+
+    def __init__(self, problem: InterfaceProblem, memory: int = 0):
         Q, (k, dim) = problem.Q, problem.q.shape
-        if sp.issparse(Q):
-            rows, columns, blocks, home = blocks_of(Q, dim)
-            places = np.searchsorted(rows, np.arange(k + 1)), columns, home
-        else:
-            blocks, places = np.asarray(Q), (NONE, NONE, NONE)
+        rows = (Q.indptr, Q.indices, Q.data) if sp.issparse(Q) else (NONE, NONE, np.asarray(Q))
         both = (problem.law.lowest != 0).astype(np.uint8)
-        integers = [np.ascontiguousarray(place, dtype=np.int64) for place in places]
-        reals = [np.ascontiguousarray(array, float) for array in (blocks, problem.mu, problem.q)]
-        self.fixed = dim, *integers, reals[0], reals[1], both, reals[2]
+        places = [np.ascontiguousarray(place, dtype=np.int64) for place in rows[:2]]
+        reals = [np.ascontiguousarray(array, float) for array in (rows[2], problem.mu)]
+        work = np.zeros(4 + memory**2 + 2 * (memory + 1) * k * dim)
+        q = np.ascontiguousarray(problem.q, float)
+        self.fixed = dim, *places, *reals, both, q, work, memory
 
     @staticmethod
     def can(problem: InterfaceProblem) -> bool:
         """Whether there is compiled code, and the problem has no plates."""
         return not len(problem.s) and sweeps is not None
 
-    def __call__(self, r: np.ndarray, count: int, share: float = 1.0) -> float:
-        """Sweep `count` times, and change r (k, dim) in place.
+    def __call__(
+        self, r: np.ndarray, count: int, share: float = 1.0, enough: float = -1.0
+    ) -> tuple[float, int]:
+        """Sweep at most `count` times, and change r (k, dim) in place.
 
-        share  fraction of each local change that is taken
+        share   fraction of each local change that is taken
+        enough  change of a sweep over the forces that ends them
 
-        Returns the change of the last sweep over the forces.
+        Returns the change of the last sweep over the forces, and the number of sweeps.
         """
-        return float(sweeps.sweep(*self.fixed, r, count, share))
+        change, done = sweeps.sweep(*self.fixed, r, count, share, enough)
+        return float(change), int(done)

@@ -1,10 +1,9 @@
 /* Sweeps of the nonsmooth Gauss-Seidel method over contacts without plates, compiled.
 
 The formulas and their order are those of contactopt.methods.nsgs, which says them in full, so that
-both give the same forces but for rounding. Here r (k, dim) changes in place. Q is an array, or
-known by its blocks of dim x dim, row after row. Those of contact i are first[i] <= place <
-first[i + 1]; columns[place] is the contact that the block couples it to, and home[i] the place of
-its own block. An array has no columns. */
+both give the same forces but for rounding. Here r (k, dim) changes in place. Q is an array, or has
+compressed rows: those entries of row i stand at first[i] <= place < first[i + 1], in the columns
+columns[place]. An array has no columns. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -12,9 +11,13 @@ its own block. An array has no columns. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define ROOT 1e-14
 #define STEPS 60
+#define LONGEST 32   /* sweeps that may be remembered */
+#define GROWN 2.0    /* a change so many times the least so far ends what is remembered */
+#define LITTLE 1e-13 /* of the identity, beside products of unit vectors */
 
 typedef struct {
     double compliance, S[4], w[2], tn[2], mu, level;
@@ -23,26 +26,43 @@ typedef struct {
 
 typedef struct {
     const double *entries;
-    const int64_t *first, *columns, *home;
+    const int64_t *first, *columns;
     Py_ssize_t k;
 } Matrix;
 
+/* The block W (dim, dim) of contact i and itself. */
+static void own_block(int dim, Py_ssize_t i, const Matrix *Q, double *W)
+{
+    Py_ssize_t own = i * dim;
+    for (int a = 0; a < dim; a++) {
+        for (int b = 0; b < dim; b++)
+            W[a * dim + b] = Q->columns ? 0.0 : Q->entries[(own + a) * Q->k * dim + own + b];
+        if (Q->columns == NULL)
+            continue;
+        for (int64_t place = Q->first[own + a]; place < Q->first[own + a + 1]; place++) {
+            int64_t b = Q->columns[place] - own;
+            if (0 <= b && b < dim)
+                W[a * dim + b] += Q->entries[place];
+        }
+    }
+}
+
 /* The least stiffness of a direction, S, keeps the law solvable where W is singular. */
-static Local local_of(int dim, const double *W, Py_ssize_t row, double mu, int bilateral)
+static Local local_of(int dim, const double *W, double mu, int bilateral)
 {
     Local at = {.compliance = W[0], .mu = mu, .level = 0.0, .bilateral = bilateral};
     int t = dim - 1;
     double trace = 0.0;
     for (int i = 0; i < dim; i++)
-        trace += fabs(W[i * row + i]);
+        trace += fabs(W[i * dim + i]);
     double least = 1e-12 * (trace > 0 ? trace : 1.0);
     for (int i = 0; i < t; i++) {
         at.w[i] = at.compliance > 0 ? W[1 + i] / at.compliance : W[1 + i];
-        at.tn[i] = W[(1 + i) * row];
+        at.tn[i] = W[(1 + i) * dim];
     }
     for (int i = 0; i < t; i++)
         for (int j = 0; j < t; j++)
-            at.S[i * t + j] = W[(1 + i) * row + 1 + j] - at.tn[i] * at.w[j];
+            at.S[i * t + j] = W[(1 + i) * dim + 1 + j] - at.tn[i] * at.w[j];
     if (t == 1)
         at.S[0] = fmax(at.S[0], least);
     else
@@ -128,88 +148,205 @@ static void relax(int dim, const Local *at, double share, const double *old, dou
         r[i] *= bound / size;
 }
 
+/* Four sums, which one instruction may add to at once. */
+static double dot(const double *a, const double *b, Py_ssize_t n)
+{
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    Py_ssize_t i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int j = 0; j < 4; j++)
+            sum[j] += a[i + j] * b[i + j];
+    for (; i < n; i++)
+        sum[0] += a[i] * b[i];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
 /* v += what all contacts but i move contact i by. */
 static void add_motion(int dim, Py_ssize_t i, const Matrix *Q, const double *force, double *v)
 {
-    if (Q->columns == NULL) {
-        Py_ssize_t n = Q->k * dim, own = i * dim;
-        for (int a = 0; a < dim; a++) {
+    Py_ssize_t n = Q->k * dim, own = i * dim;
+    for (int a = 0; a < dim; a++) {
+        double sum = 0.0;
+        if (Q->columns == NULL) {
             const double *row = Q->entries + (own + a) * n;
-            double sum = 0.0;
-            for (Py_ssize_t c = 0; c < own; c++)
-                sum += row[c] * force[c];
-            for (Py_ssize_t c = own + dim; c < n; c++)
-                sum += row[c] * force[c];
-            v[a] += sum;
+            sum = dot(row, force, own) + dot(row + own + dim, force + own + dim, n - own - dim);
         }
-        return;
-    }
-    for (int64_t place = Q->first[i]; place < Q->first[i + 1]; place++) {
-        const double *B = Q->entries + place * dim * dim, *other = force + Q->columns[place] * dim;
-        if (place == Q->home[i])
-            continue;
-        for (int a = 0; a < dim; a++)
-            for (int b = 0; b < dim; b++)
-                v[a] += B[a * dim + b] * other[b];
+        else
+            for (int64_t place = Q->first[own + a]; place < Q->first[own + a + 1]; place++) {
+                int64_t column = Q->columns[place];
+                if (column < own || column >= own + dim)
+                    sum += Q->entries[place] * force[column];
+            }
+        v[a] += sum;
     }
 }
 
-/* `count` sweeps; the change of the last one over the forces, infinite if these have vanished. */
-static double sweep_over(int dim, int count, double share, const Matrix *Q, const double *q,
-                         Local *at, double *r)
+/* One sweep, from r to its values after it. */
+static void sweep_once(int dim, double share, const Matrix *Q, const double *q, Local *at, double *r)
 {
-    double moved = 0.0, size = 0.0;
-    for (int pass = 0; pass < count; pass++) {
-        moved = size = 0.0;
-        for (Py_ssize_t i = 0; i < Q->k; i++) {
-            double v[3], old[3], *mine = r + i * dim;
-            for (int a = 0; a < dim; a++)
-                v[a] = q[i * dim + a], old[a] = mine[a];
-            add_motion(dim, i, Q, r, v);
-            solve_local(dim, at + i, v, mine);
-            if (share != 1.0)
-                relax(dim, at + i, share, old, mine);
-            for (int a = 0; a < dim; a++) {
-                moved += (mine[a] - old[a]) * (mine[a] - old[a]);
-                size += mine[a] * mine[a];
-            }
+    for (Py_ssize_t i = 0; i < Q->k; i++) {
+        double v[3], old[3], *mine = r + i * dim;
+        for (int a = 0; a < dim; a++)
+            v[a] = q[i * dim + a], old[a] = mine[a];
+        add_motion(dim, i, Q, r, v);
+        solve_local(dim, at + i, v, mine);
+        if (share != 1.0)
+            relax(dim, at + i, share, old, mine);
+    }
+}
+
+/* What Anderson's acceleration remembers, all of it in one array of the caller. Of the last sweeps:
+the differences `moves` of their results and `changes` of their changes f, both over the norm of the
+latter, and the products of these with each other. */
+typedef struct {
+    double *used, *next, *started, *best, *products, *moves, *changes, *result, *change;
+    int most;
+    Py_ssize_t n;
+} Memory;
+
+static Memory memory_in(double *work, int most, Py_ssize_t n)
+{
+    double *products = work + 4, *moves = products + most * most, *changes = moves + most * n;
+    double *result = changes + most * n;
+    return (Memory){work, work + 1, work + 2, work + 3, products, moves, changes,
+                    result, result + n, most, n};
+}
+
+static Py_ssize_t work_of(int most, Py_ssize_t n)
+{
+    return most ? 4 + most * most + 2 * (most + 1) * n : 0;
+}
+
+static void forget(Memory *past)
+{
+    *past->used = *past->next = *past->started = 0.0;
+}
+
+/* Keep the result r of a sweep and its change f. */
+static void remember(Memory *past, const double *r, const double *f)
+{
+    Py_ssize_t n = past->n, slot = (Py_ssize_t)*past->next;
+    double norm = sqrt(dot(f, f, n));
+    if (norm > GROWN * *past->best)
+        forget(past);
+    if (*past->started == 0.0 || norm < *past->best)
+        *past->best = norm;
+    if (*past->started != 0.0) {
+        double *move = past->moves + slot * n, *change = past->changes + slot * n, size = 0.0;
+        for (Py_ssize_t i = 0; i < n; i++) {
+            move[i] = r[i] - past->result[i];
+            change[i] = f[i] - past->change[i];
+            size += change[i] * change[i];
+        }
+        if (size > 0) {
+            size = sqrt(size);
+            for (Py_ssize_t i = 0; i < n; i++)
+                move[i] /= size, change[i] /= size;
+            if (*past->used < past->most)
+                *past->used += 1;
+            *past->next = (slot + 1) % past->most;
+            for (int j = 0; j < (int)*past->used; j++)
+                past->products[slot * past->most + j] = past->products[j * past->most + slot] =
+                    dot(change, past->changes + j * n, n);
         }
     }
-    return size == 0 && moved == 0 ? 0.0 : sqrt(moved / size);
+    memcpy(past->result, r, n * sizeof(double));
+    memcpy(past->change, f, n * sizeof(double));
+    *past->started = 1.0;
+}
+
+/* r, from the combination of the last results whose changes would add up to the least. Their least
+squares are solved by Cholesky factors of the products, with a little of the identity. */
+static void extrapolate(Memory *past, double *r)
+{
+    int used = (int)*past->used, most = past->most;
+    double L[LONGEST][LONGEST], c[LONGEST];
+    for (int i = 0; i < used; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = past->products[i * most + j] + (i == j ? LITTLE : 0.0);
+            for (int l = 0; l < j; l++)
+                sum -= L[i][l] * L[j][l];
+            if (i == j && !(sum > 0)) {
+                forget(past);
+                return;
+            }
+            L[i][j] = i == j ? sqrt(sum) : sum / L[j][j];
+        }
+        c[i] = dot(past->changes + i * past->n, past->change, past->n);
+        for (int l = 0; l < i; l++)
+            c[i] -= L[i][l] * c[l];
+        c[i] /= L[i][i];
+    }
+    for (int i = used - 1; i >= 0; i--) {
+        for (int l = i + 1; l < used; l++)
+            c[i] -= L[l][i] * c[l];
+        c[i] /= L[i][i];
+    }
+    for (int j = 0; j < used; j++)
+        for (Py_ssize_t i = 0; i < past->n; i++)
+            r[i] -= c[j] * past->moves[j * past->n + i];
+}
+
+/* At most `count` sweeps, fewer where one changes the forces by no more than `enough` of them; r is
+the result of the last one. Returns its change over the forces, infinite if these have vanished, and
+sets `count` to the number of sweeps. */
+static double sweep_over(int dim, Py_ssize_t *count, double share, double enough, const Matrix *Q,
+                         const double *q, Local *at, double *r, double *f, Memory *past)
+{
+    double change = INFINITY;
+    Py_ssize_t n = Q->k * dim, done = 0;
+    while (done < *count && change > enough) {
+        if (past->most)
+            extrapolate(past, r);
+        memcpy(f, r, n * sizeof(double));
+        sweep_once(dim, share, Q, q, at, r);
+        for (Py_ssize_t i = 0; i < n; i++)
+            f[i] = r[i] - f[i];
+        double moved = dot(f, f, n), size = dot(r, r, n);
+        change = size == 0 && moved == 0 ? 0.0 : sqrt(moved / size);
+        if (past->most)
+            remember(past, r, f);
+        done++;
+    }
+    *count = done;
+    return change;
 }
 
 static PyObject *sweep(PyObject *self, PyObject *args)
 {
-    int dim, count;
-    double share, change = 0.0;
-    Py_buffer first, columns, home, blocks, mu, bilateral, q, r;
-    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*y*y*w*id", &dim, &first, &columns, &home, &blocks, &mu,
-                          &bilateral, &q, &r, &count, &share))
+    int dim, most;
+    Py_ssize_t count;
+    double share, enough, change = 0.0;
+    Py_buffer first, columns, entries, mu, bilateral, q, work, r;
+    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*y*w*iw*ndd", &dim, &first, &columns, &entries, &mu,
+                          &bilateral, &q, &work, &most, &r, &count, &share, &enough))
         return NULL;
-    Matrix Q = {blocks.buf, first.buf, columns.len ? columns.buf : NULL, home.buf,
+    Matrix Q = {entries.buf, first.buf, columns.len ? columns.buf : NULL,
                 mu.len / (Py_ssize_t)sizeof(double)};
-    Local *at = malloc((Q.k ? Q.k : 1) * sizeof(Local));
+    int fits = most <= LONGEST && work.len >= work_of(most, Q.k * dim) * (Py_ssize_t)sizeof(double);
+    Local *at = fits ? malloc((Q.k ? Q.k : 1) * (sizeof(Local) + dim * sizeof(double))) : NULL;
     if (at != NULL) {
         Py_BEGIN_ALLOW_THREADS;
+        Memory past = memory_in(work.buf, most, Q.k * dim);
         for (Py_ssize_t i = 0; i < Q.k; i++) {
-            Py_ssize_t own = Q.columns ? Q.home[i] * dim * dim : i * dim * (Q.k * dim + 1);
-            const double *W = Q.entries + own;
-            at[i] = local_of(dim, W, Q.columns ? dim : Q.k * dim, ((double *)mu.buf)[i],
-                             ((uint8_t *)bilateral.buf)[i]);
+            double W[9] = {0.0};
+            own_block(dim, i, &Q, W);
+            at[i] = local_of(dim, W, ((double *)mu.buf)[i], ((uint8_t *)bilateral.buf)[i]);
         }
-        change = sweep_over(dim, count, share, &Q, q.buf, at, r.buf);
+        change = sweep_over(dim, &count, share, enough, &Q, q.buf, at, r.buf,
+                            (double *)(at + Q.k), &past);
         Py_END_ALLOW_THREADS;
         free(at);
     }
-    PyBuffer_Release(&first), PyBuffer_Release(&columns), PyBuffer_Release(&home);
-    PyBuffer_Release(&blocks), PyBuffer_Release(&mu), PyBuffer_Release(&bilateral);
-    PyBuffer_Release(&q), PyBuffer_Release(&r);
-    return at == NULL ? PyErr_NoMemory() : PyFloat_FromDouble(change);
+    PyBuffer_Release(&first), PyBuffer_Release(&columns), PyBuffer_Release(&entries);
+    PyBuffer_Release(&mu), PyBuffer_Release(&bilateral);
+    PyBuffer_Release(&q), PyBuffer_Release(&work), PyBuffer_Release(&r);
+    return at == NULL ? PyErr_NoMemory() : Py_BuildValue("dn", change, count);
 }
 
 static PyMethodDef functions[] = {
     {"sweep", sweep, METH_VARARGS,
-     "Sweep `count` times over all contacts; the last sweep's change over the forces."},
+     "Sweep at most `count` times over all contacts; the last change over the forces, the sweeps."},
     {NULL, NULL, 0, NULL}};
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "sweeps", NULL, -1, functions};
