@@ -6,7 +6,7 @@ import pytest
 import scipy.sparse as sp
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
+from contactopt import InputError, InterfaceProblem, Status, fclib, reduce, scenes, solve
 from contactopt.methods.kernels import gauss_seidel
 from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.nsgs import NSGS, Local
@@ -198,6 +198,24 @@ def test_accelerated_sweeps_go_on_where_they_ended():
     for count in (1, 7, 12):
         sweeps(parts, count)
     np.testing.assert_array_equal(once, parts)
+
+
+@COMPILED
+def test_sweeps_over_a_sparse_array_without_entries():
+    problem = InterfaceProblem(sp.csr_array((40, 40)), -np.ones((20, 2)), 0.5)
+    r = np.ones(problem.q.shape)
+    assert Sweeps(problem, 4)(r, 5) == (0.0, 5)
+    assert not r.any()
+
+
+@COMPILED
+def test_long_sweeps_keep_the_time_limit():
+    from contactopt.benchmark.families.packings import packing
+
+    problem = packing(3, 400, mu=0.6, points=2)  # 500 sweeps take four seconds
+    found = solve(problem, time_limit=0.1)
+    assert found.status is Status.TIME_LIMIT and found.iterations == 0
+    assert sum(found.seconds.values()) < 2.5
 
 
 @COMPILED

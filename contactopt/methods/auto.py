@@ -40,6 +40,7 @@ import scipy.sparse as sp
 
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
+from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
@@ -96,9 +97,10 @@ class Auto(Method):
         sparse, sweeping = sp.issparse(problem.Q), problem
         if sparse and problem.q.size <= constants.SMALL:
             problem = problem.altered(Q=problem.Q.toarray())
-        loose = sparse and not (problem.symmetric and definite(problem.Q))
         swept = _Swept(sweeping, start)
         yield from swept.points(constants.FIRST_SWEEPS, constants.SWEEPING)
+        # asked only now, because a factorisation tells
+        loose = sparse and not (problem.symmetric and definite(problem.Q))
         if loose:
             reached = start or at_rest(problem)
         else:
@@ -142,14 +144,26 @@ class _Swept:
             return
         if not (NSGS().solves(problem.law) and Sweeps.can(problem)):
             return
-        sweeps = Sweeps(problem, constants.SWEEPS_KEPT)
-        change, done = sweeps(self.r, left, enough=constants.NEARLY_SWEPT)
-        if change > constants.NEARLY_SWEPT:
+        sweeps, often = Sweeps(problem, constants.SWEEPS_KEPT), int(constants.MOMENT // cost) + 1
+        done = self.reached(constants.NEARLY_SWEPT, sweeps, left, often)
+        if not done:
             return
         if done * cost > constants.LOOK:
             yield self.r.copy(), np.zeros(0)
-        sweeps(self.r, 2 * done, enough=constants.SWEPT)  # the last digits take less than the first
+        # the last digits take less than the first
+        self.reached(constants.SWEPT, sweeps, 2 * done, often)
         yield self.r.copy(), np.zeros(0)
+
+    def reached(self, enough: float, sweeps: Sweeps, most: int, often: int) -> int:
+        """The number of sweeps, at most so many, until a change is small enough; 0 if none is. The
+        clock is looked at every so often.
+        """
+        for done in range(0, most, often):
+            check_time()
+            change, more = sweeps(self.r, min(often, most - done), enough=enough)
+            if change <= enough:
+                return done + more
+        return 0
 
 
 class _Robust:

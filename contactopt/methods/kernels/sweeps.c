@@ -3,7 +3,7 @@
 The formulas and their order are those of contactopt.methods.nsgs, which says them in full, so that
 both give the same forces but for rounding. Here r (k, dim) changes in place. Q is an array, or has
 compressed rows: those entries of row i stand at first[i] <= place < first[i + 1], in the columns
-columns[place]. An array has no columns. */
+columns[place]. An array has no such places. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -36,8 +36,8 @@ static void own_block(int dim, Py_ssize_t i, const Matrix *Q, double *W)
     Py_ssize_t own = i * dim;
     for (int a = 0; a < dim; a++) {
         for (int b = 0; b < dim; b++)
-            W[a * dim + b] = Q->columns ? 0.0 : Q->entries[(own + a) * Q->k * dim + own + b];
-        if (Q->columns == NULL)
+            W[a * dim + b] = Q->first ? 0.0 : Q->entries[(own + a) * Q->k * dim + own + b];
+        if (Q->first == NULL)
             continue;
         for (int64_t place = Q->first[own + a]; place < Q->first[own + a + 1]; place++) {
             int64_t b = Q->columns[place] - own;
@@ -167,7 +167,7 @@ static void add_motion(int dim, Py_ssize_t i, const Matrix *Q, const double *for
     Py_ssize_t n = Q->k * dim, own = i * dim;
     for (int a = 0; a < dim; a++) {
         double sum = 0.0;
-        if (Q->columns == NULL) {
+        if (Q->first == NULL) {
             const double *row = Q->entries + (own + a) * n;
             sum = dot(row, force, own) + dot(row + own + dim, force + own + dim, n - own - dim);
         }
@@ -321,7 +321,7 @@ static PyObject *sweep(PyObject *self, PyObject *args)
     if (!PyArg_ParseTuple(args, "iy*y*y*y*y*y*w*iw*ndd", &dim, &first, &columns, &entries, &mu,
                           &bilateral, &q, &work, &most, &r, &count, &share, &enough))
         return NULL;
-    Matrix Q = {entries.buf, first.buf, columns.len ? columns.buf : NULL,
+    Matrix Q = {entries.buf, first.len ? first.buf : NULL, columns.buf,
                 mu.len / (Py_ssize_t)sizeof(double)};
     int fits = most <= LONGEST && work.len >= work_of(most, Q.k * dim) * (Py_ssize_t)sizeof(double);
     Local *at = fits ? malloc((Q.k ? Q.k : 1) * (sizeof(Local) + dim * sizeof(double))) : NULL;
