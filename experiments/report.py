@@ -14,7 +14,6 @@ from typing import Any
 from contactopt.figures.style import save_figure
 
 REPORTS = Path(__file__).parents[1] / "reports"
-PAPER = ("punch-2d", "punch-3d", "sphere")  # the paper's scenes
 PACKAGES = ("numpy", "scipy", "scikit-fem", "qpsolvers", "cvxpy", "clarabel", "proxsuite", "osqp")
 
 

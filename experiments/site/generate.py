@@ -41,10 +41,8 @@ ACCURACY = (
     "accuracy",
     "elements",
     "patch_test",
-    "facing_surfaces",
     "load_cycle",
     "calculix",
-    "second_reading",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 

@@ -52,12 +52,6 @@ def test_a_report_names_the_command_that_writes_it(tmp_path, monkeypatch, capsys
     assert command(tmp_path / "hertz" / "report.md") == ["questions.hertz"]
 
 
-def test_sentences_that_no_assertion_beside_them_holds_are_true():
-    from experiments.questions.second_reading import CLAIMS
-
-    assert [sentence for sentence, _, number, holds in CLAIMS if not holds(number())] == []
-
-
 def test_a_question_runs_as_a_command_and_measures_what_it_says():
     """The patch test is the quickest: its report is exact to rounding.
 

@@ -15,7 +15,7 @@ CONDITIONS = ("penetration", "tension", "complementarity", "friction bound")
 CONDITIONS += ("slip", "direction", "balance")
 
 
-def violations(Q, q, mu, V, s, r, lam) -> dict[str, float]:  # type: ignore[no-untyped-def]
+def violations(Q, q, mu, V, s, r, lam):
     """The largest violation of each condition, forces over a force scale and displacements over a
     displacement scale.
 

@@ -1,11 +1,15 @@
-"""Are the sentences of the pages true? Here are those that no assertion beside them holds."""
+"""Sentences of the pages that no assertion beside them holds are true.
 
-from __future__ import annotations
+All pages written by hand, the tutorials, the chapters and the gallery were read once more, sentence
+by sentence: formulas were derived again, sentences with *always*, *never*, *only* or *if* were held
+against cases at the border of their hypothesis, and numbers were compared with their reports. Most
+claims have an assertion beside them, or a room of the museum. These have neither.
+"""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from skfem import MeshTri
 
 from contactopt import (
@@ -22,13 +26,12 @@ from contactopt import (
     solve,
 )
 from contactopt.methods.preconditioners.circulant import seminorm
-from experiments.report import template, write
 
 SHIFT = np.array([[0.001, -0.0003]])  # from a solution to a start near it [N]
 NODE = np.linalg.inv([[4.0, -1.5], [-1.5, 1.0]])  # compliance of the node of tutorial 4 [mm/N]
 
 
-def load_is_s() -> float:
+def load_is_s():
     """A block under 1 MPa on 4 mm: s in the vertical motion [N]."""
     ticks = np.linspace(-2, 2, 9), np.linspace(0, 2, 5)
     sides = {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 2}
@@ -38,7 +41,7 @@ def load_is_s() -> float:
     return float(reduce(Scene("block", block, Rigid("floor"), mu=0.5)).s.min())
 
 
-def returns(method: str) -> int:
+def returns(method):
     """How many of the three solutions of a node a method finds from a start near them."""
     problem = InterfaceProblem(NODE, [NODE @ [-1.0, 0.8]], 1.0)
     found = all_solutions(problem)
@@ -47,25 +50,25 @@ def returns(method: str) -> int:
     return sum(np.allclose(a, one.reactions, atol=1e-6) for a, one in zip(again, found))
 
 
-def sticking_traction() -> float:
+def sticking_traction():
     """Traction in the middle of a sheared cylinder at T = 0 after T = .8 mu P, over that before."""
     first = lambda share: 1 - np.sqrt(1 - share)  # noqa: E731
     return float((first(0.8) - 2 * first(0.4)) / first(0.8))
 
 
-def least_factor(coupling: float) -> float:
+def least_factor(coupling):
     """Least factor of Acary and Cadoux's iteration over all mu below the threshold, Q_nn = Q_tt."""
     mu = np.linspace(0, 1 / coupling, 2001)[:-1]
     return float(np.min(mu * (mu - coupling) / (1 - 2 * mu * coupling + mu**2)))
 
 
-def slipping(mu: float) -> int:
+def slipping(mu):
     """Nodes of the block of chapter 5 that slip."""
     r = solve(reduce(scenes.flat_punch(2, mu=mu, elements=24)), tol=1e-12).reactions
     return int(np.sum((np.abs(r[:, 1]) > mu * r[:, 0] * (1 - 1e-9)) & (r[:, 0] > 0)))
 
 
-def share_at_the_end() -> float:
+def share_at_the_end():
     """Force of the floor on the last node of a string that touches, over the weight of a node."""
     count, weight = 39, 8.0 / 40
     A = 40 * (2 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1))
@@ -77,7 +80,7 @@ def share_at_the_end() -> float:
     return float(r[r > 1e-9 * weight][0] / weight)
 
 
-def relaxed_force() -> float:
+def relaxed_force():
     """Distance of associated friction from Coulomb's forces where a plate slips as a whole."""
     plate = InterfaceProblem(np.eye(2), [[0.0, 3.0]], 0.5, [[1.0], [0.0]], [-1.0])
     program = models.associated(plate)
@@ -85,13 +88,13 @@ def relaxed_force() -> float:
     return float(np.abs(program.variables["r"].value - solve(plate).reactions.ravel()).max())
 
 
-def nitsche(gamma: float) -> float:
+def nitsche(gamma):
     """Largest second derivative of Nitsche's function of chapter 1, k = 2 N/mm."""
     return max(2.0 * (1 - 2.0 / gamma), gamma - 2.0)
 
 
 # sentence, where it stands, number, what makes it true
-CLAIMS: tuple[tuple[str, str, Callable[[], float], Callable[[float], bool]], ...] = (
+CLAIMS = (
     ("s is the load", "chapters 4 and 6, course", load_is_s, lambda x: abs(x + 4) < 1e-9),
     ("Newton's method finds the solution near which it starts", "tutorial 4",
      lambda: returns("newton"), lambda x: x == 3),
@@ -114,16 +117,7 @@ CLAIMS: tuple[tuple[str, str, Callable[[], float], Callable[[float], bool]], ...
      relaxed_force, lambda x: x < 1e-6),
 )  # fmt: skip
 
-TEXT = template(__file__)
 
-
-def main() -> None:
-    rows = []
-    for sentence, place, number, holds in CLAIMS:
-        value = number()
-        rows.append({"sentence": sentence, "where": place, "number": value, "true": holds(value)})
-    write("second_reading", "Second reading", TEXT, {"rows": rows}, {})
-
-
-if __name__ == "__main__":
-    main()
+@pytest.mark.parametrize("sentence,where,number,holds", CLAIMS, ids=[claim[0] for claim in CLAIMS])
+def test_the_sentence_is_true(sentence, where, number, holds):
+    assert holds(number()), f"{where}: {sentence}"
