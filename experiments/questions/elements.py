@@ -7,7 +7,6 @@ meshes of a series are refinements of each other in every place, also far away.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,10 +17,10 @@ import numpy as np
 from contactopt import Material, Part, Rigid, Scene, Support, reduce_bodies, solve
 from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.bodies import elements
-from contactopt.figures.style import BLUE, GREY, ORANGE, label_ends, paper_axes
+from contactopt.figures.style import BLUE, ORANGE, label_ends, paper_axes
 from contactopt.meshes.structured import patch, rename, simplices, tensor_mesh
 from contactopt.readings.edges import contact_edge
-from experiments.report import figures_alone, save_figures, stored, template, write
+from experiments.report import measure, template
 
 RUBBER, RADIUS = Material(5.0, 0.3), 50.0  # MPa; of the sphere, in contact half-widths
 SIZE = {2: 30_000.0, 3: 20.0}  # of the body, in contact half-widths
@@ -29,7 +28,6 @@ SIZE = {2: 30_000.0, 3: 20.0}  # of the body, in contact half-widths
 FAR = {2: 3.0, 3: 4.0}
 # (dim, degree) -> n
 ACROSS = {(2, 1): (4, 8, 16, 32), (2, 2): (2, 4, 8, 16), (3, 1): (2, 4, 6, 8), (3, 2): (1, 2, 3)}
-QUICK = {(2, 1): (4, 8), (2, 2): (2, 4), (3, 1): (2, 3), (3, 2): (1, 2)}
 KINDS = {
     ("Q", 1): (BLUE, "s--"),
     ("Q", 2): (BLUE, "s-"),
@@ -37,7 +35,6 @@ KINDS = {
     ("P", 2): (ORANGE, "^-"),
 }
 CASES = {"sphere": 2, "sphere 3D": 3}
-TARGETS = (1e-2, 1e-3)
 INNER = 0.6  # the ripple is looked for within this share of the contact radius
 
 
@@ -78,7 +75,7 @@ def scene(dim: int, n: int, degree: int, shape: str) -> Scene:
     return Scene("elements", rigid, body, 0.0, kind, **settings)
 
 
-def measure(case: str, n: int, degree: int, shape: str) -> dict[str, object]:
+def solved(case: str, n: int, degree: int, shape: str) -> dict[str, object]:
     """One solve, repeated where it is short: relative errors, unknowns, median processor time."""
     dim = 3 if case.endswith("3D") else 2
     made = scene(dim, n, degree, shape)
@@ -115,11 +112,14 @@ def measure(case: str, n: int, degree: int, shape: str) -> dict[str, object]:
     }
 
 
-def runs(across: dict[tuple[int, int], tuple[int, ...]]) -> Iterator[dict[str, object]]:
-    for shape, degree in KINDS:
-        for case, dim in CASES.items():
-            for n in across[dim, degree]:
-                yield measure(case, n, degree, shape)
+def runs() -> list[dict[str, object]]:
+    """All elements on all meshes."""
+    return [
+        solved(case, n, degree, shape)
+        for shape, degree in KINDS
+        for case, dim in CASES.items()
+        for n in ACROSS[dim, degree]
+    ]
 
 
 @contextmanager
@@ -135,140 +135,37 @@ def contacts_at_all_nodes() -> Iterator[None]:
         elements.FACES.update(kept)
 
 
-def ripples(
-    rows: list[dict], across: dict[tuple[int, int], tuple[int, ...]]
-) -> list[dict[str, object]]:
-    """Scatter of the pressure on the finest meshes, also with contacts at all nodes."""
-    out = []
-    for case, dim in CASES.items():
-        finest = {kind: series(rows, case, *kind)[-1] for kind in KINDS}
-        with contacts_at_all_nodes():
-            other = measure(case, across[dim, 2][-1], 2, "P")
-        chosen = [(f"{s}{d}", row) for (s, d), row in finest.items()] + [
-            ("P2, contacts at all nodes", other)
-        ]
-        for name, row in chosen:
-            out.append(
-                {"case": case, "element": name}
-                | {k: row[k] for k in ("n", "contacts", "ripple", "traction")}
-            )
-    return out
+def other_contacts() -> list[dict[str, object]]:
+    """Quadratic simplices with contacts at all nodes, on the finest meshes."""
+    with contacts_at_all_nodes():
+        return [solved(case, ACROSS[dim, 2][-1], 2, "P") for case, dim in CASES.items()]
 
 
-def series(rows: list[dict], case: str, shape: str, degree: int) -> list[dict]:
-    return [r for r in rows if (r["case"], r["shape"], r["degree"]) == (case, shape, degree)]
+QUANTITIES = {
+    ("sphere", "peak"): "peak pressure",
+    ("sphere", "radius"): "contact radius",
+    ("sphere", "approach"): "approach",
+    ("sphere 3D", "peak"): "peak pressure",
+}
 
 
-QUANTITIES = (
-    ("sphere", "peak"),
-    ("sphere", "radius"),
-    ("sphere", "approach"),
-    ("sphere 3D", "peak"),
-)
-
-
-def reach(rows: list[dict], quantity: str, cost: str, target: float) -> float | None:
-    """Cost from which on the error stays below the target, by a power law; None: never."""
-    error = np.abs([r[quantity] for r in rows])
-    # a finer mesh may be worse: a lucky zero does not count
-    error = np.maximum.accumulate(error[::-1])[::-1]
-    below = np.flatnonzero(error <= target)
-    if len(below) == 0:
-        return None
-    j, price = below[0], [float(r[cost]) for r in rows]
-    if j == 0:
-        return price[0]
-    share = np.log(error[j - 1] / target) / np.log(error[j - 1] / error[j])
-    return float(price[j - 1] * (price[j] / price[j - 1]) ** share)
-
-
-def cheapest(rows: list[dict]) -> list[dict[str, object]]:
-    out = []
-    for case, quantity in QUANTITIES:
-        for target in TARGETS:
-            row: dict[str, object] = {
-                "case": case,
-                "quantity": quantity,
-                "error": f"{100 * target:g} %",
-            }
-            costs = {}
-            for kind in KINDS:
-                own = series(rows, case, *kind)
-                pair = [reach(own, quantity, cost, target) for cost in ("unknowns", "seconds")]
-                costs["".join(map(str, kind))] = pair
-                row["".join(map(str, kind))] = (
-                    "-" if pair[0] is None else f"{pair[0]:.0f} ({pair[1]:.2g} s)"
-                )
-            reached = {k: p for k, p in costs.items() if p[0] is not None}
-            for i, name in enumerate(("fewest unknowns", "least time")):
-                row[name] = min(reached, key=lambda k: reached[k][i]) if reached else "none"
-            out.append(row)
-    return out
-
-
-def draw(rows: list[dict]) -> Any:
-    titles = {"peak": "peak pressure", "radius": "contact radius", "approach": "approach"}
+def draw(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
     figure, axes = paper_axes(2, rows=2, wide=True)
-    for ax, (case, quantity) in zip(axes, QUANTITIES):
+    for ax, ((case, quantity), title) in zip(axes, QUANTITIES.items()):
         solid = ("hexahedra", "tetrahedra") if CASES[case] == 3 else ("quads", "triangles")
         ends = []
         for (shape, degree), (colour, style) in KINDS.items():
-            own = series(rows, case, shape, degree)
+            wanted = case, shape, degree
+            own = [r for r in tables["runs"] if (r["case"], r["shape"], r["degree"]) == wanted]
             x, y = [r["unknowns"] for r in own], np.abs([r[quantity] for r in own])
             ax.loglog(x, y, style, color=colour, mfc="white" if degree == 1 else colour)
             ends.append((x[-1], y[-1], f"{solid[shape == 'P']}, degree {degree}", colour))
-        for target in TARGETS:
-            ax.axhline(target, color=GREY, lw=0.6, ls=":")
         ax.set(xlabel="displacement unknowns [-]", xlim=(7e2, 7e4))
-        ax.set_ylabel(f"error of the {titles[quantity]} [-],\n{case}")
+        ax.set_ylabel(f"error of the {title} [-],\n{case}")
         label_ends(ax, ends)
-    return figure
-
-
-def findings(rows: list[dict], ripple: list[dict]) -> str:
-    """What the tables say, in words."""
-    table = cheapest(rows)
-    said = []
-    for target in (f"{100 * t:g} %" for t in TARGETS):
-        for what, word in (
-            ("fewest unknowns", "fewest unknowns are needed"),
-            ("least time", "least time is needed"),
-        ):
-            won = [
-                f"{r['case']}, {r['quantity']}: {r[what]}"
-                for r in table
-                if r["error"] == target and r[what] != "none"
-            ]
-            said.append(
-                f"- For an error of {target} the {word} by these elements: {'; '.join(won)}."
-            )
-    for case in CASES:
-        own = {r["element"]: float(r["ripple"]) for r in ripple if r["case"] == case}
-        other = own.pop("P2, contacts at all nodes")
-        worst = max(own, key=lambda k: own[k])
-        said.append(
-            f"- {case}: on the finest meshes the pressure within {INNER:g} a scatters by"
-            f" {100 * own['P2']:.2g} % of the peak on quadratic simplices, and by"
-            f" {100 * own['Q2']:.2g} % on quadratic bricks. It scatters most on {worst}, by"
-            f" {100 * own[worst]:.2g} %. If all nodes of quadratic simplices were contacts, it"
-            f" would be {100 * other:.2g} %."
-        )
-    return "\n".join(said)
-
-
-TEXT = template(__file__)
-
-
-def main(across: dict[tuple[int, int], tuple[int, ...]] = ACROSS) -> None:
-    rows = list(runs(across))
-    ripple = ripples(rows, across)
-    tables = {"runs": rows, "cheapest": cheapest(rows), "ripple": ripple}
-    text = TEXT.replace("{findings}", findings(rows, ripple))
-    write("elements", "Shape and degree of the elements", text, tables, {"errors": draw(rows)})
+    return {"errors": figure}
 
 
 if __name__ == "__main__":
-    if figures_alone():
-        save_figures("elements", {"errors": draw(stored("elements", "runs"))})
-    else:
-        main(QUICK if "--quick" in sys.argv else ACROSS)
+    tables = {"runs": runs, "all_nodes": other_contacts}
+    measure("elements", "Shape and degree of the elements", template(__file__), tables, draw)

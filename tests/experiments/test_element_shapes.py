@@ -11,11 +11,11 @@ def test_hertz_does_not_ripple_in_3d(cut):
     """Within .6 a the error of the pressure is nearly the same at all nodes; contacts at all nodes
     of P2 would fail.
     """
-    row = experiment.measure("sphere 3D", 2, 2, "P" if cut else "Q")
+    row = experiment.solved("sphere 3D", 2, 2, "P" if cut else "Q")
     assert row["ripple"] < 0.03
     if cut:
         with experiment.contacts_at_all_nodes():
-            assert experiment.measure("sphere 3D", 2, 2, "P")["ripple"] > 2 * row["ripple"]
+            assert experiment.solved("sphere 3D", 2, 2, "P")["ripple"] > 2 * row["ripple"]
         assert len(FACES["RefTet"][3]) == 1
 
 
@@ -26,8 +26,8 @@ def test_quadratic_elements_need_fewer_unknowns_for_hertz(cut):
     """
     shape = "P" if cut else "Q"
     linear, quadratic = (
-        experiment.measure("sphere", 8, 1, shape),
-        experiment.measure("sphere", 4, 2, shape),
+        experiment.solved("sphere", 8, 1, shape),
+        experiment.solved("sphere", 4, 2, shape),
     )
     assert quadratic["unknowns"] < 1.3 * linear["unknowns"]
     for quantity in ("peak", "approach"):
