@@ -117,23 +117,6 @@ def alone(act: Callable[[Any], Any], task: Any) -> Any:
         return pool.apply(act, (task,))
 
 
-def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Slopes of log(quantity) over log(unknowns), by least squares over the three largest sizes."""
-    out = []
-    for name in ELEMENTS:
-        own = [row for row in rows if row["solver"] == name][-3:]
-        slope = {
-            key: float(
-                np.polyfit(np.log([r["unknowns"] for r in own]), np.log([r[key] for r in own]), 1)[
-                    0
-                ]
-            )
-            for key in ("setup [s]", "solve [s]", "memory [MiB]")
-        }
-        out.append({"solver": name, **slope})
-    return out
-
-
 def draw(rows: list[dict[str, Any]]) -> Any:
     figure, axes = paper_axes(2, rows=2, wide=True)
     keys = ("setup [s]", "solve [s]", "memory [MiB]", "iterations")
@@ -179,5 +162,5 @@ if __name__ == "__main__":
         f"{name} {version(name)}" for name in ("pyamg", "pypardiso") if find_spec(name)
     )
     text = TEXT.format(versions=versions, large="Made with `--large`.\n\n" if large else "")
-    tables = {"rows": rows, "growth": exponents(rows)}
-    write("body_solvers", "Solvers of a body's linear system", text, tables, {"cost": draw(rows)})
+    title = "Solvers of a body's linear system"
+    write("body_solvers", title, text, {"rows": rows}, {"cost": draw(rows)})

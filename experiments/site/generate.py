@@ -40,7 +40,6 @@ TUTORIALS = (
 ACCURACY = (
     "accuracy",
     "elements",
-    "patch_test",
     "load_cycle",
     "calculix",
 )
