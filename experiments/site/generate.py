@@ -27,7 +27,6 @@ ROOT = Path(__file__).parents[2]
 # the order in which a course would take them
 TUTORIALS = (
     "one_contact_node",
-    "from_bodies_to_compliance",
     "why_the_preconditioner_works",
     "no_one_or_three_solutions",
     "a_load_cycle",
@@ -125,8 +124,8 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
     title, rest = text.split("\n", 2)[1], text.split("\n", 2)[2]
     offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
     yield Path(folder, f"{name}.py"), f"{head}# %% [markdown]\n{title}\n{offer}\n{rest}"
-    # notebooks of one folder refer to each other
-    local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)
+    # notebooks, which are all in one folder, refer to each other
+    local = re.sub(r"\]\((?:\.\./\w+/)?(\w+)\.py\)", r"](\1.ipynb)", text)
     book = jupytext.reads(local, "py:percent")
     book.metadata["kernelspec"] = KERNEL
     for cell in book.cells:  # what the page folds, JupyterLab folds too
