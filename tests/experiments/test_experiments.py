@@ -110,11 +110,11 @@ def test_every_command_that_is_named_somewhere_exists():
 
 
 def test_what_is_called_exact_of_nearly_symmetric_scenes_is_right():
-    from experiments.questions.simplest import nearly
+    from experiments.questions import simplest
 
-    checks = [nearly.checked(number) for number in (4, 13, 17, 31, 1, 3)]
+    checks = [simplest.checked(number) for number in (5, 9, 10, 0, 1, 2)]
     assert [bool(row["exact"]) for row in checks] == [row["spoilt by"] == 0 for row in checks]
     assert (
         max(row["certificate"] for row in checks) < 1e-8
-        and sum(row["wrong"] for row in nearly.table(checks)) == 0
+        and sum(row["wrong"] for row in simplest.table(checks)) == 0
     )
