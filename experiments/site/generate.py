@@ -38,8 +38,6 @@ TUTORIALS = (
 # reports about accuracy; all others are about performance
 ACCURACY = (
     "accuracy",
-    "elements",
-    "load_cycle",
     "calculix",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
