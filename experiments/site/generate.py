@@ -18,7 +18,7 @@ import jupytext
 import lectures
 import museum
 import reference
-from reference import contents, index
+from reference import contents, opening
 
 import contactopt.cli
 from experiments.course.nbgrader import solved
@@ -62,10 +62,8 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     ordered = [name for name in TUTORIALS if name in found] + sorted(set(found) - set(TUTORIALS))
     for name in ordered:
         yield from notebook("tutorials", name, found[name].read_text())
-    yield (
-        Path("tutorials.md"),
-        index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered]),
-    )
+    listed = contents([f"tutorials/{name}" for name in ordered])
+    yield Path("tutorials.md"), opening("tutorials") + listed
     yield from notebook("gallery", "gallery", gallery())
     yield from course(site)
     yield Path("museum.md"), museum.index(site)
@@ -82,7 +80,9 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
         ("accuracy", about),
         ("performance", [name for name in reports if name not in about]),
     ):
-        text = (site / f"{page}.md").read_text() + "".join(opening(reports[name]) for name in names)
+        text = (site / f"{page}.md").read_text() + "".join(
+            beginning(reports[name]) for name in names
+        )
         yield (
             Path(f"{page}.md"),
             text + contents([f"reports/{name}" for name in names], hidden=True),
@@ -92,13 +92,6 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
         for picture in PICTURE.findall(path.read_text()):
             if (path.parent / picture[1]).exists():  # Sphinx names what is missing
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
-
-
-TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page
-of this site. It takes ten to fifteen minutes to read. The code checks every claim by an assertion.
-The exercises have hidden solutions: click on *Solution* to open one. [The course](course.md) says
-how to open a notebook.
-"""
 
 
 # A page that is not executed does not know its language otherwise.
@@ -200,7 +193,7 @@ def report(path: Path) -> str:
     return re.sub(r"(?<!!)\[([^\]]*)\]\((?!http|#)([^)]*)\)", place, text)
 
 
-def opening(path: Path) -> str:
+def beginning(path: Path) -> str:
     """Title, first paragraph and first picture of a report, and the way to all of it."""
     text = PICTURE.sub(r"![\1](reports/\2)", report(path))
     title, *paragraphs = text.strip().split("\n\n")
