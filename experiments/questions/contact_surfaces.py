@@ -19,7 +19,7 @@ from contactopt.meshes.polar import ring
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
 from experiments.questions.preconditioners import condition, iterations
-from experiments.report import template, write
+from experiments.report import measure, template
 
 POISSON, HEIGHT, GROWTH = 0.3, 1.0, 1.3
 RATIOS = (1e-4, 1.0, 1e4)  # stiffness of the lower body over that of the upper one
@@ -164,18 +164,18 @@ def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, objec
     return row
 
 
-def main() -> None:
-    rows = []
+def rows() -> list[dict[str, object]]:
+    made = []
     for i, name in enumerate(SURFACES):
         for size in SIZES:
-            rows += [judge(name, *pair) for pair in pairs(stubs(name, size), RATIOS)]
+            made += [judge(name, *pair) for pair in pairs(stubs(name, size), RATIOS)]
         if i < 2:
-            rows += [judge(name, *pair) for pair in pairs(stubs(name, FINER), RATIOS[1:2])]
+            made += [judge(name, *pair) for pair in pairs(stubs(name, FINER), RATIOS[1:2])]
     for n in AROUND:
-        rows += [judge("closed ring, in the plane", *pair) for pair in pairs(around(n), RATIOS)]
-    title = "`laplacian` on contact surfaces of any shape"
-    write("contact_surfaces", title, template(__file__), {"rows": rows}, {})
+        made += [judge("closed ring, in the plane", *pair) for pair in pairs(around(n), RATIOS)]
+    return made
 
 
 if __name__ == "__main__":
-    main()
+    title = "`laplacian` on contact surfaces of any shape"
+    measure("contact_surfaces", title, template(__file__), {"rows": rows})
