@@ -82,7 +82,8 @@ def half_space(points: int) -> Row:
 
     seconds, (problem, solution) = timed(act)
     pressure = solution.reactions[:, 0] / problem.areas
-    values = round_contact(np.linalg.norm(problem.chart.places, axis=0), pressure, scene)
+    distance = np.linalg.norm(problem.chart.places, axis=0)
+    values = round_contact(distance, pressure, scene.reference.half_width)
     values["approach"] = -float(solution.multipliers[0])
     return {"unknowns": 3 * problem.contacts, "seconds": seconds} | relative(values, scene)
 
@@ -96,14 +97,17 @@ def box_scene(points: int) -> Scene:
     return replace(scene, lower=replace(scene.lower, points=(ticks, ticks)))
 
 
-def round_contact(distance: np.ndarray, pressure: np.ndarray, scene: Scene) -> dict[str, float]:
-    """Peak and radius of p^2 = p0^2 (1 - r^2 / a^2), fitted inside and near the edge."""
-    a = scene.reference.half_width
-    inner = distance < 0.5 * a
-    edge = (distance > 0.5 * a) & (distance < 0.95 * a)
-    top = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, 2)[-1]
-    slope, at = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
-    return {"peak": float(np.sqrt(top)), "width": float(np.sqrt(-at / slope))}
+def round_contact(distance: np.ndarray, pressure: np.ndarray, a: float) -> dict[str, float]:
+    """Peak and half-width of p^2 = p0^2 (1 - r^2 / a^2), fitted inside and near the edge of about
+    a; nan where too few points say it.
+    """
+    inner, edge = distance < 0.5 * a, (distance > 0.5 * a) & (distance < 0.95 * a)
+    degree, width = min(2, int(inner.sum()) - 1), np.nan
+    top = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, degree)[-1]
+    if edge.sum() > 2:
+        slope, at = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
+        width = float(np.sqrt(-at / slope))
+    return {"peak": float(np.sqrt(top)), "width": width}
 
 
 def in_tamaas(python: str, gap: np.ndarray, **given: Any) -> tuple[float, np.ndarray]:
@@ -128,7 +132,7 @@ def tamaas(points: int, python: str) -> Row:
     seconds, pressure = in_tamaas(
         python, gap, length=side, pressure=force / side**2, modulus=modulus
     )
-    values = round_contact(np.linalg.norm(places, axis=0), pressure, scene)
+    values = round_contact(np.linalg.norm(places, axis=0), pressure, exact.half_width)
     return {"unknowns": points**2, "seconds": seconds} | relative(values, scene)
 
 

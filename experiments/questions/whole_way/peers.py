@@ -32,6 +32,7 @@ from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL, indenter
 from experiments.questions.calculix import run
+from experiments.questions.whole_way.ours import round_contact
 
 FLATTER = 100.0
 REFINED = 4  # faces of the indenter over one of the block
@@ -154,17 +155,9 @@ def hertz_line(code: str, elements: int, size: float) -> dict[str, Any]:
     load = 2 * float(np.trapezoid(pressure, model.x))
     exact = model.scene.reference
     share = np.sqrt(load / abs(float(model.scene.upper.force["y"])))
-    a = exact.half_width * share
-    inner, edge = model.x < 0.5 * a, (model.x > 0.5 * a) & (model.x < 0.95 * a)
-    degree = min(2, int(inner.sum()) - 1)
-    peak = np.sqrt(np.polyfit(model.x[inner] ** 2, pressure[inner] ** 2, degree)[-1])
-    width = np.nan
-    if edge.sum() > 2:
-        slope, at = np.polyfit(model.x[edge] ** 2, pressure[edge] ** 2, 1)
-        width = float(np.sqrt(-at / slope) / a - 1)
-    return {
-        "unknowns": model.block.p.size,
-        "seconds": seconds,
-        "peak": float(peak / (exact.peak * share) - 1),
-        "width": width,
+    found = round_contact(model.x, pressure, exact.half_width * share)
+    errors = {
+        "peak": found["peak"] / (exact.peak * share) - 1,
+        "width": found["width"] / (exact.half_width * share) - 1,
     }
+    return {"unknowns": model.block.p.size, "seconds": seconds} | errors
