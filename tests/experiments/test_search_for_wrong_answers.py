@@ -19,9 +19,9 @@ def ball(**force: float) -> HalfSpace:
     return HalfSpace("ball", MATERIAL, (ROW,), height=lambda x: -(x[0] ** 2) / 40, **force)
 
 
-def test_fourteen_scenes_of_seven_kinds_have_one_answer_by_two_ways():
-    found = [verdict(seed) for seed in range(14)]
-    assert len({one.family for one in found}) == 7
+def test_twelve_scenes_of_six_kinds_have_one_answer_by_two_ways():
+    found = [verdict(seed) for seed in range(12)]
+    assert len({one.family for one in found}) == 6
     assert not [(one.seed, one.wrong) for one in found if one.wrong]
 
 

@@ -18,11 +18,10 @@ from experiments.questions.search_for_wrong_answers import blocks, round_bodies
 from experiments.questions.search_for_wrong_answers.compare import Case, Verdict, judge
 from experiments.report import template, write
 
-SCENES = 200  # ten of them suffice for a first look
+SCENES = 180  # ten of them suffice for a first look
 FAMILIES: tuple[Callable[[np.random.Generator], Case], ...] = (
     blocks.stack,
     lambda rng: blocks.stack(rng, 3),
-    blocks.wedge,
     blocks.bridge,
     lambda rng: round_bodies.pressed(rng, "roller"),
     lambda rng: round_bodies.pressed(rng, "ball"),
@@ -45,24 +44,21 @@ def report(found: list[tuple[Verdict, float]]) -> None:
             {
                 "family": family,
                 "scenes": len(mine),
-                "disagreements": sum(verdict.disagrees for verdict, _ in mine),
+                "disagreements": sum(bool(verdict.wrong) for verdict, _ in mine),
                 "width": float(np.median(widths)),
                 "seconds a scene": float(np.mean([seconds for _, seconds in mine])),
             }
         )
     wrong = [verdict for verdict, _ in found if verdict.wrong]
     listed = "\n".join(
-        f"- seed {each.seed}, {each.family}{', several solutions' * each.several}: "
-        + "; ".join(each.wrong[:3])
-        for each in wrong
+        f"- seed {each.seed}, {each.family}: " + "; ".join(each.wrong[:3]) for each in wrong
     )
     seeds = [verdict.seed for verdict, _ in found]
     text = template(__file__).format(
         first=min(seeds),
         last=max(seeds),
         scenes=len(found),
-        count=sum(each.disagrees for each in wrong),
-        many=sum(each.several for each in wrong),
+        count=len(wrong),
         model=round_bodies.MODEL,
         listed=listed,
     )
@@ -77,12 +73,11 @@ def main(scenes: int = SCENES, first: int = 0) -> int:
         begin = time.process_time()
         one = verdict(seed)
         found.append((one, time.process_time() - begin))
-        word = "disagrees" if one.disagrees else "several solutions"
-        outcome = "\n   ".join([word, *one.wrong]) if one.wrong else "agrees"
+        outcome = "\n   ".join(["disagrees", *one.wrong]) if one.wrong else "agrees"
         print(f"{seed} {one.family}, {found[-1][1]:.1f} s: {outcome}", flush=True)
     if scenes >= SCENES:
         report(found)
-    return int(any(one.disagrees for one, _ in found))
+    return int(any(one.wrong for one, _ in found))
 
 
 if __name__ == "__main__":

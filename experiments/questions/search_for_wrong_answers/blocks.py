@@ -191,26 +191,6 @@ def stack(rng: Random, layers: int = 2) -> Case:
     return scene.case(f"{layers} blocks", rng, loose=1.001 * gaps)
 
 
-def wedge(rng: Random) -> Case:
-    """A wedge pressed obliquely between two flanks."""
-    angle, high = np.radians(rng.uniform(15, 60)), float(rng.uniform(0.6, 1.2))
-    half = float(rng.uniform(0.15, 0.5))
-    mu, side = float(rng.uniform(0, 0.6)), high * np.tan(angle)
-    out = half + side + 1.0
-    load = Plate("top", {"x": float(rng.uniform(-3e-3, 3e-3)), "y": -0.01})
-    corners = [(-half, 0.0), (half, 0.0), (half + side, high), (-half - side, high)]
-    left = [(-out, 0.0), (-half, 0.0), (-half - side, high), (-out, high)]
-    right = [(half, 0.0), (out, 0.0), (out, high), (half + side, high)]
-    both = {"on left": ("left", 0.0, high), "on right": ("right", 0.0, high)}
-    blocks = (
-        Block("wedge", corners, material(rng), both, (), (load,)),
-        Block("left", left, material(rng), {"flank": ("right", 0.0, high)}, (Support("left"),)),
-        Block("right", right, material(rng), {"flank": ("left", 0.0, high)}, (Support("right"),)),
-    )
-    pairs = (("wedge:on left", "left:flank"), ("wedge:on right", "right:flank"))
-    return Blocks(blocks, pairs, mu, high / 8).case("wedge", rng)
-
-
 def bridge(rng: Random) -> Case:
     """A beam on two piers: one surface in two pairs."""
     mu, long = friction(rng), float(rng.uniform(3, 5))

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from contactopt import InputError, Scene, reduce_bodies, run, solve
+from contactopt import Scene, run
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.quantities import elastic_energy
 
 LEVELS = (0, 1, 2)  # each about twice as fine as the one before
 FINER = (1, 2, 3)  # where the others disagree
-OTHERS = ("nsgs", "lemke", "tresca")  # methods that may find other solutions than the default one
-SLOW = 20.0  # [s] for each of them
-APART = 1e-4  # of the forces, from which on two solutions are two
 TOL = 1e-9  # of the certificate
 ROUNDING = 1e-5  # of a quantity's scale: what the certificate leaves open
 SLOWEST = 0.9  # largest ratio of the differences between levels that an estimate believes
@@ -144,21 +140,14 @@ def error(row: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came out of one seed.
-
-    Disagreements in words, the width of the estimates in shares of the scales, and whether the
-    problem has several solutions.
+    """What came out of one seed: disagreements in words, and the width of the estimates in shares
+    of the scales.
     """
 
     seed: int
     family: str
     wrong: tuple[str, ...]
     widths: tuple[float, ...] = ()
-    several: bool = False
-
-    @property
-    def disagrees(self) -> bool:
-        return bool(self.wrong) and not self.several
 
 
 def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[float]]:
@@ -182,20 +171,18 @@ def judge(seed: int, case: Case) -> Verdict:
 
     Where they disagree, both are compared once more on finer meshes, and then with quadratic
     displacements: linear elements lock in thin lips, and three of their levels may then differ less
-    than the last one errs. Where friction leaves several solutions, two ways may find two of them,
-    and both are right.
+    than the last one errs.
     """
     try:
         wrong, widths = compared(case, read_levels(case, LEVELS))
         for degree in (None, 2):
             if wrong:
                 wrong, widths = compared(case, read_levels(case, FINER, degree))
-        many = bool(wrong) and has_several(case.ways[1])
     except Exception as failure:  # whatever stops a scene is what is looked for
         where = traceback.extract_tb(failure.__traceback__)[-1]
         told = f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}"
         return Verdict(seed, case.family, (told,))
-    return Verdict(seed, case.family, tuple(wrong), tuple(widths), many)
+    return Verdict(seed, case.family, tuple(wrong), tuple(widths))
 
 
 def read_levels(
@@ -212,14 +199,3 @@ def read_levels(
         [one(number, level) for level in levels] if callable(way) else [way]
         for number, way in enumerate(case.ways)
     ]
-
-
-def has_several(way: Way) -> bool:
-    """Whether methods find two certified solutions of the coarsest problem that differ in force."""
-    problem = reduce_bodies(way(LEVELS[0])).problem
-    found = [solve(problem, tol=TOL).reactions]
-    for method in OTHERS:
-        with suppress(InputError):  # of a method that does not take this problem
-            other = solve(problem, method, tol=TOL, time_limit=SLOW)
-            found += [other.reactions] if other.status.label == "solved" else []
-    return any(np.linalg.norm(r - found[0]) > APART * np.linalg.norm(found[0]) for r in found)
