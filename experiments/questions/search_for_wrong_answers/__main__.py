@@ -18,7 +18,7 @@ from experiments.questions.search_for_wrong_answers import blocks, round_bodies
 from experiments.questions.search_for_wrong_answers.compare import Case, Verdict, judge
 from experiments.report import template, write
 
-SCENES = 180  # ten of them suffice for a first look
+SCENES = 120  # ten of them suffice for a first look
 FAMILIES: tuple[Callable[[np.random.Generator], Case], ...] = (
     blocks.stack,
     lambda rng: blocks.stack(rng, 3),

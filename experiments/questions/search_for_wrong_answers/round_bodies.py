@@ -19,7 +19,7 @@ from experiments.questions.search_for_wrong_answers.blocks import Random, materi
 from experiments.questions.search_for_wrong_answers.compare import Case, Values
 from experiments.questions.search_for_wrong_answers.outlines import outlined
 
-MODEL = 5e-3  # by which Hertz and Persson differ from bodies of such sizes
+MODEL = 0.3  # of a / R: by which round bodies differ from the half-spaces of Hertz and Persson
 REACH = 1.3  # half-widths of contact up to which triangles are small
 CLEARANCE = 1e-3  # of the pin, over its radius
 
@@ -52,7 +52,7 @@ def pressed(rng: Random, shape: str) -> Case:
     R, pin, ball = float(10 ** rng.uniform(-1, 2)), shape == "pin", shape == "ball"
     hard = material(rng)
     soft = hard if pin else material(rng)
-    modulus, a = contact_modulus(hard, soft), R * float(rng.uniform(0.02, 0.05))
+    modulus, a = contact_modulus(hard, soft), R * float(rng.uniform(0.01, 0.03))
     if pin:
         force = modulus * CLEARANCE * R * float(10 ** rng.uniform(-1, 0.3))
         exact = pin_in_hole(force, R, CLEARANCE * R, modulus)
@@ -100,7 +100,7 @@ def pressed(rng: Random, shape: str) -> Case:
     swapped, first = bool(rng.random() < 0.5), known(exact, ball)
     if pin:  # of which the places of contact lie on an arc
         del first["reach 0"]
-    return Case(shape, (first, build), swapped=swapped, model=MODEL)
+    return Case(shape, (first, build), swapped=swapped, model=MODEL * (0.02 if pin else a / R))
 
 
 def circle(radius: float, y: float) -> Any:
