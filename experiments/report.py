@@ -14,7 +14,7 @@ from typing import Any
 from contactopt.figures.style import save_figure
 
 REPORTS = Path(__file__).parents[1] / "reports"
-PAPER = ("punch-2d", "punch-3d", "sphere")  # the paper's scenes
+Tables = dict[str, list[dict[str, Any]]]
 PACKAGES = ("numpy", "scipy", "scikit-fem", "qpsolvers", "cvxpy", "clarabel", "proxsuite", "osqp")
 
 
@@ -53,7 +53,7 @@ def write(
     name: str,
     title: str,
     text: str,
-    tables: dict[str, list[dict[str, Any]]],
+    tables: Tables,
     figures: dict[str, Any],
 ) -> None:
     """Write reports/name/ with its report.
@@ -112,13 +112,14 @@ def stored(name: str, table: str) -> list[dict[str, Any]]:
 def measure(
     name: str,
     title: str,
-    text: str,
+    text: str | Callable[[Tables], str],
     tables: dict[str, Callable[[], list[dict[str, Any]]]],
-    figures: Callable[[dict[str, list[dict[str, Any]]]], dict[str, Any]] = lambda tables: {},
+    figures: Callable[[Tables], dict[str, Any]] = lambda tables: {},
 ) -> None:
     """Measure the tables that the command names, or all, and write the report once all are there.
 
-    Each table can be measured by itself; the report takes the others as they were written last.
+    Each table can be measured by itself; the report takes the others as they were written last. The
+    text may be made of the tables, where it holds numbers of them.
     """
     if figures_alone():
         return save_figures(name, figures({table: stored(name, table) for table in tables}))
@@ -130,7 +131,7 @@ def measure(
         save(name, table, tables[table]())
     known = {table: stored(name, table) for table in tables}
     if all(known.values()):
-        write(name, title, text, known, figures(known))
+        write(name, title, text(known) if callable(text) else text, known, figures(known))
 
 
 def merged(

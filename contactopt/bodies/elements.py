@@ -5,7 +5,7 @@ and next to an axis of symmetry, their integrals vanish at the vertices. So the 
 covered by linear cells with hat functions phi_i and nodal areas A_i = int phi_i > 0, and their
 nodes are the contacts: the halves and quarters of the faces of quadrilaterals and hexahedra, the
 whole faces of triangles and tetrahedra, whose forces at vertices and edges would alternate
-(experiments.questions.elements). A contact force r_i acts on the nodes j by r_i W_ij, the
+(tests/experiments/test_element_shapes.py). A contact force r_i acts on the nodes j by r_i W_ij, the
 displacement at contact i is W_ij u_j,
 
     W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i

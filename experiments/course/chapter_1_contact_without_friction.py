@@ -18,10 +18,10 @@ import numpy as np
 from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
+from experiments.course.sketch import arrow
 
 # %% [markdown]
 # ## The mechanical system
@@ -57,30 +57,11 @@ def sketch(ax, u, r):
     )
     ax.plot([-0.6, 0.6], [3, 3], "k", lw=3)
     ax.plot(0, u, "o", ms=10, color="C0")
-    for x, y0, y1, name, color in (
-        (0.5, u + 0.6, u, "$F$", "C3"),
-        (-0.5, u - 0.6, u, f"$r$ = {r:.1f} N", "C1"),
-    ):
-        ax.annotate(
-            "",
-            (x, y1),
-            (x, y0),
-            arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
-        )
-        ax.text(x + 0.08, (y0 + y1) / 2, name, color=color)
-    ax.annotate(
-        "", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"}
-    )
-    ax.text(
-        1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center"
-    )
-    ax.annotate(
-        "",
-        (-1.3, 0.8),
-        (-1.3, 0),
-        arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8},
-    )
-    ax.text(-1.22, 0.6, "$n$")
+    arrow(ax, (0.5, u + 0.6), (0.5, u), "$F$", "C3")
+    arrow(ax, (-0.5, u - 0.6), (-0.5, u), f"$r$ = {r:.1f} N", "C1")
+    place = (1.15, max(u / 2, 0.2))
+    arrow(ax, (1.1, 0), (1.1, u), f"$u$ = {u:.1f} mm", "C2", place, "<->")
+    arrow(ax, (-1.3, 0), (-1.3, 0.8), "$n$")
     ax.set(xlim=(-1.5, 2.2), ylim=(-0.7, 3.2), aspect="equal")
     ax.axis("off")
 

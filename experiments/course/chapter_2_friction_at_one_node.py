@@ -22,10 +22,10 @@ from contactopt import (
 )
 from contactopt.teaching import Slider
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
+from experiments.course.sketch import arrow
 
 # %% [markdown]
 # ## The mechanical system
@@ -84,18 +84,7 @@ for tail, head, name, color in (
     ((-1.4, 0), (-1.4, 0.7), "$n$", "k"),
     ((-1.4, 0), (-0.75, 0), "$t$", "k"),
 ):
-    ax.annotate(
-        "",
-        head,
-        tail,
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
-    )
-    ax.text(
-        (tail[0] + head[0]) / 2 + 0.06,
-        (tail[1] + head[1]) / 2 + 0.08,
-        name,
-        color=color,
-    )
+    arrow(ax, tail, head, name, color)
 ax.set(xlim=(-1.7, 2), ylim=(-0.6, 2.4), aspect="equal")
 _ = ax.axis("off")
 
@@ -217,12 +206,7 @@ def in_the_cone(coefficient):
         alpha=0.15,
         lw=0,
     )
-    ax.annotate(
-        "",
-        (force[1], force[0]),
-        (0, 0),
-        arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2},
-    )
+    arrow(ax, (0, 0), (force[1], force[0]), color="C1")
     ax.plot(*(-K @ q)[::-1], "kx")
     ax.text(-2.0, 0.7, "sticking force", ha="center")
     ax.set(

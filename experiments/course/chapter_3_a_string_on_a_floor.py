@@ -18,10 +18,10 @@ import numpy as np
 from contactopt import InterfaceProblem, solve
 from contactopt.teaching import Slider
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
+from experiments.course.sketch import arrow
 
 # %% [markdown]
 # ## The mechanical system
@@ -50,24 +50,10 @@ for tail, head, name, color, at in (
     ((0, 0.25), (-0.09, 0.25), "$T$", "k", (-0.07, 0.265)),
     ((L, 0.25), (L + 0.09, 0.25), "$T$", "k", (L + 0.05, 0.265)),
 ):
-    ax.annotate(
-        "",
-        head,
-        tail,
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
-    )
-    ax.text(*at, name, color=color)
-for x_at, top, name, at in (
-    (0.0, 0.25, "$d$", (0.012, 0.03)),
-    (15 / 16, sag[15], "$u_i$", (0.95, 0.05)),
-):
-    ax.annotate(
-        "",
-        (x_at, top),
-        (x_at, 0),
-        arrowprops={"arrowstyle": "<->", "color": "C2"},
-    )
-    ax.text(*at, name, color="C2")
+    arrow(ax, tail, head, name, color, at)
+arrow(ax, (0.0, 0.0), (0.0, 0.25), "$d$", "C2", (0.012, 0.03), "<->")
+at_node = (15 / 16, 0.0), (15 / 16, sag[15])
+arrow(ax, *at_node, "$u_i$", "C2", (0.95, 0.05), "<->")
 ax.set(xlim=(-0.15, L + 0.15), ylim=(-0.075, 0.3))
 _ = ax.axis("off")
 

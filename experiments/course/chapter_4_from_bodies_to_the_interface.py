@@ -43,10 +43,10 @@ from contactopt import (
 from contactopt.problem.laws.tresca import Tresca
 from contactopt.teaching import Slider
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
+from experiments.course.sketch import arrow
 
 # %% [markdown]
 # ## The mechanical system
@@ -85,28 +85,10 @@ ax.triplot(*mesh.p, mesh.t.T, color="C0", lw=0.4)
 line = np.linspace(-2.4, 2.4, 101)
 ax.fill_between(line, -0.5, -(line**2) / 20, color="0.8", lw=0)
 ax.plot([-2.2, 2.2], [2.03, 2.03], "k", lw=4)
-ax.annotate(
-    "",
-    (0, 2.1),
-    (0, 2.6),
-    arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2},
-)
-ax.text(0.1, 2.35, "0.1 mm", color="C3")
-for head, name in (((2.7, 0.6), "$n$"), ((3.3, 0.0), "$t$")):
-    ax.annotate(
-        "",
-        head,
-        (2.7, 0.0),
-        arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8},
-    )
-    ax.text(head[0] + 0.06, head[1] + 0.04, name)
-ax.annotate(
-    "",
-    (0, -0.02),
-    (0, -0.46),
-    arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2},
-)
-ax.text(0.08, -0.42, "$r_n$", color="C1")
+arrow(ax, (0, 2.6), (0, 2.1), "0.1 mm", "C3")
+arrow(ax, (2.7, 0.0), (2.7, 0.6), "$n$")
+arrow(ax, (2.7, 0.0), (3.3, 0.0), "$t$")
+arrow(ax, (0, -0.46), (0, -0.02), "$r_n$", "C1", (0.08, -0.42))
 _ = ax.set(
     xlabel="x [mm]",
     ylabel="y [mm]",

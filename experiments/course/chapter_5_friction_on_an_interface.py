@@ -26,10 +26,10 @@ from contactopt import (
 )
 from contactopt.teaching import Slider
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
+from experiments.course.sketch import arrow
 
 # %% [markdown]
 # ## The mechanical system
@@ -62,18 +62,9 @@ ax.fill([0, 20, 20, 0], [0, 0, 40, 40], color="C0", alpha=0.25, lw=0)
 ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
 ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
 ax.plot([0, 20], [40.6, 40.6], "k", lw=4)
-ax.annotate(
-    "",
-    (10, 42),
-    (10, 54),
-    arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2},
-)
-ax.text(11.5, 47, "100 N", color="C3")
-for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
-    ax.annotate(
-        "", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"}
-    )
-    ax.text(head[0] + 1, head[1] + 1, name)
+arrow(ax, (10, 54), (10, 42), "100 N", "C3", (11.5, 47))
+arrow(ax, (28, 6), (40, 6), "$t$", at=(41, 7))
+arrow(ax, (28, 6), (28, 18), "$n$", at=(29, 19))
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
 ax.text(3, 20, "block")
 ax.text(3, -14, "foundation")

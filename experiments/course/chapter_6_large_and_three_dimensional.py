@@ -29,9 +29,8 @@ from contactopt import (
 from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.teaching import Slider
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
 
 # %% [markdown]

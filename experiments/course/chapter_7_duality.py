@@ -26,10 +26,10 @@ from contactopt import (
 )
 from contactopt.meshes.structured import tensor_mesh
 
-sys.path.extend(
-    [".", "../.."]
-)  # the folder of the repository, where the exercises are
+# the folder of the repository, where the exercises are
+sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
+from experiments.course.sketch import arrow
 
 # %% [markdown]
 # ## The mechanical system
@@ -114,18 +114,7 @@ for tail, head, name, color in (
     ((u[1] - 0.12, 0.1), (u[1] - 0.12 + 0.7 * r[1], 0.1), "$r_t$", "C1"),
     ((0, 0.6), (u[1], 0.6), "$u_t$", "C0"),
 ):
-    ax.annotate(
-        "",
-        head,
-        tail,
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8},
-    )
-    ax.text(
-        (tail[0] + head[0]) / 2 + 0.08,
-        (tail[1] + head[1]) / 2 + 0.1,
-        name,
-        color=color,
-    )
+    arrow(ax, tail, head, name, color)
 ax.set(xlim=(-0.6, u[1] + 0.9), ylim=(-0.85, 0.95), aspect="equal")
 _ = ax.axis("off")
 

@@ -77,75 +77,56 @@ a = np.sqrt(2 * 0.07 / f)
 GRADED = {
     "3.1": (
         lambda: a,
-        (
-            (a / np.sqrt(2), "The parabola is f x^2 / (2 T): a factor of two is missing."),
-            (0.5 - a, "This is the distance from the middle. Give that from the end."),
-            (2 * a, "This is the length that hangs at both ends together."),
-            (0.07 / f, "A height over a weight per length is no length: look at the units."),
-        ),
+        (a / np.sqrt(2), "The parabola is f x^2 / (2 T): a factor of two is missing."),
+        (0.5 - a, "This is the distance from the middle. Give that from the end."),
+        (2 * a, "This is the length that hangs at both ends together."),
+        (0.07 / f, "A height over a weight per length is no length: look at the units."),
     ),
     "3.2": (
         lambda: 1 - 2 * a,
-        (
-            (1 - a, "The string hangs at both ends."),
-            (2 * a, "This is the part that the ends carry."),
-            (f * (1 - 2 * a), "This is a force [N]. Divide it by the whole weight f L."),
-        ),
+        (1 - a, "The string hangs at both ends."),
+        (2 * a, "This is the part that the ends carry."),
+        (f * (1 - 2 * a), "This is a force [N]. Divide it by the whole weight f L."),
     ),
     "3.3": (
         lambda: Forces(hill_problem()),
-        (
-            (lambda: touching(*string(40)[1:]), "penetration"),
-            (lambda: np.linalg.solve(on_the_hill()[0], -on_the_hill()[1]), "tension"),
-            (lambda: 40 * touching(*on_the_hill()), "pressure"),
-            (lambda: -touching(*on_the_hill()), "sign"),
-        ),
+        (lambda: touching(*string(40)[1:]), "penetration"),
+        (lambda: np.linalg.solve(on_the_hill()[0], -on_the_hill()[1]), "tension"),
+        (lambda: 40 * touching(*on_the_hill()), "pressure"),
+        (lambda: -touching(*on_the_hill()), "sign"),
     ),
     "3.4": (
         two_starts,
+        (lambda: two_starts()[::-1], "order"),
+        (lambda: two_starts()[:1] * 2, "The start was not used: change the first `touches`."),
         (
-            (lambda: two_starts()[::-1], "order"),
-            (lambda: two_starts()[:1] * 2, "The start was not used: change the first `touches`."),
-            (
-                lambda: (two_starts()[0], 1),
-                "One step only solves; another one sees that the set stays.",
-            ),
+            lambda: (two_starts()[0], 1),
+            "One step only solves; another one sees that the set stays.",
         ),
     ),
     "3.5": (
         sweep,
-        (
-            (
-                lambda: sweep(True),
-                "This is Jacobi: each node must see the new force of the last one.",
-            ),
-            (lambda: sweep(sweeps=200), "This is the solution. One sweep does not reach it."),
-            (lambda: sweep(sweeps=2), "This is the result of two sweeps."),
-            (lambda: sweep()[::-1], "order"),
-        ),
+        (lambda: sweep(True), "This is Jacobi: each node must see the new force of the last one."),
+        (lambda: sweep(sweeps=200), "This is the solution. One sweep does not reach it."),
+        (lambda: sweep(sweeps=2), "This is the result of two sweeps."),
+        (lambda: sweep()[::-1], "order"),
     ),
     "3.6": (
         lambda: f / 0.0003,
-        (
-            (f / 0.0003 / 40, "This is the spring of one node [N/mm]. Asked is that per length."),
-            (0.0003 / f, "You divided the wrong way: a stiffness is a load over a depth."),
-            (0.25 / 0.0003, "The height d does not push; the weight f does."),
-        ),
+        (f / 0.0003 / 40, "This is the spring of one node [N/mm]. Asked is that per length."),
+        (0.0003 / f, "You divided the wrong way: a stiffness is a load over a depth."),
+        (0.25 / 0.0003, "The height d does not push; the weight f does."),
     ),
     "3.7": (
         lambda: float(carried().sum()),
-        (
-            (f, "This is the whole weight. The ends carry a part of it."),
-            (lambda: carried().mean(), "The floor rises below all nodes: add their forces."),
-            (lambda: carried().max(), "This is the force on one node. Add all of them."),
-        ),
+        (f, "This is the whole weight. The ends carry a part of it."),
+        (lambda: carried().mean(), "The floor rises below all nodes: add their forces."),
+        (lambda: carried().max(), "This is the force on one node. Add all of them."),
     ),
     "3.8": (
         lambda: 1 / np.tan(np.pi / 2000) ** 2,
-        (
-            (1e6, "It grows like N^2; the factor is missing."),
-            (4e6, "The largest eigenvalue is about 4, the smallest is not 1 / N^2."),
-            (1 / np.tan(np.pi / 2000), "This is its square root."),
-        ),
+        (1e6, "It grows like N^2; the factor is missing."),
+        (4e6, "The largest eigenvalue is about 4, the smallest is not 1 / N^2."),
+        (1 / np.tan(np.pi / 2000), "This is its square root."),
     ),
 }

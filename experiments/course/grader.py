@@ -67,7 +67,11 @@ def exercises(chapter: int) -> dict[str, Exercise]:
     """The exercises of a chapter by their numbers."""
     texts = tomllib.loads((FOLDER / f"exercises_{chapter}.toml").read_text(encoding="utf-8"))
     graded = import_module(f"experiments.course.exercises_{chapter}").GRADED
-    return {number: Exercise(number, *graded[number], **text) for number, text in texts.items()}
+    found = {}
+    for number, text in texts.items():
+        right, *mistakes = graded[number]
+        found[number] = Exercise(number, right, tuple(mistakes), **text)
+    return found
 
 
 def exercise(number: str) -> Exercise:

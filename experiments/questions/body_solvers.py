@@ -1,8 +1,10 @@
-"""What do the solvers of a body's linear system cost? `--large`: up to a million unknowns."""
+"""What do the solvers of a body's linear system cost, up to a million unknowns?
+
+It takes some ten minutes and 12 GiB.
+"""
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import multiprocessing
 import os
@@ -22,16 +24,16 @@ from contactopt.bodies.solvers.constants import RTOL
 from contactopt.bodies.solvers.multigrid import conjugate_gradients, nodal_blocks, rigid_motions
 from contactopt.bodies.solvers.system import System
 from contactopt.figures.style import COLOURS, label_ends, paper_axes
-from experiments.report import figures_alone, save_figures, stored, template, write
+from experiments.report import Tables, measure, template
 
 PLAIN = "pyamg's defaults"
-ELEMENTS = {  # across the contact half-width
-    "superlu": (8, 12, 16, 24, 32),
-    "pardiso": (8, 12, 16, 24, 32),
-    "multigrid": (8, 12, 16, 24, 32),
-    PLAIN: (8, 12, 16, 24, 32),
+USUAL = (8, 12, 16, 24, 32)  # elements across the contact half-width
+ELEMENTS = {
+    "superlu": USUAL,
+    "pardiso": (*USUAL, 48),
+    "multigrid": (*USUAL, 48, 64, 80),
+    PLAIN: USUAL,
 }
-LARGE = {"pardiso": (48,), "multigrid": (48, 64, 80)}
 
 
 def system(part: str, elements: int) -> tuple[System, np.ndarray]:
@@ -86,7 +88,7 @@ def timed(act: Callable[[], Any]) -> tuple[Any, float]:
     return result, time.process_time() - start
 
 
-def measure(task: tuple[str, int]) -> dict[str, Any]:
+def measured(task: tuple[str, int]) -> dict[str, Any]:
     """One solver on the foundation, in a process of its own."""
     name, elements = task
     arguments, load = system("lower", elements)
@@ -117,24 +119,8 @@ def alone(act: Callable[[Any], Any], task: Any) -> Any:
         return pool.apply(act, (task,))
 
 
-def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Slopes of log(quantity) over log(unknowns), by least squares over the three largest sizes."""
-    out = []
-    for name in ELEMENTS:
-        own = [row for row in rows if row["solver"] == name][-3:]
-        slope = {
-            key: float(
-                np.polyfit(np.log([r["unknowns"] for r in own]), np.log([r[key] for r in own]), 1)[
-                    0
-                ]
-            )
-            for key in ("setup [s]", "solve [s]", "memory [MiB]")
-        }
-        out.append({"solver": name, **slope})
-    return out
-
-
-def draw(rows: list[dict[str, Any]]) -> Any:
+def draw(tables: Tables) -> dict[str, Any]:
+    rows = tables["rows"]
     figure, axes = paper_axes(2, rows=2, wide=True)
     keys = ("setup [s]", "solve [s]", "memory [MiB]", "iterations")
     for ax, key in zip(axes, keys):
@@ -149,35 +135,20 @@ def draw(rows: list[dict[str, Any]]) -> Any:
         if key == "iterations":
             ax.set(yscale="linear", ylim=(0, None))
         label_ends(ax, ends)
-    return figure
+    return {"cost": figure}
 
 
-TEXT = template(__file__)
+def rows() -> list[dict[str, Any]]:
+    return [
+        alone(measured, (name, elements))
+        for name, several in ELEMENTS.items()
+        for elements in several
+        if name != "pardiso" or find_spec("pypardiso")
+    ]
+
 
 if __name__ == "__main__":
-    if figures_alone():
-        figures = {"cost": draw(stored("body_solvers", "rows"))}
-        raise SystemExit(save_figures("body_solvers", figures))
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--large", action="store_true", help="up to a million unknowns; some ten minutes, 12 GiB"
-    )
-    large = parser.parse_args().large
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ[variable] = "1"  # for the processes started below
-    if find_spec("pypardiso") is None:
-        del ELEMENTS["pardiso"]
-    sizes = {
-        name: (*base, *(LARGE.get(name, ()) if large else ())) for name, base in ELEMENTS.items()
-    }
-    rows = []
-    for name, several in sizes.items():
-        for elements in several:
-            rows.append(alone(measure, (name, elements)))
-            print(rows[-1], flush=True)
-    versions = ", ".join(
-        f"{name} {version(name)}" for name in ("pyamg", "pypardiso") if find_spec(name)
-    )
-    text = TEXT.format(versions=versions, large="Made with `--large`.\n\n" if large else "")
-    tables = {"rows": rows, "growth": exponents(rows)}
-    write("body_solvers", "Solvers of a body's linear system", text, tables, {"cost": draw(rows)})
+    there = [name for name in ("pyamg", "pypardiso") if find_spec(name)]
+    versions = ", ".join(f"{name} {version(name)}" for name in there)
+    text = template(__file__).format(versions=versions)
+    measure("body_solvers", "Solvers of a body's linear system", text, {"rows": rows}, draw)

@@ -15,16 +15,17 @@ import numpy as np
 from skfem import MeshQuad, MeshTet
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
+from contactopt.meshes.polar import ring
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
 from experiments.questions.preconditioners import condition, iterations
-from experiments.report import template, write
+from experiments.report import measure, template
 
 POISSON, HEIGHT, GROWTH = 0.3, 1.0, 1.3
 RATIOS = (1e-4, 1.0, 1e4)  # stiffness of the lower body over that of the upper one
 SIZES = (0.3, 0.13)  # of the triangles
 FINER = 0.075  # on the first two surfaces, at a ratio of one
-AROUND = (100, 1000)  # nodes around the ring
+AROUND = (100, 1000)  # nodes of the ring
 UPPER, LOWER = 1.0, -1.0
 
 
@@ -124,27 +125,18 @@ def stubs(name: str, size: float) -> Scene:
     return Scene("stubs", part("upper", UPPER), part("lower", LOWER), 0.5, kind="solid")
 
 
-def ring(n: int) -> Scene:
+def around(n: int) -> Scene:
     """A pin in a bush, both held far from the contact, with n nodes around."""
-    angle, rise = 2 * np.pi * np.arange(n) / n, graded(1.0, 2 * np.pi / n, 1.4)
-    i = np.arange(n)
+    angles, rise = np.linspace(0, 2 * np.pi, n + 1), graded(1.0, 2 * np.pi / n, 1.4)
 
-    def part(name: str, radii: np.ndarray, far: float) -> Part:
-        p = np.concatenate([r * np.stack([np.cos(angle), np.sin(angle)]) for r in radii], axis=1)
-        cells = [
-            np.stack([i, i + n, (i + 1) % n + n, (i + 1) % n]) + layer * n
-            for layer in range(len(radii) - 1)
-        ]
-        middle = np.cos(np.pi / n)
-        mesh = MeshQuad(p, np.concatenate(cells, axis=1)).with_boundaries(
-            {
-                "contact": lambda x: np.abs(np.hypot(*x) - middle) < 1e-7,
-                "far": lambda x: np.abs(np.hypot(*x) - far * middle) < 1e-7,
-            }
-        )
+    def part(name: str, radii: np.ndarray, **sides: str) -> Part:
+        made = ring(radii, angles)
+        mesh = MeshQuad(made.p[:, : made.nvertices], made.t)  # its edges are straight
+        mesh = mesh.with_boundaries({new: made.boundaries[old] for new, old in sides.items()})
         return Part(name, mesh, Material(1.0, POISSON), (Support("far"),))
 
-    return Scene("ring", part("pin", 1 - 0.8 * rise[::-1], 0.2), part("bush", 1 + rise, 2.0), 0.5)
+    pin = part("pin", 1 - 0.8 * rise[::-1], contact="outer", far="inner")
+    return Scene("ring", pin, part("bush", 1 + rise, contact="inner", far="outer"), 0.5)
 
 
 def pairs(scene: Scene, ratios: tuple[float, ...]) -> Iterator[tuple[float, InterfaceProblem]]:
@@ -172,52 +164,18 @@ def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, objec
     return row
 
 
-TEXT = template(__file__)
-
-
-def report(rows: list[dict]) -> str:
-    """The text with its numbers, which come from the rows."""
-
-    def most(key: str) -> float:
-        return max(row[key] for row in rows)
-
-    unseen = [row for row in rows if "fitted" not in row["surface"]]
-    worst = max(unseen, key=lambda row: row["deflated: condition"])
-    disc = [row["deflated: condition"] for row in rows if "fitted" in row["surface"]]
-    meshes: dict[tuple, list[float]] = {}
-    for row in rows:
-        mesh = row["surface"], row["contacts"]
-        meshes.setdefault(mesh, []).append(row["deflated: condition"])
-    growth = []
-    for surface in dict.fromkeys(row["surface"] for row in rows):
-        even = [row for row in rows if row["surface"] == surface and row["ratio"] == 1.0]
-        growth.append(even[-1]["deflated: condition"] / even[0]["deflated: condition"])
-    return TEXT.format(
-        worst="the {surface} of {contacts} contacts at a ratio of {ratio:g}".format(**worst),
-        most=worst["deflated: condition"],
-        steps=most("deflated: iterations"),
-        disc=f"{min(disc):.1f} to {max(disc):.1f}",
-        plain=most("laplacian: condition"),
-        plainsteps=most("laplacian: iterations"),
-        none=most("none: iterations"),
-        spread=100 * max(max(values) / min(values) - 1 for values in meshes.values()),
-        least=min(growth),
-        largest=max(growth),
-    )
-
-
-def main() -> None:
-    rows = []
+def rows() -> list[dict[str, object]]:
+    made = []
     for i, name in enumerate(SURFACES):
         for size in SIZES:
-            rows += [judge(name, *pair) for pair in pairs(stubs(name, size), RATIOS)]
+            made += [judge(name, *pair) for pair in pairs(stubs(name, size), RATIOS)]
         if i < 2:
-            rows += [judge(name, *pair) for pair in pairs(stubs(name, FINER), RATIOS[1:2])]
+            made += [judge(name, *pair) for pair in pairs(stubs(name, FINER), RATIOS[1:2])]
     for n in AROUND:
-        rows += [judge("closed ring, in the plane", *pair) for pair in pairs(ring(n), RATIOS)]
-    title = "`laplacian` on contact surfaces of any shape"
-    write("contact_surfaces", title, report(rows), {"rows": rows}, {})
+        made += [judge("closed ring, in the plane", *pair) for pair in pairs(around(n), RATIOS)]
+    return made
 
 
 if __name__ == "__main__":
-    main()
+    title = "`laplacian` on contact surfaces of any shape"
+    measure("contact_surfaces", title, template(__file__), {"rows": rows})

@@ -122,20 +122,8 @@ both threads.
 {{ratios}}
 
 Friction can cost less than a linear solve. The factors of two separate bodies are smaller than
-those of both bodies together, and each body has a core of its own. What friction itself adds are
-the steps between `factorise` and the certificate:
-
-{{phases}}
+those of both bodies together, and each body has a core of its own.
 """
-
-
-def phases(name: str, solver: str) -> dict[str, Any]:
-    *_, reduction, solution = frictional(SCENES[name][0](), solver)
-    return {
-        "scene": name,
-        "solver": solver,
-        **{f"{k} [s]": v for k, v in (reduction.seconds | solution.seconds).items()},
-    }
 
 
 if __name__ == "__main__":
@@ -143,11 +131,5 @@ if __name__ == "__main__":
     names = [n for n in SCENES if n in sys.argv] or list(SCENES)
     solvers = [s for s in SOLVERS if s in sys.argv] or list(SOLVERS)
     pairs = [(n, s) for n in names for s in solvers if s != "pardiso" or find_spec("pypardiso")]
-    rows = {
-        "ratios": [measure(*pair) for pair in pairs],
-        "phases": [phases(*pair) for pair in pairs],
-    }
-    tables = {
-        name: merged("cost_ratio", name, table, ("scene", "solver")) for name, table in rows.items()
-    }
-    write("cost_ratio", "The price of friction", TEXT, tables, {})
+    rows = merged("cost_ratio", "ratios", [measure(*pair) for pair in pairs], ("scene", "solver"))
+    write("cost_ratio", "The price of friction", TEXT, {"ratios": rows}, {})

@@ -2,8 +2,7 @@
 FOLDER [FOLDER ...]`.
 
 The folders hold FCLib files (*.hdf5) and files in Siconos' text format (*.dat), which are not part
-of this project. Where Siconos is installed, its solvers take the same files in the same run. The
-table of the default method is printed first; the other methods follow.
+of this project. Where Siconos is installed, its solvers take the same files in the same run.
 """
 
 from __future__ import annotations
@@ -18,11 +17,10 @@ import numpy as np
 
 from contactopt import InputError, InterfaceProblem, Solution, fclib, siconos_residual, solve
 from experiments.peers.siconos_numerics import siconos
-from experiments.report import markdown, template, write
+from experiments.report import template, write
 
-DEFAULT, OTHERS = "auto", ("proximal", "nsgs", "admm")
 TOL = 1e-8
-LIMIT, SHORT_LIMIT = 20.0, 5.0  # seconds a file, of the default method and of the others
+LIMIT = 20.0  # seconds a file
 REPEATS, LONG = 3, 2.0  # a solve that takes longer than so many seconds is not repeated
 SOLVERS = ("NSGS", "PROX", "ADMM", "NSN_AC", "VI_EG")
 SHIFT = 1e-3  # of the shifted geometric means [s]
@@ -42,12 +40,12 @@ def of_siconos(problem: InterfaceProblem, solver: str) -> float | None:
     return statistics.median(times)
 
 
-def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solution, float]:
+def timed(problem: InterfaceProblem) -> tuple[Solution, float]:
     """The solution, and the median of the processor seconds."""
     times: list[float] = []
     while len(times) < REPEATS and max(times, default=0.0) < LONG:
         start = time.process_time()
-        solution = solve(problem, method, tol=TOL, time_limit=limit, max_iterations=100_000)
+        solution = solve(problem, tol=TOL, time_limit=LIMIT, max_iterations=100_000)
         times.append(time.process_time() - start)
     return solution, statistics.median(times)
 
@@ -55,7 +53,7 @@ def timed(problem: InterfaceProblem, method: str, limit: float) -> tuple[Solutio
 def beside_siconos(path: Path) -> dict[str, Any]:
     """The default method on one file, and what Siconos' solvers take for it in the same run."""
     problem = fclib.read(path)
-    solution, seconds = timed(problem, DEFAULT, LIMIT)
+    solution, seconds = timed(problem)
     known = [of_siconos(problem, solver) for solver in SOLVERS]
     return {
         "folder": path.parent.resolve().name,
@@ -71,30 +69,14 @@ def beside_siconos(path: Path) -> dict[str, Any]:
     }
 
 
-def of_another(path: Path, method: str) -> dict[str, Any]:
-    """Another method on one file."""
-    problem = fclib.read(path)
-    solution, seconds = timed(problem, method, SHORT_LIMIT)
-    return {
-        "problem": path.stem,
-        "method": method,
-        "status": str(solution.status),
-        "residual": solution.residual,
-        "iterations": solution.iterations,
-        "seconds": seconds,
-    }
-
-
-def totals(rows: list[dict[str, Any]], key: str) -> list[dict[str, Any]]:
-    """How many files are certified, and the seconds of all, by folder or by method."""
+def totals(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """How many files are certified, and the seconds of all, by folder."""
     out = []
-    for name in dict.fromkeys(row[key] for row in rows):
-        chosen = [row for row in rows if row[key] == name]
-        certified = sum(row["status"] == "solved" for row in chosen)
+    for name in dict.fromkeys(row["folder"] for row in rows):
+        chosen = [row for row in rows if row["folder"] == name]
+        certified = f"{sum(row['status'] == 'solved' for row in chosen)} of {len(chosen)}"
         seconds = sum(row["seconds"] for row in chosen)
-        out.append(
-            {key: name, "certified": f"{certified} of {len(chosen)}", "seconds in all": seconds}
-        )
+        out.append({"folder": name, "certified": certified, "seconds in all": seconds})
     return out
 
 
@@ -114,8 +96,6 @@ def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-TEXT = template(__file__)
-
 if __name__ == "__main__":
     folders = sys.argv[1:]
     files = [
@@ -130,15 +110,6 @@ if __name__ == "__main__":
             " *.hdf5 or *.dat"
         )
     default = [beside_siconos(path) for path in files]
-    certified = totals(default, "folder")
-    print(markdown(certified), markdown(means(default)), markdown(default), sep="\n\n", flush=True)
-    others = [of_another(path, method) for method in OTHERS for path in files]
-    text = TEXT.format(long=LONG, limit=LIMIT, short=SHORT_LIMIT)
-    tables = {
-        "folders": certified,
-        "means": means(default),
-        "default": default,
-        "methods": totals(others, "method"),
-        "others": others,
-    }
+    tables = {"folders": totals(default), "means": means(default), "default": default}
+    text = template(__file__).format(long=LONG, limit=LIMIT)
     write("fclib_problems", "Problems of other codes", text, tables, {})

@@ -18,7 +18,7 @@ from contactopt.benchmark.families.packings import packing
 from contactopt.figures.style import draw_lines, paper_axes
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.coulomb import Coulomb
-from experiments.report import measure, stored, template
+from experiments.report import Tables, measure, stored, template
 
 TIGHT, LOOSE = 1e-10, 1e-4  # tolerances of the cone solver
 ROUNDS, STILL = 100, 1e-8  # of a fixed point; its last change
@@ -65,14 +65,12 @@ def fixed_point(step: Callable[[np.ndarray], Answer], start: np.ndarray, read: A
 
 
 def associated(problem: InterfaceProblem, softness: float = 0.0, tol: float = TIGHT) -> Answer:
-    """Forces in Coulomb's cones minimise r' Q r / 2 + q' r: contacts that slip open by mu |u_t|."""
+    """Forces in Coulomb's cones minimise r' Q r / 2 + q' r: contacts that slip open by mu |u_t|.
+
+    Springs in the contacts, of `softness` times the diagonal of Q, make it the compliant law.
+    """
     cones = lambda n, t: (0.0, [cp.SOC(cp.multiply(problem.mu, n), t, axis=1)])  # noqa: E731
     return minimum(problem, cones, softness, tol)
-
-
-def compliant(problem: InterfaceProblem, softness: float, tol: float = TIGHT) -> Answer:
-    """The associated law with springs in the contacts, of `softness` times the diagonal of Q."""
-    return associated(problem, softness, tol)
 
 
 def polygon(problem: InterfaceProblem, sides: int, tol: float = TIGHT) -> Answer:
@@ -163,11 +161,11 @@ PROBLEMS: dict[str, Callable[[], InterfaceProblem]] = {
     "elastic punch": lambda: reduce_bodies(scenes.flat_punch(dim=3, elements=3)).problem,
 }
 LAWS: dict[str, tuple[Callable[..., Answer], tuple[float, ...]]] = {
-    "associated": (lambda problem, _, tol=TIGHT: associated(problem, tol=tol), (0.0,)),
+    "associated": (associated, (0.0,)),
     "square around the disc": (lambda p, _, tol=TIGHT: polygon(p, 0, tol), (0.0,)),
     "polygon": (polygon, SIDES),
     "regularised": (regularised, SWEEP),
-    "compliant": (compliant, SWEEP),
+    "compliant": (associated, SWEEP),
     "barrier": (barrier, SWEEP),
 }
 
@@ -228,47 +226,40 @@ def worst(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def figure(table: list[dict[str, Any]]) -> Any:
-    """Distance to Coulomb's solution against the parameter, and creep beside it."""
-    picture, axes = paper_axes(columns=2, wide=True)
+def draw(tables: Tables) -> dict[str, Any]:
+    """Distance to Coulomb's solution against the parameter, creep beside it; the distance against
+    the number of sides, a line for each problem.
+    """
+    table = tables["rows"]
+    parameters, axes = paper_axes(columns=2, wide=True)
     for ax, key, label in (
         (axes[0], "distance", "distance to Coulomb's solution [-]"),
         (axes[1], "creep", "creep of sticking contacts [-]"),
     ):
         lines = []
         for law in ("regularised", "compliant", "barrier"):
-            own = [r for r in worst(table) if r["law"] == law]
+            own = [r for r in tables["worst"] if r["law"] == law]
             lines.append((law, [r["parameter"] for r in own], [r[key] for r in own]))
         draw_lines(ax, lines)
         ax.set(xlabel="parameter [-]", ylabel=label)
-    return picture
-
-
-def sides_figure(table: list[dict[str, Any]]) -> Any:
-    """Distance to Coulomb's solution against the number of sides, a line for each problem."""
-    picture, axes = paper_axes()
+    sides, (ax,) = paper_axes()
     lines = []
     for name in PROBLEMS:
         own = [r for r in table if (r["problem"], r["law"]) == (name, "polygon")]
         shown = [max(r["distance"], SMALL) for r in own]
         lines.append((name, [r["parameter"] for r in own], shown))
-    draw_lines(axes[0], lines)
-    axes[0].set(xlabel="sides of the polygon [-]", ylabel="distance to Coulomb's solution [-]")
-    axes[0].set_xscale("log", base=2)
-    axes[0].set_xticks(SIDES, [str(sides) for sides in SIDES])
-    return picture
+    draw_lines(ax, lines)
+    ax.set(xlabel="sides of the polygon [-]", ylabel="distance to Coulomb's solution [-]")
+    ax.set_xscale("log", base=2)
+    ax.set_xticks(SIDES, [str(number) for number in SIDES])
+    return {"parameters": parameters, "sides": sides}
 
-
-TEXT = template(__file__)
 
 if __name__ == "__main__":
     measure(
         "five_frictions",
         "One Q, five frictions",
-        TEXT.format(tight=TIGHT, loose=LOOSE, small=SMALL),
+        template(__file__).format(tight=TIGHT, loose=LOOSE, small=SMALL),
         {"rows": rows, "worst": lambda: worst(stored("five_frictions", "rows"))},
-        lambda tables: {
-            "parameters": figure(tables["rows"]),
-            "sides": sides_figure(tables["rows"]),
-        },
+        draw,
     )

@@ -22,7 +22,7 @@ from contactopt.methods.preconditioners import (
     restricted,
     smooth_motions,
 )
-from experiments.report import figures_alone, save_figures, stored, template, write
+from experiments.report import Tables, measure, template
 
 SIZES = (17, 33, 65, 129, 257, 513, 1025)
 DENSE = 260  # contacts up to which condition numbers are computed
@@ -206,67 +206,53 @@ def draw(rows: list[dict], sizes: tuple[int, ...]) -> Any:
     return figure
 
 
-TEXT = template(__file__)
+def drawn(tables: Tables) -> dict[str, Any]:
+    surface = draw(tables["surface"], tuple(n * n for n in SIDES))
+    return {"line": draw(tables["sizes"], SIZES), "surface": surface}
 
 
-def drawn(line: list[dict], surface: list[dict]) -> dict[str, Any]:
-    return {"line": draw(line, SIZES), "surface": draw(surface, tuple(n * n for n in SIDES))}
+def sizes() -> list[dict[str, object]]:
+    return [row for k in SIZES for row in by_size(blocks(k, *STIFFNESS[0]))]
 
 
-def main() -> None:
-    if figures_alone():
-        tables = (stored("preconditioners", table) for table in ("sizes", "surface"))
-        return save_figures("preconditioners", drawn(*tables))
-    rows = [row for k in SIZES for row in by_size(blocks(k, *STIFFNESS[0]))]
-    even = [of_bodies(blocks(129, *material), BODIES.format(*material)) for material in STIFFNESS]
-    even.append(
-        of_bodies(
-            blocks(129, *STIFFNESS[0], refined(129, 5 ** (1 / 64))), "E1 = E2 = 5, nu = 0.3, graded"
-        )
-    )
-    surface = [
-        row
-        for n in SIDES
-        for row in by_size(solids(n, 5.0, 5.0, Q="explicit" if n < 30 else "implicit"))
-    ]
+def surface() -> list[dict[str, object]]:
+    forms = {n: "explicit" if n < 30 else "implicit" for n in SIDES}
+    return [row for n, Q in forms.items() for row in by_size(solids(n, 5.0, 5.0, Q=Q))]
+
+
+def bodies() -> list[dict[str, object]]:
+    rows = [of_bodies(blocks(129, *material), BODIES.format(*material)) for material in STIFFNESS]
+    uneven = blocks(129, *STIFFNESS[0], refined(129, 5 ** (1 / 64)))
+    return [*rows, of_bodies(uneven, "E1 = E2 = 5, nu = 0.3, graded")]
+
+
+def ratios() -> list[dict[str, object]]:
     pairs = ((5.0, 5.0), (5e4, 5.0), (5.0, 5e4))
-    ratios = [of_bodies(solids(13, *pair), BODIES.format(*pair, 0.3)) for pair in pairs]
-    graded_ = refined(13, 5 ** (1 / 6))
-    ratios.append(of_bodies(solids(13, 5.0, 5.0, graded_), "E1 = E2 = 5, nu = 0.3, graded"))
-    plane, solid = blocks(129, *STIFFNESS[0]), solids(13, 5.0, 5.0)
-    zones = [in_zone(p, share) for p in (plane, solid) for share in (0.8, 0.4, 0.2)]
-    zones = [{key: row.get(key, "") for key in zones[0]} for row in zones]
-    best = [
-        row["PCG iterations, full"] for row in rows if row["preconditioner"] == "neumann, deflated"
-    ]
-    solid_best = [
-        row["PCG iterations, full"]
-        for row in surface
-        if row["preconditioner"] == "neumann, deflated"
-    ]
-    none = [row for row in rows if row["preconditioner"] == "none"][-1]
-    text = TEXT.format(
-        worst_2d=max(best),
-        worst_3d=max(solid_best),
-        none_2d=none["PCG iterations, full"],
-        last=none["contacts"],
-    )
-    tables = {
-        "sizes": rows,
-        "bodies": even,
-        "surface": surface,
-        "ratios": ratios,
-        "zones": zones,
-    }
-    figures = drawn(rows, surface)
-    write(
-        "preconditioners",
-        "Preconditioners of the interface operator",
-        text,
-        tables,
-        figures,
+    rows = [of_bodies(solids(13, *pair), BODIES.format(*pair, 0.3)) for pair in pairs]
+    uneven = solids(13, 5.0, 5.0, refined(13, 5 ** (1 / 6)))
+    return [*rows, of_bodies(uneven, "E1 = E2 = 5, nu = 0.3, graded")]
+
+
+def zones() -> list[dict[str, object]]:
+    problems = blocks(129, *STIFFNESS[0]), solids(13, 5.0, 5.0)
+    rows = [in_zone(problem, share) for problem in problems for share in (0.8, 0.4, 0.2)]
+    return [{key: row.get(key, "") for key in rows[0]} for row in rows]
+
+
+def text(tables: Tables) -> str:
+    def most(table: str, name: str) -> int:
+        own = [row for row in tables[table] if row["preconditioner"] == name]
+        return max(row["PCG iterations, full"] for row in own)
+
+    return template(__file__).format(
+        worst_2d=most("sizes", "neumann, deflated"),
+        worst_3d=most("surface", "neumann, deflated"),
+        none_2d=most("sizes", "none"),
+        last=SIZES[-1],
     )
 
 
 if __name__ == "__main__":
-    main()
+    tables = {"sizes": sizes, "bodies": bodies, "surface": surface, "ratios": ratios}
+    title = "Preconditioners of the interface operator"
+    measure("preconditioners", title, text, tables | {"zones": zones}, drawn)

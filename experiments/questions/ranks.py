@@ -1,4 +1,4 @@
-"""How evenly do ranks of MPI work on bodies of their own, and what travels between them?"""
+"""How evenly do ranks of MPI work on bodies of their own?"""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from contactopt import Scene, reduce, reduce_bodies, scenes, solve
+from contactopt import Scene, scenes
 from contactopt.bodies.launch import mpiexec
 from contactopt.bodies.ranks import Kept, Team, serve, spread, world
-from contactopt.scenes.slices import sliced
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 from experiments.report import template, write
 
@@ -27,10 +27,6 @@ EQUAL = {
     "solid, factors": (3, 24, {"Q": "explicit", "solver": "superlu"}),
     "solid, multigrid": (3, 56, {"solver": "multigrid"}),
 }
-RANKS = (4, 8, 16)
-HEIGHTS = (80.0, 640.0)  # of the foundation that is cut into slices [mm]
-# elements across the contact half-width there, by the number of ranks
-SLICED = {4: 12, 8: 12, 16: 32}
 
 
 def equal_bodies(dim: int, elements: int) -> Scene:
@@ -135,72 +131,8 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
     }
 
 
-def traffic(team: Team, height: float) -> dict[str, Any]:
-    """One body on each rank: what a product with Q sends, and the answer."""
-    scene = sliced(
-        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height),
-        "foundation",
-        team.size - 1,
-    )
-    one, many = (
-        reduce_bodies(given, Q="implicit", solver="superlu")
-        for given in (scene, spread(scene, team))
-    )
-    r = np.random.default_rng(0).normal(size=many.problem.q.size)
-    expected = one.problem.Q @ r
-    before = (team.traffic.messages, team.traffic.length)
-    product = many.problem.Q @ r
-    sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
-    answers = [
-        solve(reduce(given, Q="explicit"), tol=TOL) for given in (scene, spread(scene, team))
-    ]
-    size = np.abs(answers[0].reactions).max()
-    return {
-        "ranks": team.size,
-        "unknowns of the bodies": many.dofs,
-        "interface unknowns": many.problem.q.size,
-        "messages per product": sent[0],
-        "bytes per product": sent[1],
-        "products differ by": float(np.abs(product - expected).max() / np.abs(expected).max()),
-        "steps": f"{answers[0].iterations}, {answers[1].iterations}",
-        "residuals": f"{answers[0].residual:.1e}, {answers[1].residual:.1e}",
-        "answers differ by": float(
-            np.abs(answers[0].reactions - answers[1].reactions).max() / size
-        ),
-    }
-
-
-def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
-    """The same bodies solved by multigrid: what the whole solution sends."""
-    scene = sliced(
-        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height),
-        "foundation",
-        team.size - 1,
-    )
-    problem = reduce(spread(scene, team), solver="multigrid")
-    before = (team.traffic.messages, team.traffic.length)
-    solution = solve(problem, "newton", tol=TOL)
-    sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
-    bodies, cycles = team.size - 1, problem.Q.coupled.cycles
-    return {
-        "ranks": team.size,
-        "unknowns of the bodies": sum(term.size for term in problem.Q.coupled.terms),
-        "interface unknowns": problem.q.size,
-        "steps": solution.iterations,
-        "residual": float(solution.residual),
-        "V-cycles": cycles,
-        "messages per step": sent[0] / solution.iterations,
-        "bytes per step": sent[1] / solution.iterations,
-        "messages per V-cycle and rank": sent[0] / cycles / bodies,
-        "bytes per message": sent[1] / sent[0],
-    }
-
-
-TEXT = template(__file__)
-
-
 def work(out: str) -> None:
-    """On the ranks: the tables of as many ranks as there are."""
+    """On the ranks: the table."""
     comm = world()
     if comm.rank:
         serve(comm)
@@ -210,39 +142,24 @@ def work(out: str) -> None:
 
     team = ranks.TimedTeam(comm)
     try:
-        tables: dict[str, list[dict[str, Any]]] = {"efficiency": [], "traffic": [], "coupled": []}
-        if comm.size == 2:
-            tables["efficiency"] = [ranks.efficiency(team, case) for case in EQUAL]
-        else:
-            tables["traffic"] = [ranks.traffic(team, height) for height in HEIGHTS]
-        if comm.size == RANKS[0]:
-            tables["coupled"] = [ranks.coupled_traffic(team, height) for height in HEIGHTS]
-        Path(out).write_text(json.dumps(tables))
+        Path(out).write_text(json.dumps([ranks.efficiency(team, case) for case in EQUAL]))
     finally:
         team.dismiss()
 
 
-def measured(ranks: int) -> dict[str, list[dict[str, Any]]]:
-    """The tables of one launch, kept in out/ranks/ until all are there."""
-    out = Path("out", "ranks", f"{ranks}.json")
-    if not out.exists():
-        out.parent.mkdir(parents=True, exist_ok=True)
-        command = [*mpiexec(ranks), sys.executable, "-m", "experiments.questions.ranks", str(out)]
+def measured() -> list[dict[str, Any]]:
+    """The table of two ranks, which write it to a file."""
+    with TemporaryDirectory() as folder:
+        out = Path(folder, "rows.json")
+        command = [*mpiexec(2), sys.executable, "-m", "experiments.questions.ranks", str(out)]
         subprocess.run(command, check=True)
-    tables: dict[str, list[dict[str, Any]]] = json.loads(out.read_text())
-    return tables
+        rows: list[dict[str, Any]] = json.loads(out.read_text())
+    return rows
 
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         work(sys.argv[1])
     else:
-        launches = [measured(ranks) for ranks in (2, *RANKS)]
-        names = ("efficiency", "traffic", "coupled")
-        write(
-            "ranks",
-            "Bodies on ranks of their own",
-            TEXT,
-            {n: [row for made in launches for row in made[n]] for n in names},
-            {},
-        )
+        title = "Bodies on ranks of their own"
+        write("ranks", title, template(__file__), {"efficiency": measured()}, {})

@@ -11,8 +11,8 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from importlib import import_module
 from typing import Any
+from unittest.mock import patch
 
 from contactopt import InterfaceProblem, reduce, scenes, solve
 from contactopt.benchmark.families.packings import packing
@@ -21,70 +21,41 @@ from contactopt.methods import constants, find_method
 from contactopt.methods.nested import Nested
 from experiments.report import template, write
 
-HOME = "contactopt.methods"
-# names of constants -> module that uses them, method that is run, kinds of problems that feel them
-USERS = {
-    "FIRST_SWEEPS MORE_SWEEPS SWEEPING LOCAL FEWEST_SWEEPS SWEEPS_KEPT NEARLY_SWEPT SWEPT LOOK": (
-        "auto",
-        "auto",
-        ("rigid", "packing"),
-    ),
-    "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH "
-    "ROUND SPARSE_ROUND PATHS TURNING EAGER_ALPHA GENTLE_ALPHA LARGER": (
-        "auto",
-        "auto",
-        ("elastic", "rigid", "packing"),
-    ),
-    "FALL RISE GENTLE_FALL GENTLE_RISE EASY EAGER_STEPS": (
-        "proximal",
-        "proximal",
-        ("elastic", "rigid"),
-    ),
-    "SUBPROBLEM_STEPS SHORTEST MEMORY ENOUGH": (
-        "kernels.sparse_newton",
-        "proximal",
-        ("elastic", "rigid"),
-    ),
-    "LOOSE": ("kernels.alart_curnier", "newton", ("elastic",)),
-    "SMALL FULL": ("kernels.sparse_blocks", "auto", ("packing",)),
-    "SHARPER SHARPEST": ("apg", "apg", ("coarse",)),
-    "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING "
-    "MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING "
-    "STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK": (
-        "kernels.interior",
-        "auto",
-        ("rigid", "packing"),
-    ),
-    "KRYLOV_FIRST KRYLOV_LOOSEST KRYLOV_TIGHTEST": ("newton", "newton", ("products",)),
-    "PRODUCT_SHARE MODEL_STEP MODEL_PRODUCTS": ("kernels.krylov", "newton", ("products",)),
-    "SLIPPING": ("kernels.linearised", "newton", ("products",)),
-    "ACTIVE_SETS SUCCESS WEIGHT_FALL WEIGHT_RISE": ("kernels.subproblems", "pcg", ("products",)),
-    "COUPLED_FIRST COUPLED_LOOSEST COUPLED_TIGHTEST SCHUR_STEP SCHUR_MARGIN GIVEN_BALANCE": (
-        "kernels.coupled_newton",
-        "newton",
-        ("bodies",),
-    ),
-    "COARSEST LEAST_SYMBOL LEAST_DETERMINANT": ("kernels.levels", "nested", ("half-spaces",)),
-    "FIRST_SHIFT SHIFT_RATIO": ("kernels.level_steps", "nested", ("half-spaces",)),
-    "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS COARSE_TRIES "
-    "CLOSER SLOW": (
-        "nested",
-        "nested",
-        ("half-spaces",),
-    ),
-    "MOST_LOCAL FEW_OF_ALL LOCAL_SHARE AROUND LOCAL_TRIES LOCAL_ENOUGH": (
-        "kernels.elimination",
-        "nested",
-        ("half-spaces",),
-    ),
-    "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": (
-        "kernels.mprgp",
-        "lagrangian",
-        ("coarse",),
-    ),
-    "ROUGH_NORMAL": ("lagrangian", "lagrangian", ("coarse",)),
-    "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("admm", "admm", ("coarse",)),
-}
+# method that is run, kinds of problems that feel them, names of constants
+FELT = (
+    ("auto", "rigid packing",
+     "FIRST_SWEEPS MORE_SWEEPS SWEEPING LOCAL FEWEST_SWEEPS SWEEPS_KEPT NEARLY_SWEPT SWEPT LOOK "
+     "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START "
+     "LEAST_SMOOTHING MOST_SMOOTHING PREDICTED BOUNDARY SHORT STUCK CORRECTED "
+     "LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK"),
+    ("auto", "elastic rigid packing",
+     "NEWTON_STEPS PATIENCE FEW_ENTRIES PROGRESS NEARBY CONE_PROGRAMS CLOSE LEAST_ALPHA "
+     "POLISH ROUND SPARSE_ROUND PATHS TURNING EAGER_ALPHA GENTLE_ALPHA LARGER"),
+    ("proximal", "elastic rigid",
+     "FALL RISE GENTLE_FALL GENTLE_RISE EASY EAGER_STEPS SUBPROBLEM_STEPS SHORTEST MEMORY "
+     "ENOUGH"),
+    ("newton", "elastic",
+     "LOOSE"),
+    ("auto", "packing",
+     "SMALL FULL"),
+    ("apg", "coarse",
+     "SHARPER SHARPEST"),
+    ("newton", "products",
+     "KRYLOV_FIRST KRYLOV_LOOSEST KRYLOV_TIGHTEST PRODUCT_SHARE MODEL_STEP MODEL_PRODUCTS "
+     "SLIPPING"),
+    ("pcg", "products",
+     "ACTIVE_SETS SUCCESS WEIGHT_FALL WEIGHT_RISE"),
+    ("newton", "bodies",
+     "COUPLED_FIRST COUPLED_LOOSEST COUPLED_TIGHTEST SCHUR_STEP SCHUR_MARGIN GIVEN_BALANCE"),
+    ("nested", "half-spaces",
+     "COARSEST LEAST_SYMBOL LEAST_DETERMINANT FIRST_SHIFT SHIFT_RATIO NESTED_LOOSEST "
+     "NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS COARSE_TRIES CLOSER SLOW "
+     "MOST_LOCAL FEW_OF_ALL LOCAL_SHARE AROUND LOCAL_TRIES LOCAL_ENOUGH"),
+    ("lagrangian", "coarse",
+     "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER ROUGH_NORMAL"),
+    ("admm", "coarse",
+     "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE"),
+)  # fmt: skip
 # methods with settings, or without a name of their own
 BUILT = {"pcg": find_method("alternating", normal="pcg", tangential="pcg"), "nested": Nested()}
 LIMIT = 1000  # iterations per problem
@@ -124,15 +95,12 @@ def problems() -> dict[str, list[InterfaceProblem]]:
 
 @contextmanager
 def setting(name: str, value: Any) -> Iterator[None]:
-    """The solvers with another value of one constant."""
+    """All methods, which are imported by now, with another value of one constant."""
+    usual = getattr(constants, name)
     with ExitStack() as stack:
-        for names, (module, _, _) in USERS.items():
-            if name in names.split():
-                user = import_module(f"{HOME}.{module}")
-                for where in (constants, user):
-                    if hasattr(where, name):
-                        stack.callback(setattr, where, name, getattr(where, name))
-                        setattr(where, name, value)
+        for room, module in list(sys.modules.items()):
+            if room.startswith("contactopt.methods") and vars(module).get(name) == usual:
+                stack.enter_context(patch.object(module, name, value))
         yield
 
 
@@ -154,9 +122,9 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
     """One row for each of the chosen constants; for every one if none is chosen."""
     rows: list[dict[str, Any]] = []
     sets = problems()
-    known: dict[tuple[str, tuple[str, ...]], tuple[int, float]] = {}
-    for names, (_, method, kinds) in USERS.items():
-        asked = [problem for kind in kinds for problem in sets[kind]]
+    known: dict[tuple[str, str], tuple[int, float]] = {}
+    for method, kinds, names in FELT:
+        asked = [problem for kind in kinds.split() for problem in sets[kind]]
         for name in (name for name in names.split() if name in chosen or not chosen):
             value = getattr(constants, name)
             if (method, kinds) not in known:

@@ -30,6 +30,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx-mathjax-offline"]
 exclude_patterns = [
     "*.py",
     "notes",
+    "openings",
     "accuracy.md",
     "performance.md",
     "course.md",

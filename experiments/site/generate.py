@@ -18,7 +18,7 @@ import jupytext
 import lectures
 import museum
 import reference
-from reference import contents, index
+from reference import contents, opening
 
 import contactopt.cli
 from experiments.course.nbgrader import solved
@@ -27,7 +27,6 @@ ROOT = Path(__file__).parents[2]
 # the order in which a course would take them
 TUTORIALS = (
     "one_contact_node",
-    "from_bodies_to_compliance",
     "why_the_preconditioner_works",
     "no_one_or_three_solutions",
     "a_load_cycle",
@@ -35,16 +34,6 @@ TUTORIALS = (
     "reading_a_strangers_problem",
     "derivatives_with_kinks",
     "half_space_or_finite_elements",
-)
-# reports about accuracy; all others are about performance
-ACCURACY = (
-    "accuracy",
-    "elements",
-    "patch_test",
-    "facing_surfaces",
-    "load_cycle",
-    "calculix",
-    "second_reading",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
@@ -73,10 +62,8 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     ordered = [name for name in TUTORIALS if name in found] + sorted(set(found) - set(TUTORIALS))
     for name in ordered:
         yield from notebook("tutorials", name, found[name].read_text())
-    yield (
-        Path("tutorials.md"),
-        index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered]),
-    )
+    listed = contents([f"tutorials/{name}" for name in ordered])
+    yield Path("tutorials.md"), opening("tutorials") + listed
     yield from notebook("gallery", "gallery", gallery())
     yield from course(site)
     yield Path("museum.md"), museum.index(site)
@@ -87,12 +74,15 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     reports = {name_of(path): path for path in sorted((ROOT / "reports").glob("*/report.md"))}
     listed = (ROOT / "reports" / "README.md").read_text()
     yield Path("measured.md"), re.sub(r"\((\w+)/report\.md\)", r"(reports/\1.md)", listed)
-    about = [name for name in ACCURACY if name in reports]
+    first = listed.split("\n## ")[1]  # reports about accuracy; all others are about performance
+    about = re.findall(r"\((\w+)/report\.md\)", first)
     for page, names in (
         ("accuracy", about),
         ("performance", [name for name in reports if name not in about]),
     ):
-        text = (site / f"{page}.md").read_text() + "".join(opening(reports[name]) for name in names)
+        text = (site / f"{page}.md").read_text() + "".join(
+            beginning(reports[name]) for name in names
+        )
         yield (
             Path(f"{page}.md"),
             text + contents([f"reports/{name}" for name in names], hidden=True),
@@ -102,13 +92,6 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
         for picture in PICTURE.findall(path.read_text()):
             if (path.parent / picture[1]).exists():  # Sphinx names what is missing
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
-
-
-TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page
-of this site. It takes ten to fifteen minutes to read. The code checks every claim by an assertion.
-The exercises have hidden solutions: click on *Solution* to open one. [The course](course.md) says
-how to open a notebook.
-"""
 
 
 # A page that is not executed does not know its language otherwise.
@@ -128,8 +111,8 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
     title, rest = text.split("\n", 2)[1], text.split("\n", 2)[2]
     offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
     yield Path(folder, f"{name}.py"), f"{head}# %% [markdown]\n{title}\n{offer}\n{rest}"
-    # notebooks of one folder refer to each other
-    local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)
+    # notebooks, which are all in one folder, refer to each other
+    local = re.sub(r"\]\((?:\.\./\w+/)?(\w+)\.py\)", r"](\1.ipynb)", text)
     book = jupytext.reads(local, "py:percent")
     book.metadata["kernelspec"] = KERNEL
     for cell in book.cells:  # what the page folds, JupyterLab folds too
@@ -210,7 +193,7 @@ def report(path: Path) -> str:
     return re.sub(r"(?<!!)\[([^\]]*)\]\((?!http|#)([^)]*)\)", place, text)
 
 
-def opening(path: Path) -> str:
+def beginning(path: Path) -> str:
     """Title, first paragraph and first picture of a report, and the way to all of it."""
     text = PICTURE.sub(r"![\1](reports/\2)", report(path))
     title, *paragraphs = text.strip().split("\n\n")

@@ -53,10 +53,7 @@ LECTURES: tuple[tuple[str, tuple[tuple[str, tuple[str, ...]], ...], tuple[str, .
     ),
     (
         "The compliance and its preconditioner",
-        (
-            ("tutorials/from_bodies_to_compliance", ("What Q looks like", "The law behind it")),
-            ("tutorials/why_the_preconditioner_works", ()),
-        ),
+        (("tutorials/why_the_preconditioner_works", ("!Two blocks",)),),
         ("seminorm",),
     ),
     ("Friction on an interface", (("course/chapter_5_friction_on_an_interface", ()),), ()),

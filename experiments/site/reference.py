@@ -11,7 +11,6 @@ import pkgutil
 import re
 import tomllib
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +18,22 @@ from docstrings import as_rst
 
 import contactopt
 from contactopt.bodies.solvers import SOLVERS
+from contactopt.coupling.coupling import COUPLINGS
 from contactopt.methods import METHODS
 from contactopt.methods.backends import CONIC, QP
 from contactopt.methods.preconditioners import PRECONDITIONERS
+from contactopt.problem.laws import LAWS
 from contactopt.scenes import PATHS, SCENES
 
 Pages = Iterator[tuple[Path, str | Path]]
 
 
-def index(title: str, text: str, pages: list[str], hidden: bool = False) -> str:
-    """A page with a table of contents below its text."""
-    return f"# {title}\n\n{text}{contents(pages, hidden)}"
+def opening(name: str) -> str:
+    """Title and first words of a page that is made from a table."""
+    return (Path(__file__).parent / "openings" / f"{name}.md").read_text()
 
 
-def contents(pages: list[str], hidden: bool) -> str:
+def contents(pages: list[str], hidden: bool = False) -> str:
     """A table of contents; hidden: in the sidebar only."""
     listed = "\n".join(pages)
     return f"\n```{{toctree}}\n:maxdepth: 1\n{':hidden:' if hidden else ''}\n\n{listed}\n```\n"
@@ -83,7 +84,8 @@ def room_pages(root: Path) -> Pages:
         [(f"[{name}](api/{name}.md)", purpose[name]) for name in names],
     )
     text = f"{exported_names(names, purpose)}\n## The rooms\n\n{ROOMS_TEXT}\n{listed}"
-    yield Path("api.md"), index("Reference", text, [f"api/{name}" for name in names], hidden=True)
+    pages = [f"api/{name}" for name in names]
+    yield Path("api.md"), f"# Reference\n\n{text}{contents(pages, hidden=True)}"
 
 
 ROOMS_TEXT = """The folders of the package are the stages through which data flows. A room
@@ -158,80 +160,29 @@ def plug_in_pages(site: Path) -> Pages:
     for name in METHODS:
         yield Path("methods", f"{name}.md"), method_page(site, name)
     pages = {
-        "scenes": f"# Named scenes\n\n{SCENES_TEXT}\n{scenes_table()}",
-        "methods": methods_index(),
-        "laws": described("Friction laws", LAWS_TEXT, optional("contactopt.problem.laws", "LAWS")),
-        "couplings": described(
-            "Couplings", COUPLINGS_TEXT, optional("contactopt.coupling.coupling", "COUPLINGS")
-        ),
-        "preconditioners": described("Preconditioners", PRECONDITIONERS_TEXT, PRECONDITIONERS),
-        "body_solvers": described("Solvers of the bodies", SOLVERS_TEXT, SOLVERS),
-        "backends": f"# Backends\n\n{BACKENDS_TEXT}\n{backends_tables()}",
+        "scenes": scenes_table(),
+        "methods": methods_table(),
+        "laws": described(LAWS),
+        "couplings": described(COUPLINGS),
+        "preconditioners": described(PRECONDITIONERS),
+        "body_solvers": described(SOLVERS),
+        "backends": backends_tables(),
     }
-    present = {name: page for name, page in pages.items() if page}
-    for name, page in present.items():
-        yield Path(f"{name}.md"), page
-    yield Path("plug_ins.md"), index("What can be chosen by its name", PLUG_INS_TEXT, list(present))
+    for name, page in pages.items():
+        yield Path(f"{name}.md"), f"{opening(name)}\n{page}"
+    yield Path("plug_ins.md"), opening("plug_ins") + contents(list(pages))
 
 
-PLUG_INS_TEXT = """Each of these pages is made from a table of the package, so it lists all that
-there is. A new entry costs one file and one line in its table: [how to add
-one](../contributing.md).
-"""
-
-
-def methods_index() -> str:
+def methods_table() -> str:
     rows = [(f"[{name}](methods/{name}.md)", what) for name, (_, _, what) in METHODS.items()]
-    text = f"{METHODS_TEXT}\n{table(('method', 'what it is'), rows)}"
-    return index("Methods", text, [f"methods/{name}" for name in METHODS], hidden=True)
+    pages = [f"methods/{name}" for name in METHODS]
+    return table(("method", "what it is"), rows) + contents(pages, hidden=True)
 
 
-METHODS_TEXT = """Every method is called by its name, `contactopt.solve(problem, "newton")`, and
-every answer of every method gets the same certificate. The letters and signs are those of [the
-mathematics](../mathematics.md).
-"""
-SCENES_TEXT = """A named scene is run by `contactopt run NAME` or `contactopt.run("NAME")`. Its
-arguments are those of the function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene
-with a load path is solved state by state.
-"""
-PRECONDITIONERS_TEXT = """A preconditioner is an approximate inverse of the compliance $Q$. It makes
-iterative methods short, where $Q$ is known by its products only. It is chosen by its name:
-`contactopt.run("punch-2d", preconditioner="neumann")`, or `--preconditioner neumann` on the command
-line.
-"""
-SOLVERS_TEXT = """A body solver solves the linear system of one elastic body. It is chosen by its
-name: `contactopt.run("punch-2d", solver="superlu")`, or `--solver superlu` on the command line. The
-default, `auto`, chooses by size.
-"""
-LAWS_TEXT = """A law says which forces a contact can carry, and how these forces depend on its
-motion. A scene names its law: `Scene(..., law="bilateral")`, or `Contact(..., law="bilateral")` for
-one pair of surfaces. The sections below come from the table of laws.
-"""
-COUPLINGS_TEXT = """A coupling says how the displacements of two contact surfaces make the relative
-displacements of the contacts. The default, `auto`, takes `matching` if the nodes of the two
-surfaces match, and `mortar` if they do not.
-"""
-BACKENDS_TEXT = """A backend is a solver of quadratic or cone programs that others wrote. (A
-quadratic program has a quadratic cost and linear constraints. A cone program may also bound the
-length of a vector.) A backend is chosen by its name: `contactopt.solve(problem, normal="osqp")`, or
-`--normal osqp` on the command line. The packages that do not come with contactopt are installed by
-`pip install 'contactopt[backends]'` or one by one.
-"""
-
-
-def optional(module: str, name: str) -> dict[str, tuple[str, str, str]]:
-    """A table of plug-ins, empty where the package has none of that kind."""
-    return getattr(importlib.import_module(module), name, {}) if find_spec(module) else {}
-
-
-def described(title: str, text: str, plug_ins: dict[str, tuple[str, str, str]]) -> str:
-    """A page made from a table name -> (module, name there, what it is), with the docstring of each
-    entry.
-    """
-    if not plug_ins:
-        return ""
+def described(plug_ins: dict[str, tuple[str, str, str]]) -> str:
+    """A table name -> (module, name there, what it is), and the docstring of each entry."""
     rows = [(f"`{name}`", what, f"`{module}`") for name, (module, _, what) in plug_ins.items()]
-    parts = [f"# {title}\n\n{text}\n{table(('name', 'what it is', 'module'), rows)}"]
+    parts = [table(("name", "what it is", "module"), rows)]
     for name, (module, attribute, _) in plug_ins.items():
         thing = getattr(importlib.import_module(module), attribute)
         parts.append(f"\n## {name}\n\n{as_block(inspect.getdoc(thing) or '')}")

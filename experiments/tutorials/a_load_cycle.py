@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 5. A load cycle and its hysteresis
+# # 4. A load cycle and its hysteresis
 #
 # Press a cylinder on a flat body. Push it sideways, but not so hard that it slides off. Then take
 # the push away. Does the cylinder come back to where it was? It does not, because friction has done

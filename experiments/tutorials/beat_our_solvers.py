@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 6. Add your own solver and beat ours
+# # 5. Add your own solver and beat ours
 #
 # You have an idea for an algorithm. How good is it? In this tutorial we write a method in 20 lines,
 # and compare it with the methods of the package in a benchmark. The package need not be changed for

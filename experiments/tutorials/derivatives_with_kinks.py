@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 8. The derivative of a solution, and its kinks
+# # 7. The derivative of a solution, and its kinks
 #
 # How does the contact force change if friction grows a little, or if the load does? Whoever fits a
 # friction coefficient to measurements, or shapes a punch so that its pressure is even, needs the

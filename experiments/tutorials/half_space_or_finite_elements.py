@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 9. Half-space or finite elements?
+# # 8. Half-space or finite elements?
 #
 # Seen from its contact, a large body looks like a half-space: everything below (or above) a plane
 # is elastic. A half-space needs no mesh, because it is known since Boussinesq (1885) how its
@@ -7,8 +7,8 @@
 # block, with finite elements and with a half-space. We compare what each costs for a given
 # accuracy. Then we make the block small, and see when the half-space is the wrong model.
 #
-# Reading time: 10 minutes. [From bodies to compliance](from_bodies_to_compliance.py) explains $Q$
-# for finite elements.
+# Reading time: 10 minutes. [Chapter 4](../course/chapter_4_from_bodies_to_the_interface.py) of
+# the course explains $Q$ for finite elements.
 
 # %%
 import time

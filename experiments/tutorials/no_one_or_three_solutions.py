@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 4. When friction has no solution, two or three
+# # 3. When friction has no solution, two or three
 #
 # A problem of elasticity has one solution if the bodies are supported, and so has contact without
 # friction. With friction this

@@ -229,7 +229,7 @@ for much in (0.5, 2.4, 2.6):
 # Two things must be told apart. At a slope of $-1$ this *iteration* stops converging. But the
 # solution stays unique, and other methods find it. At a slope of $+1$ the solution stops being
 # *unique*: there are loads with several solutions, whatever the method. [Tutorial
-# 4](no_one_or_three_solutions.py) shows both.
+# 3](no_one_or_three_solutions.py) shows both.
 
 # %% [markdown]
 # ## Both at once: an SOCP
@@ -443,7 +443,7 @@ Slider(
 #
 # </details>
 #
-# Next: [where Q comes from](from_bodies_to_compliance.py).
+# Next: [what Q does to waves](why_the_preconditioner_works.py).
 
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

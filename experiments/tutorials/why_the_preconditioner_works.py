@@ -1,14 +1,16 @@
 # %% [markdown]
-# # 3. The circulant preconditioner and why it works
+# # 2. What Q does to waves, and the preconditioner that undoes it
 #
-# [Tutorial 2](from_bodies_to_compliance.py) found what the compliance $Q$ does to a wave of force:
-# it makes a wave of displacement out of it, and divides it by the wave number $|\xi|$. If we
-# multiply a displacement by $|\xi|$, we nearly undo $Q$. The Fourier transform does this at almost
-# no cost. That is the whole idea. In this tutorial we write such a preconditioner in a few lines.
-# We compare it with those of a paper, A. Lotfi's *Domain-Decomposition based H^1/2 Seminorm
-# Preconditioners for Frictional Contact Problems*, and count iterations.
+# [Tutorial 1](one_contact_node.py) took the compliance $Q$ for granted.
+# [Chapter 4](../course/chapter_4_from_bodies_to_the_interface.py) of the course builds it from
+# elastic bodies, by eliminating everything that is not on the interface. In this tutorial we look
+# at its spectrum: $Q$ makes a wave of displacement out of a wave of force, and divides it by the
+# wave number $|\xi|$. If we multiply a displacement by $|\xi|$, we nearly undo $Q$. The Fourier
+# transform does this at almost no cost. We write such a preconditioner in a few lines. We compare
+# it with those of a paper, A. Lotfi's *Domain-Decomposition based H^1/2 Seminorm Preconditioners
+# for Frictional Contact Problems*, and count iterations.
 #
-# Reading time: 10 minutes. You need the conjugate gradient method (CG) and the discrete Fourier
+# Reading time: 15 minutes. You need the conjugate gradient method (CG) and the discrete Fourier
 # transform (FFT).
 
 # %%
@@ -21,12 +23,12 @@ from contactopt.meshes.structured import graded, rename, tensor_mesh
 from contactopt.methods.preconditioners import preconditioner
 
 # %% [markdown]
-# ## The problem of size
+# ## Two blocks
 #
-# We take the two blocks of tutorial 2: a punch, 4 mm wide and 4 mm high, stands on a foundation, 16
-# mm wide and 8 mm high. We ask CG for the forces $r$ that close a given gap $b$, that is, for the
-# solution of $Q r = b$. All nodes are in contact here, and there is no inequality. Every contact
-# solver has such a linear system inside.
+# A punch, 4 mm wide and 4 mm high, stands on a foundation, 16 mm wide and 8 mm high. Both are 1 mm
+# thick, measured perpendicular to the plane, and both are made of the same rubber. The punch is
+# held at its top, and the foundation is clamped at its bottom. The meshes are fine at the interface
+# and coarse away from it, because stresses that vary fast along the surface fade quickly below it.
 
 
 # %%
@@ -50,6 +52,137 @@ def two_blocks(nodes):
     return reduce(Scene("two blocks", upper, lower, mu=0.5))
 
 
+problem = two_blocks(33)
+Q, nodes = problem.Q, problem.contacts
+
+# %% [markdown]
+# ## What Q looks like
+#
+# Take the normal block $Q_{nn}$. Each of its columns is the dent that a unit force at one node
+# makes. The dent is deepest where the force acts. It is about twice as deep if the force acts at an
+# edge. Away from the force the dent falls off slowly, so that every node feels all others.
+
+# %%
+Q_nn = Q[::2, ::2]
+values, vectors = np.linalg.eigh(Q_nn)
+values, vectors = values[::-1], vectors[:, ::-1]  # softest first
+x = problem.coordinates[0]
+
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.4, 3.8), layout="constrained"
+)
+for column in (0, 16, 24):
+    left.plot(x, Q_nn[:, column], label=f"force at x = {x[column]:g} mm")
+left.set(xlabel="x [mm]", ylabel="normal displacement [mm/N]")
+left.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+for j in (0, 1, 2, 5):
+    right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"number {j}")
+right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]")
+right.legend(
+    frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+)
+
+assert np.array_equal(np.argmax(Q_nn, axis=0), np.arange(nodes))
+assert Q_nn[0, 0] > 1.8 * Q_nn[16, 16]
+
+# %% [markdown]
+# The eigenvectors are waves. Eigenvector number $j$ changes its sign exactly $j$ times, like
+# $\cos(j \pi x / L)$ on a line of length $L$. The longest wave belongs to the largest eigenvalue:
+# it is the softest.
+
+# %%
+changes = [np.sum(np.diff(np.sign(v)) != 0) for v in vectors.T]
+assert changes == list(range(nodes))
+
+# %% [markdown]
+# ## The law behind it
+#
+# Press on an elastic half-plane with a pressure that is a wave, $\cos(\xi x)$. The surface sinks by
+# the same wave, multiplied by $2 (1-\nu^2) / (E\,|\xi|)$. Short waves are stiff, because they
+# strain only a thin layer. The factors of two bodies add up to
+#
+# $$ \frac{2}{E^*} \frac{1}{|\xi|}, \qquad \frac1{E^*} = \frac{1-\nu_1^2}{E_1} + \frac{1-\nu_2^2}{E_2} . $$
+#
+# So $Q$ divides the wave with wave number $\xi$ by $|\xi|$. It makes functions smoother, about as
+# much as one integration does. Displacements have one derivative more than tractions; in the
+# language of Sobolev spaces, $Q$ maps $H^{-1/2}$ to $H^{1/2}$.
+#
+# Our bodies are finite. Still, wave number $j$ has about $\xi_j = j \pi / L$, and a nodal force is
+# the pressure times the spacing $h$ of the nodes. So we predict the eigenvalues $2 / (E^* h\,
+# \xi_j)$.
+
+# %%
+modulus = 1 / (2 * (1 - 0.3**2) / 5.0)  # E*, MPa
+
+
+def predicted(count):
+    return 2 / (modulus * (4 / (count - 1)) * np.arange(1, count) * np.pi / 4)
+
+
+fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
+for count, marker in ((17, "s"), (33, "o"), (65, "^")):
+    eigenvalues = np.linalg.eigvalsh(two_blocks(count).Q[::2, ::2])[::-1]
+    ax.loglog(
+        np.arange(1, count),
+        eigenvalues[1:] * 4 / (count - 1),
+        marker,
+        ms=4,
+        mfc="none",
+        label=f"{count} nodes",
+    )
+    assert np.all(
+        np.abs(
+            eigenvalues[2 : count // 4] / predicted(count)[1 : count // 4 - 1]
+            - 1
+        )
+        < 0.25
+    )
+ax.loglog(
+    np.arange(1, 65),
+    predicted(65) * 4 / 64,
+    "k--",
+    lw=1,
+    label=r"half-planes, $2 / (E^* \xi_j)$",
+)
+ax.set(
+    xlabel="number j of the wave [-]",
+    ylabel=r"eigenvalue of $Q_{nn}$ times h [mm$^2$/N]",
+)
+_ = ax.legend(frameon=False)
+
+# %% [markdown]
+# On every mesh we see a straight line of slope $-1$. It bends only where the waves are too short
+# for the mesh. Each refinement adds shorter waves at the stiff end and changes nothing at the soft
+# end. So the condition number, which is the largest eigenvalue over the smallest, is proportional
+# to the number of nodes:
+
+# %%
+conditions = []
+for count in (17, 33, 65):
+    fine = two_blocks(count).Q
+    conditions.append([np.linalg.cond(fine[::2, ::2]), np.linalg.cond(fine)])
+    print(
+        f"{count} nodes: condition {conditions[-1][0]:.1f} of the normal block,"
+        f" {conditions[-1][1]:.0f} of all Q"
+    )
+growth = np.array(conditions)[1:] / np.array(conditions)[:-1]
+
+assert np.all((growth > 1.9) & (growth < 2.1))
+
+# %% [markdown]
+# The condition number of the whole $Q$ is about ten times that of its normal block, but it grows at
+# the same rate. The main reason is one more soft motion: the punch, which is held at its top, can
+# sway sideways.
+
+# %% [markdown]
+# ## The problem of size
+#
+# We ask CG for the forces $r$ that close a given gap $b$, that is, for the solution of $Q r = b$.
+# All nodes are in contact here, and there is no inequality. Every contact solver has such a linear
+# system inside.
+
+
+# %%
 def iterations(Q, P=None):
     residuals = []
     b = np.random.default_rng(0).normal(size=len(Q))
@@ -348,6 +481,20 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 # P = preconditioner(problem, "p21")
 # exact_on_smooth = deflated(P, problem.Q, smooth_motions(problem))
 # assert iterations(problem.Q, exact_on_smooth) < counts["p21"][nodes]
+# ```
+#
+# </details>
+
+# **4.** $Q$ is dense. How many numbers does it hold for a 3D interface of 100 x 100 nodes? How can a product $Q r$ be computed without forming $Q$?
+#
+# <details><summary>Solution</summary>
+#
+# It holds $(3 \cdot 10^4)^2 = 9 \cdot 10^8$ numbers, which take 7 GB. A product $Q r$ does not need
+# $Q$ itself: one forward and one backward substitution with the factors of each body are enough,
+# and `reduce(scene, Q="implicit")` gives a $Q$ that is known by such products.
+#
+# ```python
+# assert (3 * 100 * 100) ** 2 * 8 / 1e9 > 7
 # ```
 #
 # </details>

@@ -25,7 +25,7 @@ def test_associated_projects_onto_the_cone_and_opens() -> None:
 
 
 def test_springs_scale_the_associated_answer() -> None:
-    assert np.allclose(laws.compliant(contact(), 0.25)[0], [[1.28, 0.64, 0]], atol=1e-6)
+    assert np.allclose(laws.associated(contact(), 0.25)[0], [[1.28, 0.64, 0]], atol=1e-6)
 
 
 @pytest.mark.parametrize(

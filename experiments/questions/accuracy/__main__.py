@@ -20,13 +20,13 @@ from experiments.questions.accuracy.measured import (
     stick,
 )
 from experiments.questions.accuracy.sheared import SHEARS, sheared
-from experiments.report import figures_alone, save_figures, stored, template, write
+from experiments.report import Tables, measure, template
 
 
-def draw_effectivity(rows: list[dict[str, Any]]) -> Any:
+def draw_effectivity(tables: Tables) -> dict[str, Any]:
     figure, (ax,) = paper_axes(height=3.0)
     for quantity, mark in zip(("pressure", "width", "approach", "energy", "stick"), MARKS):
-        chosen = [row for row in rows if row["quantity"] == quantity]
+        chosen = [row for row in tables["effectivity"] if row["quantity"] == quantity]
         true = [abs(float(row["true error"])) for row in chosen]
         ax.loglog(true, [row["estimate"] for row in chosen], mark, mfc="white", label=quantity)
     ends = np.array([5e-5, 2e-2])
@@ -35,44 +35,26 @@ def draw_effectivity(rows: list[dict[str, Any]]) -> Any:
     ax.loglog(ends, ends, color=GREY, lw=0.8)
     ax.set(xlabel="true relative error [-]", ylabel="estimated relative error [-]")
     add_legend(ax)
-    return figure
+    return {"effectivity": figure}
 
 
-def judged(rows: list[dict[str, object]]) -> str:
-    values = [float(row["effectivity"]) for row in rows]  # type: ignore[arg-type]
+def text(tables: Tables) -> str:
+    values = [row["effectivity"] for row in tables["effectivity"]]
     inside = sum(0.5 <= value <= 4 for value in values)
-    return (
+    judged = (
         f"{inside} of {len(values)} lie between .5 and 4, the least is {min(values):.2f}, the"
         f" largest {max(values):.2f}"
     )
-
-
-TEXT = template(__file__)
-
-
-def main() -> None:
-    if figures_alone():
-        drawn = {"effectivity": draw_effectivity(stored("accuracy", "effectivity"))}
-        return save_figures("accuracy", drawn)
-    table = [hertz(name, elements) for name in KINDS for elements in (SMALL, MODEST)]
-    effective = all_effectivities()
-    sizes, factor = finite_sizes()
-    text = TEXT.format(
-        judged=judged(effective),
-        size_elements=32,
-        factor=factor,
-    )
-    tables = {
-        "effectivity": effective,
-        "hertz": table,
-        "stick": [stick(kind, mu) for kind in KINDS.values() for mu in FRICTION],
-        "locking": [locking(nu, mu) for nu, mu in LOCKING],
-        "cattaneo": [sheared(dim, shear) for dim, shears in SHEARS.items() for shear in shears],
-        "finite": sizes,
-    }
-    figures = {"effectivity": draw_effectivity(effective)}
-    write("accuracy", "Accuracy and what it costs", text, tables, figures)
+    return template(__file__).format(judged=judged, factor=tables["finite"][0]["C"])
 
 
 if __name__ == "__main__":
-    main()
+    tables = {
+        "effectivity": all_effectivities,
+        "hertz": lambda: [hertz(name, n) for name in KINDS for n in (SMALL, MODEST)],
+        "stick": lambda: [stick(kind, mu) for kind in KINDS.values() for mu in FRICTION],
+        "locking": lambda: [locking(nu, mu) for nu, mu in LOCKING],
+        "cattaneo": lambda: [sheared(dim, shear) for dim, own in SHEARS.items() for shear in own],
+        "finite": finite_sizes,
+    }
+    measure("accuracy", "Accuracy and what it costs", text, tables, draw_effectivity)

@@ -119,55 +119,44 @@ def all_effectivities() -> list[dict[str, object]]:
         ]
 
 
-def finite(size: float) -> dict[str, object]:
-    """Errors of a block `size` half-widths high and wide, less those of the largest block."""
-    row: dict[str, object] = {"size / a": size}
-    begin = time.perf_counter()
-    for name, scene in (
-        ("point", indenter(KINDS["point"], size=size)),
-        ("line", indenter(KINDS["line"], size=size)),
-        ("strip", flat(KINDS["line"], 0.3, size=size)),
-    ):
+READ = {
+    "point": ("pressure", "width", "approach"),
+    "line": ("pressure", "width"),
+    "strip": ("stick",),
+}
+
+
+def finite(size: float) -> dict[str, float]:
+    """What is read off blocks `size` half-widths high and wide."""
+    blocks = {name: indenter(kind, size=size) for name, kind in KINDS.items()}
+    blocks["strip"] = flat(KINDS["line"], 0.3, size=size)
+    found = {}
+    for name, scene in blocks.items():
         solved = solve_zone(scene, 32)
-        reduction, solution = solved.reduction, solved.solution
-        for quantity in (
-            ("pressure", "width", "approach") if name == "point" else ("pressure", "width")
-        ):
-            if name != "strip":
-                row[f"{name}, {quantity}"] = value_of(quantity, reduction, solution)
-        if name == "strip":
-            row["strip, c / a"] = value_of("stick", reduction, solution)
-        else:
-            row[f"{name}, unknowns"] = reduction.dofs
-    row["seconds"] = time.perf_counter() - begin
-    return row
+        found |= {f"{name}, unknowns": float(solved.reduction.dofs)}
+        for quantity in READ[name]:
+            found[f"{name}, {quantity}"] = value_of(quantity, solved.reduction, solved.solution)
+    return found
 
 
-def finite_sizes() -> tuple[list[dict[str, object]], float]:
-    """The table, and C in the correction of the approach, C force / (E* size)."""
-    rows = [finite(size) for size in SIZES]
-    last = dict(rows[-1])
-    force, modulus = 20.0, contact_modulus(MATERIAL)
-    lacking = float(last["point, approach"]) - float(rows[2]["point, approach"])  # type: ignore[arg-type]
-    scene = indenter(KINDS["point"])
-    factor = lacking / (force / (modulus * SIZES[2] * scene.reference.half_width))
-    for row in rows:
-        correction = (
-            factor * force / (modulus * float(row["size / a"]) * scene.reference.half_width)
-        )  # type: ignore[arg-type]
-        row["point, approach corrected"] = (
-            float(row["point, approach"]) + correction
-        ) / scene.reference.approach - 1  # type: ignore[arg-type]
-        for key in (
-            "point, pressure",
-            "point, width",
-            "point, approach",
-            "line, pressure",
-            "line, width",
-        ):
-            row[key] = float(row[key]) / float(last[key]) - 1  # type: ignore[arg-type]
-        row["strip, c / a"] = float(row["strip, c / a"]) - float(last["strip, c / a"])  # type: ignore[arg-type]
-    return rows, factor
+def finite_sizes() -> list[dict[str, object]]:
+    """Deviations from the largest block; of the stick zone, the absolute one. C is that of the
+    correction of the approach, C force / (E* size), found from the third size.
+    """
+    found = {size: finite(size) for size in SIZES}
+    last, approach = found[SIZES[-1]], "point, approach"
+    reference = indenter(KINDS["point"]).reference
+    unit = 20.0 / (contact_modulus(MATERIAL) * reference.half_width)  # force / (E* a)
+    C = (last[approach] - found[SIZES[2]][approach]) * SIZES[2] / unit
+    rows: list[dict[str, object]] = []
+    for size, own in found.items():
+        row: dict[str, object] = {"size / a": size}
+        for key, value in own.items():
+            row[key] = int(value) if "unknowns" in key else value / last[key] - 1
+        row["strip, stick"] = own["strip, stick"] - last["strip, stick"]
+        corrected = (own[approach] + C * unit / size) / reference.approach - 1
+        rows.append(row | {"point, approach corrected": corrected, "C": C})
+    return rows
 
 
 def stick(kind: str, mu: float) -> dict[str, object]:

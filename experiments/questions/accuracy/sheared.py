@@ -47,12 +47,6 @@ def error(value: np.ndarray, exact: np.ndarray, areas: np.ndarray) -> float:
     return float(np.sqrt(np.sum(areas * (value - exact) ** 2) / np.sum(areas * exact**2)))
 
 
-def loop_area(history: dict[str, np.ndarray], first: int) -> float:
-    """Integral of the shear force over the shift from state `first` on, by the trapezoidal rule."""
-    force, shift = history["shear_force"][first:], history["shift"][first:]
-    return float(np.sum((force[1:] + force[:-1]) / 2 * np.diff(shift)))
-
-
 def exact_loss(dim: int, scene: Scene, shear: float) -> float:
     assert isinstance(scene.upper, Part)
     material = scene.upper.material

@@ -2,14 +2,12 @@
 
 `python -m experiments.questions.ways` measures all ways on both families of meshes. The costs of
 contactopt.coupling.costs are fitted to the family `fit`, and the choice is judged by the family
-`judge`. The command with the name of a family measures this one alone, with `missing` it measures
-the scenes that were not measured before, and with `none` it only fits and judges.
+`judge`. `times`, `judges` and `prices` after the command choose a table alone.
 """
 
 from __future__ import annotations
 
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -23,23 +21,12 @@ from contactopt.bodies import assemble
 from contactopt.bodies.assembled import Work
 from contactopt.bodies.solvers import solvers_there
 from contactopt.coupling.costs import COSTS, FORM_OF, terms
-from experiments.questions.ways.unprepared import FAMILIES, Case, cases, scene, warm
-from experiments.report import stored, template, write
+from experiments.questions.ways.unprepared import Case, cases, scene, warm
+from experiments.report import Tables, measure, stored, template
 
 LIMIT = 60.0  # CPU seconds after which a way is given up
 SHORT, REPEATS = 0.5, 2  # the least of so many runs counts if the first one takes less seconds
 WITHIN = 1.3  # times the best way that a good choice takes
-
-TEXT = template(__file__)
-
-FITTED = """
-The prices, how far the estimates are off on the scenes to which they were fitted, and the times
-there:
-
-{{prices}}
-
-{{times}}
-"""
 
 
 def timed(made: Scene, Q: str, solver: str) -> tuple[float, str]:
@@ -129,48 +116,45 @@ def fitted(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
-def judged(rows: list[dict[str, Any]]) -> list[str]:
-    """What the choice costs, over the best way; each row gets its ratio."""
+def measured_all(family: str) -> list[dict[str, Any]]:
+    """All scenes of a family; what is imported and compiled at first is nobody's time."""
+    for small in warm():
+        for way, solver in COSTS:
+            if solver in solvers_there():
+                timed(small, FORM_OF[way], solver)
+    rows = []
+    for case in cases(family):
+        rows.append(measured(case))
+        print(rows[-1], flush=True)
+    return rows
+
+
+def judges() -> list[dict[str, Any]]:
+    """The scenes by which the choice is judged, with what it costs over the best way."""
+    rows = measured_all("judge")
     ways = [" ".join(way) for way in COSTS if any(row.get(" ".join(way)) for row in rows)]
     for row in rows:
         row["best"] = min(ways, key=lambda way: float(row[way]))
         row["auto / best"] = round(float(row["auto"]) / float(row[row["best"]]), 2)
-    ratios = np.array([row["auto / best"] for row in rows])
-    solvers = " and ".join(sorted({way.split()[1] for way in ways}))
-    return [
-        f"- On {len(rows)} scenes the choice takes {np.median(ratios):.2f} times the best way in"
-        f" the median and {ratios.max():.2f} times at worst, its own cost included. On"
-        f" {np.count_nonzero(ratios <= WITHIN)} of them it takes at most {WITHIN} times.",
-        f"- The solvers of the bodies are {solvers}.",
-    ]
+    return rows
 
 
-def main(arguments: list[str]) -> None:
-    known = stored("ways", "times") + stored("ways", "judges")
-    measure = [name for name in FAMILIES if not arguments or name in arguments]
-    of = {
-        name: [row for row in known if row["family"] == name and name not in measure]
-        for name in FAMILIES
-    }
-    measure = list(FAMILIES) if "missing" in arguments else measure
-    for small in warm() if measure else ():
-        for way, solver in COSTS:
-            if solver in solvers_there():
-                timed(small, FORM_OF[way], solver)
-    with suppress(KeyboardInterrupt):  # what was measured until then is written
-        for family in measure:
-            there = {row["scene"] for row in of[family]}
-            for case in cases(family):
-                if case.name not in there:
-                    of[family].append(measured(case))
-                    print(of[family][-1], flush=True)
-    findings = "\n".join(judged(of["judge"]))
-    tables, text = {"judges": of["judge"]}, TEXT.format(limit=LIMIT, findings=findings)
-    if of["fit"]:
-        tables |= {"prices": fitted(of["fit"]), "times": of["fit"]}
-        text += FITTED.format()
-    write("ways", "Which way to the solution", text, tables, {})
+def text(tables: Tables) -> str:
+    ratios = np.array([row["auto / best"] for row in tables["judges"]])
+    return template(__file__).format(
+        limit=LIMIT,
+        count=len(ratios),
+        median=np.median(ratios),
+        worst=ratios.max(),
+        good=np.count_nonzero(ratios <= WITHIN),
+        within=WITHIN,
+    )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    tables = {
+        "judges": judges,
+        "times": lambda: measured_all("fit"),
+        "prices": lambda: fitted(stored("ways", "times")),
+    }
+    measure("ways", "Which way to the solution", text, tables)

@@ -21,7 +21,6 @@ from contactopt.figures.style import LETTERS, draw_lines, paper_axes
 from contactopt.readings.quantities import value_of
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
-from experiments.questions import elements as bricks
 from experiments.questions.accuracy.half_space import flat, indenter
 from experiments.questions.whole_way.ours import (
     FINEST,
@@ -32,6 +31,7 @@ from experiments.questions.whole_way.ours import (
     cattaneo,
     half_space,
     meshed,
+    quarter,
     rough,
     tamaas,
 )
@@ -67,7 +67,7 @@ def runs() -> Iterator[tuple[str, str, float, Callable[[], Row]]]:
             graded = indenter("axisymmetric", LARGE, n)
             yield "Hertz, point", form, n, lambda s=graded, f=form: meshed(s, both, f)
     for n in (2, 3, 4):
-        solid = bricks.scene(3, n, 1, "Q")
+        solid = quarter(n)
         yield "Hertz, point", "space, linear", n, lambda s=solid: meshed(s, ("peak",))
     for n in (16, 32, 64, 128):
         yield "Hertz, point", "half-space", n, lambda p=n: half_space(p)

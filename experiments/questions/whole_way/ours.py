@@ -14,13 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from contactopt import HalfSpace, Scene, reduce_bodies, scenes, solve
+from contactopt import HalfSpace, Part, Rigid, Scene, Support, reduce_bodies, scenes, solve
 from contactopt.accuracy import refine
-from contactopt.analytic import contact_modulus
+from contactopt.analytic import contact_modulus, hertz_point
+from contactopt.meshes.structured import patch, rename, simplices, tensor_mesh
 from contactopt.readings.half_space_readings import surface_contact
 from contactopt.readings.quantities import value_of
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
+from experiments.questions.accuracy.half_space import MATERIAL
 from experiments.questions.half_spaces.rough import LENGTH, TAMAAS, gap_of, pressed
 from experiments.questions.half_spaces.rough import MATERIAL as ROUGH
 
@@ -80,7 +82,8 @@ def half_space(points: int) -> Row:
 
     seconds, (problem, solution) = timed(act)
     pressure = solution.reactions[:, 0] / problem.areas
-    values = round_contact(np.linalg.norm(problem.chart.places, axis=0), pressure, scene)
+    distance = np.linalg.norm(problem.chart.places, axis=0)
+    values = round_contact(distance, pressure, scene.reference.half_width)
     values["approach"] = -float(solution.multipliers[0])
     return {"unknowns": 3 * problem.contacts, "seconds": seconds} | relative(values, scene)
 
@@ -94,14 +97,17 @@ def box_scene(points: int) -> Scene:
     return replace(scene, lower=replace(scene.lower, points=(ticks, ticks)))
 
 
-def round_contact(distance: np.ndarray, pressure: np.ndarray, scene: Scene) -> dict[str, float]:
-    """Peak and radius of p^2 = p0^2 (1 - r^2 / a^2), fitted inside and near the edge."""
-    a = scene.reference.half_width
-    inner = distance < 0.5 * a
-    edge = (distance > 0.5 * a) & (distance < 0.95 * a)
-    top = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, 2)[-1]
-    slope, at = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
-    return {"peak": float(np.sqrt(top)), "width": float(np.sqrt(-at / slope))}
+def round_contact(distance: np.ndarray, pressure: np.ndarray, a: float) -> dict[str, float]:
+    """Peak and half-width of p^2 = p0^2 (1 - r^2 / a^2), fitted inside and near the edge of about
+    a; nan where too few points say it.
+    """
+    inner, edge = distance < 0.5 * a, (distance > 0.5 * a) & (distance < 0.95 * a)
+    degree, width = min(2, int(inner.sum()) - 1), np.nan
+    top = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, degree)[-1]
+    if edge.sum() > 2:
+        slope, at = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
+        width = float(np.sqrt(-at / slope))
+    return {"peak": float(np.sqrt(top)), "width": width}
 
 
 def in_tamaas(python: str, gap: np.ndarray, **given: Any) -> tuple[float, np.ndarray]:
@@ -126,8 +132,40 @@ def tamaas(points: int, python: str) -> Row:
     seconds, pressure = in_tamaas(
         python, gap, length=side, pressure=force / side**2, modulus=modulus
     )
-    values = round_contact(np.linalg.norm(places, axis=0), pressure, scene)
+    values = round_contact(np.linalg.norm(places, axis=0), pressure, exact.half_width)
     return {"unknowns": points**2, "seconds": seconds} | relative(values, scene)
+
+
+def quarter(n: int, degree: int = 1, cut: bool = False) -> Scene:
+    """A rigid sphere on a quarter of a half-space of 20 contact radii, without friction.
+
+    n    elements across the contact radius 1, next to it; they grow by 1 + 4 / n away from it
+    cut  whether bricks are cut into tetrahedra
+    """
+    modulus, radius, near = contact_modulus(MATERIAL), 50.0, n + max(2, n // 4)
+    force = 4 * modulus / (3 * radius)
+
+    def beyond(start: np.ndarray) -> np.ndarray:
+        count = int(np.ceil(np.log1p((20.0 - start[-1]) * 4) / np.log1p(4 / n)))
+        far = np.cumsum((1 + 4 / n) ** np.arange(1.0, count + 1))
+        return np.concatenate([start, start[-1] + far * (20.0 - start[-1]) / far[-1]])
+
+    across, depth = beyond(np.arange(near + 1) / n), beyond(np.arange(n + 1) / n)
+    mesh = rename(tensor_mesh(across, across, -depth[::-1]), bottom="z-", top="z+")
+    mesh = patch(mesh, "top", "contact", [across[near]] * 2)
+    mesh = simplices(mesh) if cut else mesh
+    held = Support("x-", {"x": 0.0}), Support("y-", {"y": 0.0}), Support("bottom")
+    tip = Rigid(
+        "sphere",
+        (0.0, 0.0, 1.0),
+        lambda x: (x[0] ** 2 + x[1] ** 2) / (2 * radius),
+        {"z": -force},
+    )
+    body = Part("half-space", mesh, MATERIAL, held)
+    exact = hertz_point(force, radius, modulus)
+    return Scene(
+        "quarter", tip, body, 0.0, "solid", copies=4, degree=degree, zone=1.0, reference=exact
+    )
 
 
 @cache

@@ -13,8 +13,6 @@ the block.
 from __future__ import annotations
 
 import os
-import re
-import resource
 import shutil
 import subprocess
 import tempfile
@@ -33,6 +31,8 @@ from contactopt.meshes.structured import tensor_mesh
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL, indenter
+from experiments.questions.calculix import run
+from experiments.questions.whole_way.ours import round_contact
 
 FLATTER = 100.0
 REFINED = 4  # faces of the indenter over one of the block
@@ -83,8 +83,7 @@ def calculix(model: Model) -> tuple[np.ndarray, float]:
     The deck is that of `contactopt export`. The pressure is made of nodal forces, which are the
     stiffness times the displacements that ccx prints.
     """
-    program = shutil.which("ccx")
-    if program is None:
+    if shutil.which("ccx") is None:
         raise InputError("ccx is not installed: apt-get install calculix-ccx.")
     top = model.x[-1]
     on = {"contact": lambda x: (x[1] == 0) & (x[0] < top), "axis": lambda x: x[0] == 0}
@@ -101,19 +100,11 @@ def calculix(model: Model) -> tuple[np.ndarray, float]:
     )  # fmt: skip
     pair = Contact("indenter", "block", 0.0, carrier="lower")
     scene = Scene("hertz", bodies=bodies, contacts=(pair,), kind="plane-strain", copies=2)
-    with tempfile.TemporaryDirectory() as name:
-        (Path(name) / "job.inp").write_text(deck(scene))
-        before = _children()
-        done = subprocess.run([program, "job"], cwd=name, env=_one_thread(), timeout=LIMIT,
-                              capture_output=True, text=True)  # fmt: skip
-        seconds = _children() - before
-        if "Job finished" not in done.stdout:
-            raise RuntimeError(f"ccx ended with code {done.returncode}")
-        printed = (Path(name) / "job.dat").read_text()
-    table = re.split(r"\n *displacements .*\n\n", printed)[-1].split("\n\n")[0]
-    rows = np.array([line.split()[:3] for line in table.splitlines()], dtype=float)
+    printed, _, seconds = run(deck(scene))
+    if not len(printed):
+        raise RuntimeError("ccx did not carry the whole load")
     first = tip.p.shape[1]
-    u = rows[first : first + block.p.shape[1], 1:].T
+    u = printed[first : first + block.p.shape[1], :2].T
     basis = skfem.Basis(block, skfem.ElementVector(skfem.ElementQuad1()))
     K = linear_elasticity(*lame_parameters(MATERIAL.E, MATERIAL.nu)).assemble(basis)
     moved = np.zeros(basis.N)
@@ -126,7 +117,7 @@ def calculix(model: Model) -> tuple[np.ndarray, float]:
 def other(code: str) -> Callable[[Model], tuple[np.ndarray, float]]:
     """The peer `code`, whose script stands beside this file and runs in a Python of its own."""
 
-    def run(model: Model) -> tuple[np.ndarray, float]:
+    def solved(model: Model) -> tuple[np.ndarray, float]:
         line, variable, usual = PYTHONS[code]
         python = os.environ.get(variable, usual)
         tip = model.indenter
@@ -136,8 +127,8 @@ def other(code: str) -> Callable[[Model], tuple[np.ndarray, float]]:
         with tempfile.TemporaryDirectory() as name:
             np.savez(Path(name) / "given.npz", **given, **model.nodes)
             command = [python, str(HERE / f"{code.lower()}_hertz.py"), "given.npz", "answer.npz"]
-            done = subprocess.run(command, cwd=name, env=_one_thread(), timeout=LIMIT,
-                                  capture_output=True, text=True)  # fmt: skip
+            done = subprocess.run(command, cwd=name, timeout=LIMIT, capture_output=True,
+                                  text=True)  # fmt: skip
             answer = Path(name) / "answer.npz"
             if not answer.exists():
                 last = "".join((done.stderr or done.stdout).strip().splitlines()[-1:])
@@ -146,7 +137,7 @@ def other(code: str) -> Callable[[Model], tuple[np.ndarray, float]]:
             found = np.load(answer)
             return found["pressure"], float(found["seconds"])
 
-    return run
+    return solved
 
 
 CODES: dict[str, Callable[[Model], tuple[np.ndarray, float]]] = {
@@ -164,26 +155,9 @@ def hertz_line(code: str, elements: int, size: float) -> dict[str, Any]:
     load = 2 * float(np.trapezoid(pressure, model.x))
     exact = model.scene.reference
     share = np.sqrt(load / abs(float(model.scene.upper.force["y"])))
-    a = exact.half_width * share
-    inner, edge = model.x < 0.5 * a, (model.x > 0.5 * a) & (model.x < 0.95 * a)
-    degree = min(2, int(inner.sum()) - 1)
-    peak = np.sqrt(np.polyfit(model.x[inner] ** 2, pressure[inner] ** 2, degree)[-1])
-    width = np.nan
-    if edge.sum() > 2:
-        slope, at = np.polyfit(model.x[edge] ** 2, pressure[edge] ** 2, 1)
-        width = float(np.sqrt(-at / slope) / a - 1)
-    return {
-        "unknowns": model.block.p.size,
-        "seconds": seconds,
-        "peak": float(peak / (exact.peak * share) - 1),
-        "width": width,
+    found = round_contact(model.x, pressure, exact.half_width * share)
+    errors = {
+        "peak": found["peak"] / (exact.peak * share) - 1,
+        "width": found["width"] / (exact.half_width * share) - 1,
     }
-
-
-def _one_thread() -> dict[str, str]:
-    return os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-
-
-def _children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    return {"unknowns": model.block.p.size, "seconds": seconds} | errors

@@ -1,1 +1,0 @@
-"""What may be left out of a scene before it is solved, and what does that save?"""
