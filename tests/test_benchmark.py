@@ -380,7 +380,6 @@ def identity(contacts=2):
     text = """
         name = "x"
         plugins = ["mine.py"]
-        starts = ["cold", "warm"]
         [[problems]]
         family = "identity"
         contacts = {from = 1, to = 100, steps = 3, scale = "log"}
@@ -475,7 +474,7 @@ def test_associated_friction_has_its_own_certificate():
 def test_a_worker_stays_with_its_problem():
     experiment = [
         Task(
-            Run(problems.ProblemSpec("family", name), MethodSpec("auto"), "mid", 1e-6, "cold", i),
+            Run(problems.ProblemSpec("family", name), MethodSpec("auto"), "mid", 1e-6, i),
             "",
             (),
             1,
@@ -574,10 +573,8 @@ def test_threads_are_pinned(tmp_path):
 def test_a_worker_process_outlives_failures_that_leave_it_intact(tmp_path):
     with Worker() as worker:
         spec = problems.ProblemSpec("family", "rigid_bodies", {"bodies": 3, "contacts": 4})
-        task = Task(
-            Run(spec, MethodSpec("lemke"), "mid", 1e-6, "cold", 0), "x", (), 5.0, 4.0, 100, 0
-        )
+        task = Task(Run(spec, MethodSpec("lemke"), "mid", 1e-6, 0), "x", (), 5.0, 4.0, 100, 0)
         first = worker.run(task)
-        pid = worker.solver.number
+        pid = worker.solver.process.pid
         assert first["status"] == "refused" and first["fingerprint"]
-        assert worker.run(task)["status"] == "refused" and worker.solver.number == pid
+        assert worker.run(task)["status"] == "refused" and worker.solver.process.pid == pid

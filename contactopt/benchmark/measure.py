@@ -58,7 +58,6 @@ def blank(task: Task) -> dict[str, Any]:
         "setting": run.setting,
         "tolerance": run.tolerance,
         "time_limit": task.time_limit,
-        "start": run.start,
         "repeat": run.repeat,
         "status": "error",
         "residual": np.inf,

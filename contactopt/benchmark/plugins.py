@@ -23,7 +23,7 @@ from contactopt.methods import METHODS
 GROUP = "contactopt.methods"  # of entry points
 LAWS = ("coulomb", "associated")
 # to a plug-in, if it has such an argument
-PASSED = ("tol", "time_limit", "max_iterations", "start")
+PASSED = ("tol", "time_limit", "max_iterations")
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,9 @@ def method(
     The declaration counts where a campaign runs the file. Everywhere else the function or class is
     returned as it is.
 
-    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s],
-    `max_iterations` and `start` (a Solution or None) are passed if it has such arguments, `tol` not
-    at the setting "default" if it has a default. It returns reactions (k, dim), or (reactions,
+    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s] and
+    `max_iterations` are passed if it has such arguments, `tol` not at the setting "default" if it
+    has a default. It returns reactions (k, dim), or (reactions,
     multipliers), or a Solution, or an Answer. Returning forces claims success; raising does not,
     and InputError means that the problem is not one for this method.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections import deque
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -85,12 +84,8 @@ class Worker:
         try:
             row |= judge(task, self.problem, self._answer(task))
         except Ended as end:
-            row |= {"status": end.status, "message": str(end)}
-            row["call_seconds"] = time.perf_counter() - begin
-            if end.phase == "neighbour":
-                how = f"{end.status} while its warm start was sought: {end}"
-                row |= {"status": "not_built", "message": how}
-            return row
+            spent = time.perf_counter() - begin
+            return row | {"status": end.status, "message": str(end), "call_seconds": spent}
         # a peer fails in its own process
         alone = task.run.method.foreign and not task.run.method.peer
         if alone and not row["success"] and row["status"] != "refused":
@@ -153,7 +148,7 @@ class Worker:
         return answer
 
     def _prepare(self, task: Task) -> None:
-        """Give the process the problem, a warm start if asked for, and the method's imports."""
+        """Give the process the problem, and let it import what the method needs."""
         method, dim = task.run.method, self.problem.dim
         if not self.solver.running:
             self._forget()
@@ -161,8 +156,6 @@ class Worker:
             given = (self.held, self.problem, task.plugins)
             self.solver.ask(BUILD_LIMIT, "send", worker.hold, *given)
             self.sent = self.held
-        if task.run.start == "warm":
-            self.solver.ask(BUILD_LIMIT, "neighbour", worker.find_start, self.held)
         if (method.label, dim) not in self.warm and method.name not in _cold:
             least = PLUGIN_WARM_UP if method.foreign else WARM_UP
             limit = max(MARGIN * task.time_limit + GRACE, least)
@@ -184,25 +177,22 @@ class Shares:
 
     def __init__(self, tasks: Sequence[Task]):
         self.lock = threading.Lock()
-        self.tasks: dict[str, deque[Task]] = {}
-        for task in tasks:
-            self.tasks.setdefault(task.run.problem.label, deque()).append(task)
+        self.tasks: dict[str, list[Task]] = {}  # of each problem, the next one last
+        for task in reversed(tasks):
+            self.tasks.setdefault(task.run.problem.label, []).append(task)
         self.holders: dict[object, str] = {}
 
     def take(self, worker: object) -> Task | None:
         """The next task of this worker; None when there is none."""
         with self.lock:
-            if not self.tasks:
+            own, others = self.holders.pop(worker, ""), {*self.holders.values()}
+            left = [name for name, tasks in self.tasks.items() if tasks]
+            if not left:
                 return None
-            label = self.holders.get(worker)
-            if label not in self.tasks:
-                free = [name for name in self.tasks if name not in self.holders.values()]
-                label = free[0] if free else max(self.tasks, key=lambda name: len(self.tasks[name]))
-            self.holders[worker] = label
-            task = self.tasks[label].popleft()
-            if not self.tasks[label]:
-                del self.tasks[label]
-            return task
+            free = [name for name in reversed(left) if name not in others]
+            most = max(left, key=lambda name: len(self.tasks[name]))
+            self.holders[worker] = own if own in left else next(iter(free), most)
+            return self.tasks[self.holders[worker]].pop()
 
 
 class History:
@@ -220,7 +210,7 @@ class History:
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Take a row into account."""
-        key = row["problem"], row["method"], row["start"]
+        key = row["problem"], row["method"]
         if row["call_seconds"] > LONG:
             self.slow.add((*key, row["setting"]))
         if row["status"] in ("time_limit", "killed"):
@@ -228,13 +218,12 @@ class History:
 
     def repeated(self, run: Run) -> bool:
         """Whether a run is a repeat of a slow one."""
-        key = run.problem.label, run.method.label, run.start, run.setting
+        key = run.problem.label, run.method.label, run.setting
         return run.repeat > 0 and key in self.slow
 
     def hopeless(self, run: Run) -> bool:
         """Whether the same method had not enough time for a looser tolerance."""
-        key = run.problem.label, run.method.label, run.start
-        return run.tolerance < self.ended.get(key, 0.0)
+        return run.tolerance < self.ended.get((run.problem.label, run.method.label), 0.0)
 
 
 def run_locally(

@@ -1,6 +1,6 @@
 """Who is first: methods compared at the accuracy that they reach, not at the one asked for.
 
-The runs of a method on an instance (a problem and a start) are points: median time and worst
+The runs of a method on a problem are points: median time and worst
 certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
 front, straight in logarithms; what does not reach it counts as its time limit, and times below
 NOISE count as NOISE.
@@ -20,7 +20,7 @@ NOISE = 1e-4  # s
 BUSY = 1.2  # wall over CPU time above which a machine is too busy for a ranking
 LEAST = 1e-17  # drawn and compared in place of a certificate of 0
 RESAMPLES, CONFIDENCE, SEED = 2000, 0.95, 0
-POINT = ["problem", "start", "method", "tolerance"]
+POINT = ["problem", "method", "tolerance"]
 # what is known of a point: (of the table's column, how the repeats are joined)
 JOINED = {
     "cpu": ("cpu_seconds", "median"),
@@ -34,7 +34,7 @@ JOINED = {
 
 
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row per problem, start, method and tolerance: times [s], worst certificate, memory."""
+    """A row per problem, method and tolerance: times [s], worst certificate, memory."""
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     groups = table.assign(_memory=memory).groupby(POINT, sort=False)
@@ -44,8 +44,8 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
-    """Seconds to a certificate of `accuracy` (instance, method), inf if not reached."""
-    fronts = points.groupby(["problem", "start", "method"], sort=False)[[time, "residual", "limit"]]
+    """Seconds to a certificate of `accuracy` (problem, method), inf if not reached."""
+    fronts = points.groupby(["problem", "method"], sort=False)[[time, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
 
@@ -128,7 +128,7 @@ def _logs(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """log(t + SHIFT) of the instances that somebody solved, and which methods solved them."""
     seconds = achieved(points, accuracy, time)
-    limits = points.groupby(["problem", "start"], sort=False)["limit"].max()
+    limits = points.groupby("problem", sort=False)["limit"].max()
     solved = np.isfinite(seconds)
     kept = solved.any(axis=1)
     shown = seconds.where(solved, limits.reindex(seconds.index), axis=0)[kept]

@@ -8,25 +8,14 @@ for long ones.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.figure_style import (
-    FLOOR,
-    LEAST_RESIDUAL,
-    NAMES,
-    NO_LABELS,
-    set_ticks,
-    short_label,
-    short_tick,
-    write_numbers,
-)
 from contactopt.benchmark.ranking import achieved, mean_times, points
 from contactopt.benchmark.tables import INSTANCE, groups
-from contactopt.errors import InputError
 from contactopt.figures.style import (
     COLOURS,
     FAINT,
@@ -42,6 +31,29 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
+# residuals below this fraction of the tolerance asked for are drawn there: they answer no question
+FLOOR = 1e-2
+LONGEST = 20  # characters of a label
+CELLS = 240  # of a map, above which no numbers are written into them
+NO_LABELS: Mapping[str, str] = MappingProxyType({})
+NAMES = {
+    "solve_seconds": "time of the method [s]",
+    "call_seconds": "time of the call [s]",
+    "cpu_seconds": "CPU time of the call [s]",
+    "peak_mb": "peak memory [MB]",
+    "iterations": "outer iterations [-]",
+    "error": "relative error of the forces [-]",
+    "residual": "natural-map residual [-]",
+    "contacts": "contacts [-]",
+    "problem.contacts": "contacts [-]",
+    "problem.mu": r"friction coefficient $\mu$ [-]",
+    "problem.stiffness_ratio": r"$E_\mathrm{lower}\,/\,E_\mathrm{upper}$ [-]",
+    "problem.elements": "elements across the half-width [-]",
+    "method.rho": r"penalty factor $\rho$ [-]",
+    "problem.coupling": r"Dundurs' constant $\beta$ [-]",
+    "method.factor": "penalty factor [-]",
+    "problem.upper_nu": r"Poisson's ratio $\nu$ [-]",
+}
 
 
 def _look(rank: int) -> dict[str, Any]:
@@ -313,42 +325,61 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
             ax.plot(*(line if upright else line[::-1]), style, **look)
 
 
-def convergence(
-    table: pd.DataFrame,
-    x: str = "iterations",
-    by: str = "method",
-    labels: Mapping[str, str] = NO_LABELS,
-) -> Any:
-    """Draw the residual over outer iterations, or over time ("seconds"), of first repeats."""
-    if x not in ("iterations", "seconds"):
-        raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
-    figure, (ax,) = paper_axes()
-    ends = []
-    for rank, (name, rows) in enumerate(groups(table, by)):
-        history = json.loads(rows.sort_values("repeat")["history"].iloc[0])
-        if not history:
-            continue
-        residual, seconds, iterations = history
-        along = iterations if x == "iterations" else seconds
-        residual = np.maximum(residual, max(LEAST_RESIDUAL, FLOOR * float(rows["tolerance"].min())))
-        label = short_label(name, labels)
-        ax.loglog(along, residual, label=label, **_look(rank))
-        if rank < len(COLOURS):
-            ends.append((along[-1], residual[-1], label, COLOURS[rank]))
-    across = "outer iteration [-]" if x == "iterations" else "time [s]"
-    ax.set(xlabel=across, ylabel="natural-map residual [-]")
-    label_ends(ax, ends)
-    return figure
-
-
 FIGURES: dict[str, Callable[..., Any]] = {
     f.__name__: f
     for f in (
-        speed_accuracy,
-        time_to_accuracy,
-        performance_profile,
-        time_against_size,
-        stability_map,
-        convergence,
+        speed_accuracy, time_to_accuracy, performance_profile, time_against_size, stability_map,
     )
-}
+}  # fmt: skip
+
+
+def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
+    """The label given for a name, else the name with the values of its settings only."""
+    if name in labels:
+        return str(labels[name])
+    head, bracket, settings = name.partition("(")
+    if len(name) <= LONGEST or not bracket:
+        return name
+    words = [head]
+    for setting in settings.rstrip(")").split(", "):
+        key, _, value = setting.partition("=")
+        if value == "True":
+            words.append(key)
+        elif value.startswith("'"):
+            words.append(value.strip("'"))
+        elif value != "False":
+            try:
+                words.append(short_tick(float(value)))
+            except ValueError:
+                words.append(setting)
+    return " ".join(words)
+
+
+def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
+    """Write the numbers of a map in its cells, black on light colours and white on dark ones."""
+    values = grid.to_numpy(float)
+    if values.size > CELLS:
+        return
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = "black" if float(norm(max(value, norm.vmin))) > 0.6 else "white"
+            text = short_tick(float(f"{value:.0f}" if 10 <= abs(value) < 1000 else f"{value:.1g}"))
+            ax.text(column, row, text, ha="center", va="center", fontsize=size, color=colour)
+
+
+def set_ticks(axis: Any) -> None:
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high < 100 * low:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def short_tick(value: float) -> str:
+    """A number as short as it can be: 100000.0 becomes 1e5."""
+    plain = f"{value:g}"
+    power = f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
+    return power if len(power) < len(plain) and float(power) == value else plain

@@ -1,4 +1,4 @@
-"""What is run: a problem, a method, a setting, a start, a repeat."""
+"""What is run: a problem, a method, a setting, a repeat."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from contactopt.methods.driver import TOL
 from contactopt.methods.method import NATIVE
 
 SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
-STARTS = ("cold", "warm")
 # methods of contactopt that solve another problem than Coulomb's
 OTHER_LAWS = {"relaxation": "associated"}
 
@@ -94,11 +93,10 @@ class Run:
     method: MethodSpec
     setting: str
     tolerance: float
-    start: str
     repeat: int
 
     @cached_property
     def key(self) -> str:
         method, backends = self.method.label, self.method.backends(2, 3)
-        parts = (self.problem.label, method, backends, self.setting, self.start, self.repeat)
+        parts = (self.problem.label, method, backends, self.setting, self.repeat)
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

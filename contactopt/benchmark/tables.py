@@ -13,7 +13,7 @@ from contactopt.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-INSTANCE = ["problem", "setting", "start"]
+INSTANCE = ["problem", "setting"]
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:

@@ -324,8 +324,8 @@ def report(options: argparse.Namespace) -> int:
     if options.merge or options.figures:
         raise InputError("--merge and --figures are for the folder of a campaign; name it first.")
     paths = sorted(Path(options.experiments).glob("*.toml"))
-    page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
-    print(f"reports in {page.parent}, all of them in {page}")
+    folder = run_reports(paths, options.reports, options.run, options.names, options.jobs)
+    print(f"reports in {folder}")
     return 0
 
 

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BLUE", "GREEN", "GREY", "ORANGE", "contact_figure", "contact_line", "contact_place",
-    "convergence", "deformed", "design", "fit", "pressure", "refinement_figure", "stick_map",
+    "deformed", "design", "fit", "pressure", "refinement_figure", "stick_map",
     "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
@@ -269,17 +269,6 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
     status = "" if solution.solved else f": {solution.status}"
     figure.suptitle(f"{scene.name}, {symbols(scene.friction)}{status}", fontsize=LETTERS)
     return figure
-
-
-def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
-    """Natural-map residual against outer iterations, one line per solve."""
-    ax = make_axes(ax)
-    for colour, (label, solution) in zip(cycle(COLOURS), solutions.items()):
-        residual = [h["residual"] for h in solution.history]
-        ax.semilogy(range(1, len(residual) + 1), residual, "o-", color=colour, label=label)
-    ax.set(xlabel="outer iteration [-]", ylabel="natural-map residual [-]")
-    add_legend(ax)
-    return ax
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
