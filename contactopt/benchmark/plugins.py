@@ -9,11 +9,11 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from contactopt.benchmark.peers import Peer
@@ -22,6 +22,7 @@ from contactopt.methods import METHODS
 
 GROUP = "contactopt.methods"  # of entry points
 LAWS = ("coulomb", "associated")
+MARK = "_contactopt"  # attribute of what a file declares: table of the registry, name, entry
 # to a plug-in, if it has such an argument
 PASSED = ("tol", "time_limit", "max_iterations")
 
@@ -74,11 +75,9 @@ class Registry:
         """Run plug-in files, each of them once; InputError, naming the file, if one fails."""
         for path in map(Path, paths):
             if path not in self.loaded:
-                token = _receiving.set(self)
-                try:
-                    _run(path)
-                finally:
-                    _receiving.reset(token)
+                for one in vars(_run(path)).values():
+                    for table, name, declared in getattr(one, "__dict__", {}).get(MARK, ()):
+                        getattr(self, table)[name] = declared
                 self.loaded.add(path)
 
     def find(self, name: str) -> Plugin | None:
@@ -91,11 +90,6 @@ class Registry:
                     text = f"plug-in '{point.value}' failed: {type(error).__name__}: {error}"
                     raise InputError(text) from error
         return self.methods.get(name)
-
-
-# The registry that receives what the plug-in file declares that is being run; None at any other
-# time.
-_receiving: ContextVar[Registry | None] = ContextVar("receiving", default=None)
 
 
 def method(
@@ -137,10 +131,7 @@ def method(
             raise InputError(
                 f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it."
             )
-        registry = _receiving.get()
-        if registry is not None:
-            registry.methods[plugin.name] = plugin
-        return make
+        return _marked(make, "methods", plugin.name, plugin)
 
     return register if make is None else register(make)
 
@@ -164,12 +155,15 @@ def problem(make: Any = None, *, name: str | None = None) -> Any:
     """
 
     def register(make: Any) -> Any:
-        found, registry = _name("problem", make, name), _receiving.get()
-        if registry is not None:
-            registry.problems[found] = make
-        return make
+        return _marked(make, "problems", _name("problem", make, name), make)
 
     return register if make is None else register(make)
+
+
+def _marked(make: Any, *declared: Any) -> Any:
+    """The function or class with a note for the registry that runs its file."""
+    setattr(make, MARK, (*getattr(make, "__dict__", {}).get(MARK, ()), declared))
+    return make
 
 
 def _name(kind: str, make: Any, name: object) -> str:
@@ -184,7 +178,7 @@ def _name(kind: str, make: Any, name: object) -> str:
     return found
 
 
-def _run(path: Path) -> None:
+def _run(path: Path) -> ModuleType:
     """Run a plug-in file as a module of its own."""
     digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
     spec = spec_from_file_location(f"contactopt_plugin_{path.stem}_{digest}", path)
@@ -196,3 +190,4 @@ def _run(path: Path) -> None:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
+    return module
