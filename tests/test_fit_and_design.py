@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contactopt
-from contactopt import HalfSpace, InputError, Material, Rigid, Scene, follow, plots, scenes
+from contactopt import HalfSpace, InputError, Material, Rigid, Scene, follow, scenes
 from contactopt.scenes.parameters import parameter
 
 LOADS = (0.0, 20.0, 42.0, 10.0, -20.0, -42.0, 0.0)

@@ -121,7 +121,7 @@ def _entry(
 ) -> dict[str, Any]:
     """The schema of an entry of a table, from all that was asked of it."""
     kinds = list(dict.fromkeys(one.kind for one in asked))
-    ways = []
+    ways: list[dict[str, Any]] = []
     for kind in kinds:
         way: dict[str, Any] = {"type": TYPES[kind]}
         if kind is dict:
@@ -140,9 +140,9 @@ def _entry(
                 else {"enum": names}
             )
         ways.append(way)
-    made = ways[0] if len(ways) == 1 else {"anyOf": ways} if ways else {}
+    made: dict[str, Any] = ways[0] if len(ways) == 1 else {"anyOf": ways} if ways else {}
     if place == ("solve",):
-        made["description"] = OPTIONS[key].metadata["what"]
+        made["description"] = OPTIONS[key].what
     usual = next((one.default for one in asked if one.default not in (None, "", [], "scene")), None)
     what = next((one.what for one in asked if one.what), "")
     made |= {"default": usual} if usual is not None else {}
