@@ -88,7 +88,7 @@ class Result(Outcome):
         if file is None:
             file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
         with tempfile.TemporaryDirectory() as folder:
-            write(self, Path(folder), states=True)
+            write(self, Path(folder))
             (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
             made = write_page(folder, file)
         if show:
@@ -371,7 +371,7 @@ def _written(
             with _clock(seconds, "figures"):
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
-            write(result, folder, states=options.html)
+            write(result, folder)
             if result.path is None:
                 restart.finished(result.solution)
             restart.save(folder / FILE, result.solution.solved)

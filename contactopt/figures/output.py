@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
-STATES, SERIES = "states.npz", "states.pvd"
+SERIES = "states.pvd"
 SINGLE = re.compile(r"-state\d{4}\.vtu$")  # names of the files of single states
 STATUS = ("open", "stick", "slip")
 # of the bodies at all states of a load path, above which only the last state is written
@@ -38,7 +38,7 @@ MOST_NUMBERS = 3_000_000
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz", STATES, SERIES, FILE,
+    PAGE, "interface.npz", "history.csv", "path.npz", SERIES, FILE,
 )  # fmt: skip
 
 
@@ -69,10 +69,9 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
         save(plots.refinement_figure(result.estimate), "refinement")
 
 
-def write(result: Outcome, folder: Path, states: bool) -> None:
+def write(result: Outcome, folder: Path) -> None:
     """Write the fields of a result as VTU files, its contacts and states as tables, and its contact
-    forces and load path as arrays, into a folder. With `states` also the bodies at all states of
-    the path, for a page on which they move.
+    forces and load path as arrays, into a folder.
     """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
@@ -103,8 +102,6 @@ def write(result: Outcome, folder: Path, states: bool) -> None:
     else:
         path.write(folder)
         write_series(path, result.fields, folder)
-        if states and (found := body_states(path, result.fields)):
-            np.savez(folder / STATES, **found)
     write_tables(result, surfaces, folder)
 
 
@@ -148,24 +145,6 @@ def write_series(path: PathResult, last: tuple[Fields, ...], folder: Path) -> No
     (folder / SERIES).write_text(
         f'<VTKFile type="Collection" version="0.1"><Collection>\n{body}\n</Collection></VTKFile>\n'
     )
-
-
-def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
-    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and
-    von_mises (n, nodes).
-
-    It is empty where there would be more than MOST_NUMBERS, or where the path kept no
-    displacements.
-    """
-    if not _fits(path, last):
-        return {}
-    made = {}
-    for own in zip(*(path.fields(step) for step in range(len(path.states)))):
-        made[f"displacement/{own[0].name}"] = np.array(
-            [f.displacement.T for f in own], dtype=np.float32
-        )
-        made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
-    return made
 
 
 def _fits(path: PathResult, last: tuple[Fields, ...]) -> bool:

@@ -5,7 +5,7 @@ displacement; their deformation follows a slider. Half and quarter models are sh
 contact surface it shows pressure, traction, gap, slip, and which contacts stick, slip or are open.
 A click on a place shows its values with their units. A load path has a slider over its states and
 the loop of force and displacement. The bodies move with it where the run wrote all of their states,
-which it does for a page if they are small enough (MOST_NUMBERS in contactopt.figures.output).
+which it does if they are small enough (MOST_NUMBERS in contactopt.figures.output).
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
     followers = (
         "The contact follows the slider: pressure, traction, status, gap, slip since the state"
         " before, and arrows. The bodies are those of the last state: the run kept no others,"
-        " because it made no page, or because they are too large for one."
+        " because they are too large."
     )
     if data["moving"] or not data["bodies"]:
         followers = (
