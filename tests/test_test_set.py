@@ -14,8 +14,8 @@ import scipy.sparse as sp
 from contactopt import all_solutions, fclib, natural_map_residual, solve
 from contactopt.benchmark import read_experiment, testset
 from contactopt.benchmark.problems import FAMILIES
-from contactopt.benchmark.testset.invariants import invariants
 from contactopt.benchmark.testset.programs import PROGRAMS, convex_program, write_cbf, write_npz
+from contactopt.benchmark.testset.tags import invariants
 from contactopt.cli import main
 from contactopt.errors import InputError
 from contactopt.problem import infeasibility

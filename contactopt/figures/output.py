@@ -55,9 +55,7 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
         picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
         save(picture.figure, "deformed")
     if any(part.elastic and not part.meshed for part in result.scene.parts):
-        from contactopt.figures.maps import maps_figure
-
-        save(maps_figure(result.reduction, result.solution), "maps")
+        save(plots.maps_figure(result.reduction, result.solution), "maps")
     for pair in problem.pairs:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
         save(plots.contact_figure(result.scene, *alone(problem, solution, pair)), name)

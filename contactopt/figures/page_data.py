@@ -52,8 +52,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
     fields = {name: _body_values(mesh.point_data, len(axes)) for name, mesh in bodies.items()}
     if path is not None and moving:
-        for name, own in fields.items():
-            own |= _at_all_states(folder, name, len(path["reactions"]), len(axes))
+        for name, values in fields.items():
+            values |= _at_all_states(folder, name, len(path["reactions"]), len(axes))
     box = whole_box(box_of([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
     near = _near_contact(whole_box(box_of([mesh.points for mesh in pairs.values()]), mirrors), box)
     largest = max((float(np.abs(values["move"]).max()) for values in fields.values()), default=0.0)

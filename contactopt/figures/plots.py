@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.coupling.reduction import Reduction
 from contactopt.figures.bodies import deformed
 from contactopt.figures.pieces import triangles
 from contactopt.figures.style import (
@@ -28,19 +29,21 @@ from contactopt.figures.style import (
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_edge
+from contactopt.readings.half_space_readings import surface_maps
 from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
 
 __all__ = [
-    "contact_figure", "contact_line", "contact_place", "deformed", "pressure",
+    "contact_figure", "contact_line", "contact_place", "deformed", "maps_figure", "pressure",
     "refinement_figure", "stick_map", "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
 SMALL = 6.0  # parts of a contact line of which the contact zone fills one, if it is drawn alone
+COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels wide
 ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
@@ -262,6 +265,49 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
         draw(scene, problem, solution, ax)
     status = "" if solution.solved else f": {solution.status}"
     figure.suptitle(f"{scene.name}, {symbols(scene.friction)}{status}", fontsize=LETTERS)
+    return figure
+
+
+def maps_figure(reduction: Reduction, solution: Solution) -> Any:
+    """Draw pressure, gap, and where there is friction traction, slip and stick, of half-spaces."""
+    from matplotlib.colors import ListedColormap
+
+    scene, problem, maps = reduction.scene, reduction.problem, surface_maps(reduction, solution)
+    length, stress = scene.units
+    closed = maps["status"] > 0
+    panels = [
+        ("pressure", closed, maps["pressure"], f"pressure [{stress}]", "viridis"),
+        ("gap", ~closed, maps["gap"], f"gap [{length}]", "cividis"),
+    ]
+    if problem.law.rough.any():
+        traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
+        two: Any = ListedColormap([BLUE, ORANGE])
+        panels += [
+            ("traction", closed, traction, f"tangential traction [{stress}]", "viridis"),
+            ("slip", closed, slip, f"slip [{length}]", "cividis"),
+            ("status", closed, maps["status"], "", two),
+        ]
+    line = maps["pressure"].ndim == 1
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    figure, axes = paper_axes(columns, rows, height=1.7 if line else 2.3)
+    for (name, where, known, label, colours), ax in zip(panels, axes):
+        values = np.where(where, known, np.nan)
+        if line:
+            ax.plot(problem.chart.places[0], values)
+            ax.set(xlabel=f"${scene.components[0]}$ [{length}]", ylabel=label)
+            continue
+        x, y = problem.chart.places
+        extent = (x.min(), x.max(), y.min(), y.max())
+        look = {"origin": "lower", "interpolation": "nearest", "cmap": colours}
+        image = ax.imshow(values.T, extent=extent, **look)
+        ax.set(xlabel=f"$x$ [{length}]", ylabel=f"$y$ [{length}]")
+        bar = add_colours(image, ax, label, orientation="horizontal", shrink=1.0)
+        if name == "status":
+            image.set_clim(0.5, 2.5)
+            bar.set_ticks([1, 2], labels=["stick", "slip"])
+    for ax in axes[len(panels) :]:
+        ax.set_axis_off()
     return figure
 
 
