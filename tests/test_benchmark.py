@@ -11,13 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactopt import InputError, benchmark, natural_map_residual, solve
+from contactopt import InputError, benchmark, solve
 from contactopt.benchmark import pool, problems, store
 from contactopt.benchmark.experiment import read_experiment
-from contactopt.benchmark.measure import Task, associated_residual
-from contactopt.benchmark.plugins import Registry
+from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import Shares, Worker
-from contactopt.benchmark.runs import MethodSpec, Run, method_spec
+from contactopt.benchmark.runs import MethodSpec, Run
 from contactopt.benchmark.store import COLUMNS, STATUSES, Store, lines
 from contactopt.cli import main
 
@@ -460,15 +459,6 @@ def deadly():
     rows = table[table["family"].isin(["impossible", "deadly"])]
     assert len(rows) == 8 and set(rows["status"]) == {"not_built"}
     assert rows["message"].str.contains("no such thing|SIGABRT").all()
-
-
-def test_associated_friction_has_its_own_certificate():
-    problem = problems.half_plane(16, mu=0.4, coupling=0.3)
-    coulomb, associated = solve(problem), solve(problem, "relaxation")
-    assert associated_residual(problem, associated.reactions, associated.multipliers) <= 1e-10
-    assert natural_map_residual(problem, associated.reactions, associated.multipliers) > 1e-4
-    assert associated_residual(problem, coulomb.reactions, coulomb.multipliers) > 1e-4
-    assert method_spec("relaxation", {}, Registry()).law == "associated"
 
 
 def test_a_worker_stays_with_its_problem():

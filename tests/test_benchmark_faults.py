@@ -338,7 +338,6 @@ def exits():
         ("raise SystemExit(3)\n", "SystemExit"),
         ("from contactopt.benchmark import method\nmethod(3)\n", "must be a function"),
         ("from contactopt.benchmark import method\nmethod(len, name=3)\n", "name"),
-        ("from contactopt.benchmark import method\n@method(law='x')\ndef f(p): pass\n", "law"),
         (
             (
                 "from contactopt.benchmark import"
@@ -630,19 +629,17 @@ def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
 
     file = tmp_path / "mine.py"
     file.write_text(
-        "from contactopt.benchmark import method, problem\n@method(law='associated')\ndef mine(p):"
+        "from contactopt.benchmark import method, problem\n@method(name='own')\ndef mine(p):"
         " return p.q\n@problem(name='other')\ndef family(n=1): return n\n"
     )
     first, second = Registry(), Registry()
     first.load([file, file])
-    mine = first.find("mine")
-    assert mine is not None and mine.law == "associated" and first.problems["other"]() == 1
-    assert second.find("mine") is None and not second.problems
+    mine = first.find("own")
+    assert mine is not None and first.problems["other"]() == 1
+    assert second.find("own") is None and not second.problems
     names = {}
     exec(compile(file.read_text(), file, "exec"), names)
-    assert (
-        callable(names["mine"]) and second.find("mine") is None and list(first.methods) == ["mine"]
-    )
+    assert callable(names["mine"]) and second.find("own") is None and list(first.methods) == ["own"]
 
 
 def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal():

@@ -21,7 +21,6 @@ from contactopt.errors import InputError
 from contactopt.methods import METHODS
 
 GROUP = "contactopt.methods"  # of entry points
-LAWS = ("coulomb", "associated")
 MARK = "_contactopt"  # attribute of what a file declares: table of the registry, name, entry
 # to a plug-in, if it has such an argument
 PASSED = ("tol", "time_limit", "max_iterations")
@@ -35,7 +34,6 @@ class Plugin:
 
     name: str
     make: Callable[..., Any]
-    law: str = "coulomb"
     peer: Peer | None = None
 
     @property
@@ -92,9 +90,7 @@ class Registry:
         return self.methods.get(name)
 
 
-def method(
-    make: Any = None, *, name: str | None = None, law: str = "coulomb", peer: Peer | None = None
-) -> Any:
+def method(make: Any = None, *, name: str | None = None, peer: Peer | None = None) -> Any:
     """Declare a function or class as a method of the benchmark.
 
     The declaration counts where a campaign runs the file. Everywhere else the function or class is
@@ -110,8 +106,6 @@ def method(
     ----------
     make : The function or class, where the decorator is written without arguments.
     name : The name of the method; by default that of the function.
-    law : "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles
-        compare within, one law.
     peer : The solver of others that it calls, without which it is left out.
 
     Returns
@@ -120,13 +114,11 @@ def method(
 
     Raises
     ------
-    InputError : For an unknown law, and for the name of a method of contactopt.
+    InputError : For the name of a method of contactopt.
     """
-    if law not in LAWS:
-        raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
 
     def register(make: Any) -> Any:
-        plugin = Plugin(_name("method", make, name), make, law, peer)
+        plugin = Plugin(_name("method", make, name), make, peer)
         if plugin.name in METHODS:
             raise InputError(
                 f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it."

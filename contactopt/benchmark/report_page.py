@@ -115,13 +115,11 @@ def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
 
 
 def page_data(table: pd.DataFrame) -> dict[str, Any]:
-    """What the page shows of the runs under Coulomb's law, or of all if there are none."""
-    own = table[table["law"] == "coulomb"]
-    own = own if len(own) else table
-    found = points(own)
-    names, methods = list(dict.fromkeys(own["problem"])), sorted(set(own["method"]))
+    """What the page shows of the runs."""
+    found = points(table)
+    names, methods = list(dict.fromkeys(table["problem"])), sorted(set(table["method"]))
     of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in problems()}
-    tags = {name: _tags(rows.iloc[0], of_set) for name, rows in own.groupby("problem")}
+    tags = {name: _tags(rows.iloc[0], of_set) for name, rows in table.groupby("problem")}
     accuracies = _accuracies(found)
     times = [achieved(found, a).reindex(names)[methods] for a in accuracies]
     first = ranking(found, accuracies[len(accuracies) // 2])["method"]
@@ -130,7 +128,7 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
         [number[p], methods.index(m), *(_plain(value) for value in rest)]
         for p, m, *rest in found[["problem", "method", *COLUMNS_SHOWN]].itertuples(index=False)
     ]
-    ratio = wall_over_cpu(own)
+    ratio = wall_over_cpu(table)
     return {
         "methods": methods,
         "order": list(first) + [name for name in methods if name not in set(first)],
@@ -144,10 +142,10 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
             for group, rows, members in _groups(found, tags, number)
             for a in accuracies
         ],
-        "histories": _histories(own, number, methods),
+        "histories": _histories(table, number, methods),
         "cards": _cards(table),
         "busy": warning(ratio),
-        "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(own, found)),
+        "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(table, found)),
         "colours": COLOURS[:7],
     }
 

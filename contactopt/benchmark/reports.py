@@ -119,11 +119,11 @@ def write_report(
 
 def _drawn(layout: Experiment, number: int, entry: Mapping[str, Any], table: pd.DataFrame) -> Any:
     """What a figure's function makes of its rows; None where no row fits an optional one."""
-    kind, where = entry["kind"], dict(entry.get("where", {}))
+    kind, where = entry["kind"], entry.get("where", {})
     arguments = {key: value for key, value in entry.items() if key not in OWN_KEYS}
     try:
         try:
-            rows = select(table, where.pop("law", "coulomb"), **where)
+            rows = select(table, **where)
         except InputError:
             if entry.get("optional"):
                 return None
