@@ -634,12 +634,14 @@ def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
     )
     first, second = Registry(), Registry()
     first.load([file, file])
-    mine = first.find("own")
+    mine = first.methods.get("own")
     assert mine is not None and first.problems["other"]() == 1
-    assert second.find("own") is None and not second.problems
+    assert "own" not in second.methods and not second.problems
     names = {}
     exec(compile(file.read_text(), file, "exec"), names)
-    assert callable(names["mine"]) and second.find("own") is None and list(first.methods) == ["own"]
+    assert (
+        callable(names["mine"]) and "own" not in second.methods and list(first.methods) == ["own"]
+    )
 
 
 def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal():

@@ -60,9 +60,7 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
         save(plots.contact_figure(result.scene, *alone(problem, solution, pair)), name)
     if result.path is not None:
-        from contactopt.figures.animation import path_figure
-
-        save(path_figure(result.path), "path")
+        save(plots.path_figure(result.path), "path")
     if result.estimate is not None:
         save(plots.refinement_figure(result.estimate), "refinement")
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.figures.bodies import deformed
+from contactopt.figures.path_plots import energies, loop, path_figure
 from contactopt.figures.pieces import triangles
 from contactopt.figures.style import (
     BLUE,
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
 
 __all__ = [
-    "contact_figure", "contact_line", "contact_place", "deformed", "maps_figure", "pressure",
-    "refinement_figure", "stick_map", "traction",
+    "contact_figure", "contact_line", "contact_place", "deformed", "energies", "loop",
+    "maps_figure", "path_figure", "pressure", "refinement_figure", "stick_map", "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from contactopt import scenes
-from contactopt.figures.animation import animate, energies, loop
-from contactopt.figures.style import COLOURS, label_ends, paper_axes
+from contactopt.cards import force_unit
+from contactopt.figures.plots import contact_line, contact_place, energies, loop
+from contactopt.figures.style import (
+    BLUE,
+    COLOURS,
+    GREY,
+    LETTERS,
+    ORANGE,
+    add_legend,
+    label_ends,
+    paper_axes,
+    symbols,
+)
 from contactopt.solving.follow import follow
 from contactopt.solving.paths import PathResult
 from experiments.questions.accuracy.sheared import exact_loss, loop_area
@@ -19,6 +33,7 @@ SHEAR = 45.0  # .9 mu force
 STEPS = (1, 2, 4, 8, 16, 32)
 INCREMENTS = (1, 5, 10, 20, 40, 80, 160)
 FRICTION = (0.1, 0.3, 0.5)
+FRAMES, FILM = 10, 110  # of a film: pictures per second, pixels per inch
 
 
 def cycle(steps: int) -> dict[str, object]:
@@ -86,6 +101,45 @@ def draw_growing(rows: list[dict]) -> Any:
     ax.set(xlabel="load increments [-]", ylabel="stick ratio $c / a$ [-] (dashed: exact)")
     label_ends(ax, ends)
     return figure
+
+
+def animate(path: PathResult, file: Path) -> None:
+    """The path as a GIF: tangential traction within its bounds, and the point on the loop."""
+    figure, (left, right) = paper_axes(2, wide=True)
+    FigureCanvasAgg(figure)
+    problem, scene = path.reduction.problem, path.states[-1].scene
+    line = contact_line(problem)
+    x, area = contact_place(problem)[line], problem.areas[line]
+    bound = [problem.law.bound_along(s.solution.reactions)[line] / area for s in path.states]
+    for own in bound:
+        own[np.isinf(own)] = 0.0  # glued contacts have none
+    shear = [-s.solution.reactions[line, 1] / area for s in path.states]
+    peak = float(np.max(bound))
+    (upper,) = left.plot(x, bound[0], "--", color=GREY, label=r"bound $\pm\mu p$")
+    (lower,) = left.plot(x, -bound[0], "--", color=GREY)
+    look = {"color": BLUE, "label": "traction on the lower body"}
+    (traction,) = left.plot(x, shear[0], "o-", **look)
+    where = ", $y$ = 0" if problem.dim == 3 else ""
+    left.set(xlabel=f"${scene.components[0]}$ [{scene.units[0]}]{where}")
+    left.set(ylabel=f"tangential traction [{scene.units[1]}]", ylim=(-1.15 * peak, 1.15 * peak))
+    add_legend(left)
+    across, force = path.history["shift"], path.history["shear_force"]
+    right.plot(across, force, color=GREY, lw=0.8)
+    (past,) = right.plot([], [], color=BLUE)
+    (point,) = right.plot([], [], "o", color=ORANGE)
+    right.set(xlabel=f"shift [{scene.units[0]}]", ylabel=f"shear force [{force_unit(scene.units)}]")
+    figure.suptitle(f"{scene.name}, {symbols(scene.friction)}", fontsize=LETTERS)
+
+    def draw(state: int) -> tuple[Any, ...]:
+        upper.set_ydata(bound[state])
+        lower.set_ydata(-bound[state])
+        traction.set_ydata(shear[state])
+        past.set_data(across[: state + 1], force[: state + 1])
+        point.set_data(across[state : state + 1], force[state : state + 1])
+        return upper, lower, traction, past, point
+
+    film = FuncAnimation(figure, draw, frames=len(path.states))
+    film.save(file, writer=PillowWriter(fps=FRAMES), dpi=FILM)
 
 
 TEXT = template(__file__)
