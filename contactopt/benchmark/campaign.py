@@ -15,7 +15,7 @@ from contactopt.benchmark.measure import Task, absent_row
 from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.report_page import report_campaign
 from contactopt.benchmark.reports import build, layouts, publish
-from contactopt.benchmark.store import Store, lines, load, require, save, told
+from contactopt.benchmark.store import Store, lines, load, require, save
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.writing import remove_files, whole_file
@@ -152,6 +152,5 @@ def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) 
         print(f"left out: {error}", file=sys.stderr)
         return
     folder = work / experiment.name
-    with told(folder):
-        remove_files(folder, WRITTEN)
+    remove_files(folder, WRITTEN)
     publish(path, run_campaign(experiment, folder, jobs=jobs), target)

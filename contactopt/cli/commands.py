@@ -158,14 +158,19 @@ def _print_estimate(estimate: Any) -> None:
 
 def view(options: argparse.Namespace) -> int:
     """Write the page of a run and open it in the browser."""
-    import webbrowser
-
     from contactopt.figures.view_page import write_page
 
     page = write_page(options.folder, options.out or Path(options.folder) / "view.html")
+    return _shown(page, options, f"{page} is the result as a page; open it in a browser")
+
+
+def _shown(page: Path, options: argparse.Namespace, words: str) -> int:
+    """Open a page, unless that is not wanted, and say where it is."""
+    import webbrowser
+
     if not options.no_open:
         webbrowser.open(page.resolve().as_uri())
-    print(f"{page} is the result as a page; open it in a browser")
+    print(words)
     return 0
 
 
@@ -179,8 +184,6 @@ def show(options: argparse.Namespace) -> int:
 
 def mesh(options: argparse.Namespace) -> int:
     """Mesh a part of a CAD program, or read a mesh file; say and draw what it holds."""
-    import webbrowser
-
     from contactopt.figures.check_page import write_mesh_page
     from contactopt.figures.mesh_words import mesh_words
     from contactopt.meshes.cad import ENDINGS, mesh_part
@@ -199,10 +202,8 @@ def mesh(options: argparse.Namespace) -> int:
         return 0 if meshes else 2
     page = Path(f"out/{path.stem}-mesh.html")
     write_mesh_page(str(path), named, text, refused, page)
-    if not options.no_open:
-        webbrowser.open(page.resolve().as_uri())
-    print(f"# {page} shows the bodies and their boundaries; open it in a browser")
-    return 0
+    words = f"# {page} shows the bodies and their boundaries; open it in a browser"
+    return _shown(page, options, words)
 
 
 def simplify(options: argparse.Namespace) -> int:
@@ -216,8 +217,6 @@ def simplify(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """Say what is known of a scene before it is solved, and write it as a page."""
-    import webbrowser
-
     from contactopt.figures.check_page import write_check_page
     from contactopt.figures.scene_check import check_scene
     from contactopt.runner import states_of
@@ -228,10 +227,8 @@ def check(options: argparse.Namespace) -> int:
     if options.no_page:
         return 0
     page = write_check_page(found, options.out or f"out/{Path(options.scene).stem}-check.html")
-    if not options.no_open:
-        webbrowser.open(page.resolve().as_uri())
-    print(f"{page} shows bodies, boundaries, loads and pairs; open it in a browser")
-    return 0
+    words = f"{page} shows bodies, boundaries, loads and pairs; open it in a browser"
+    return _shown(page, options, words)
 
 
 def export(options: argparse.Namespace) -> int:

@@ -25,16 +25,7 @@ TOL = 1e-10  # certificate of the forces at which subproblems are made
 
 
 def problems(options: argparse.Namespace) -> int:
-    """List, show or write problems of a test set.
-
-    Parameters
-    ----------
-    options : of the command `problems`
-
-    Returns
-    -------
-    int : the exit code, 0
-    """
+    """List, show or write problems of a test set."""
     from contactopt.benchmark import testset
 
     found = testset.problems(options.tier or "", options.tag, options.testset)

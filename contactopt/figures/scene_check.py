@@ -69,14 +69,8 @@ class SceneCheck:
 def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) -> SceneCheck:
     """Look at a scene without solving it. InputError for a scene that cannot be solved at all.
 
-    Parameters
-    ----------
-    states : the scene, or the states of its load path
-    solve : options of the run that it is meant for: method, Q, solver
-
-    Returns
-    -------
-    SceneCheck : with the words of the last state
+    states  the scene, or the states of its load path, of which the last one is described
+    solve   options of the run that it is meant for: method, Q, solver
     """
     scene, options = states[-1], solve or {}
     made = posed(scene)
