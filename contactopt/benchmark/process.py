@@ -44,11 +44,12 @@ class Ended(Exception):
 class Process:
     """One process at a time, started when it is first asked and again after it died.
 
-    Use from one thread.
+    Use from one thread. `known` is for notes about the present process, and empty in a new one.
     """
 
     def __init__(self) -> None:
         self.process: subprocess.Popen[bytes] | None = None
+        self.known: dict[str, str] = {}
 
     @property
     def running(self) -> bool:
@@ -58,7 +59,7 @@ class Process:
         """Let the process start, if there is none; nobody waits for it here."""
         if self.process is not None:
             return
-        self.ready = False  # until it has said so
+        self.ready, self.known = False, {}  # until it has said so
         self.noise = tempfile.TemporaryFile()  # noqa: SIM115
         self.pipe, theirs = Pipe()
         program = PROGRAM.format(theirs.fileno(), os.getpid())
@@ -157,7 +158,7 @@ class Process:
         self.process.wait()
         self.pipe.close()
         self.noise.close()
-        self.process = None
+        self.process, self.known = None, {}
 
 
 def serve(pipe_number: int, parent: int) -> None:
