@@ -47,7 +47,7 @@ class Entries:
                         raise self.table.fail(message, key, index, culprit) from error
                     self.skipped.append(str(error))
                     self.absent.append((key, name, values, str(error)))
-        if twice := twice_in(spec.label for spec in made):
+        if twice := twice_in(getattr(one, "spec", one).label for one in made):
             raise self.table.fail(f"two {key} are called {twice!r}.", key)
         return made
 

@@ -23,6 +23,7 @@ from contactopt.figures.style import (
     LINE,
     MARKS,
     add_colours,
+    draw_lines,
     label_ends,
     paper_axes,
 )
@@ -167,15 +168,13 @@ def time_to_accuracy(
     found, which = points(table), "wall" if time == "call_seconds" else "cpu"
     across = np.geomspace(*ACCURACIES)
     curves = [mean_times(found, accuracy, which) for accuracy in across]
-    ends = []
-    for rank, full in enumerate(curves[len(curves) // 2].sort_values().index):
-        height = [float(curve.get(full, np.nan)) for curve in curves]
-        ax.loglog(across, height, **_look(rank))
-        if rank < len(COLOURS):
-            ends.append((across[-1], height[-1], short_label(str(full), labels), COLOURS[rank]))
+    lines = [
+        (short_label(str(full), labels), [*across], [curve.get(full, np.nan) for curve in curves])
+        for full in curves[len(curves) // 2].sort_values().index
+    ]
     ax.set(xlim=ACCURACIES[:2], xlabel="certificate that is reached [-]")
+    draw_lines(ax, lines, ["-"] * len(lines))
     ax.set(ylabel=NAMES.get(time, time) + ", mean")
-    label_ends(ax, ends)
     return figure
 
 
@@ -201,20 +200,15 @@ def time_against_size(
     The eight fastest at their largest sizes have colours and names.
     """
     figure, (ax,) = paper_axes()
-    ends, found = [], []
+    found = []
     for full, rows in groups(table[table["success"]], by):
         medians = rows.groupby(size)[metric].median()
-        found.append((full, medians.index.to_numpy(float), medians.to_numpy()))
-    found.sort(key=lambda own: (-own[1][-1], own[2][-1]))
-    for rank, (full, x, y) in enumerate(found):
+        x, y = medians.index.to_numpy(float), medians.to_numpy()
         exponent, label = fitted_exponent(x, y), short_label(full, labels)
-        label += "" if np.isnan(exponent) else f" $n^{{{exponent:.1f}}}$"
-        ax.loglog(x, y, marker=MARKS[rank % len(MARKS)], label=label, **_look(rank))
-        if rank < len(COLOURS):
-            ends.append((x[-1], y[-1], label, COLOURS[rank]))
+        found.append((label + ("" if np.isnan(exponent) else f" $n^{{{exponent:.1f}}}$"), x, y))
+    draw_lines(ax, sorted(found, key=lambda own: (-own[1][-1], own[2][-1])))
     ax.set(xlabel=NAMES.get(size, size), ylabel=NAMES.get(metric, metric) + ", median")
     set_ticks(ax.xaxis)
-    label_ends(ax, ends)
     return figure
 
 

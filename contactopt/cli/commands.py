@@ -6,17 +6,15 @@ import argparse
 import json
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from contactopt.cards import count, force_unit
-from contactopt.cli.test_set import problems
+from contactopt.cli.test_set import problems  # noqa: F401 (a command, too)
 from contactopt.errors import InputError
 from contactopt.methods.method import NATIVE
 from contactopt.readings.resultants import resultant_words
-
-Command = Callable[[argparse.Namespace], int]
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -326,7 +324,7 @@ def report(options: argparse.Namespace) -> int:
     return 0
 
 
-def listing(options: argparse.Namespace) -> int:
+def list_names(options: argparse.Namespace) -> int:
     """Print everything that can be chosen by its name."""
     from contactopt.bodies.solvers import SOLVERS
     from contactopt.linear.operators import FORMS
@@ -371,21 +369,3 @@ def completion(options: argparse.Namespace) -> int:
 
     print(script(options.parser, options.shell))
     return 0
-
-
-COMMANDS: dict[str, Command] = {
-    "run": run,
-    "view": view,
-    "show": show,
-    "check": check,
-    "mesh": mesh,
-    "simplify": simplify,
-    "export": export,
-    "new": new,
-    "schema": schema,
-    "bench": bench,
-    "report": report,
-    "problems": problems,
-    "list": listing,
-    "completion": completion,
-}

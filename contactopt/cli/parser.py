@@ -49,7 +49,7 @@ def make_parser() -> argparse.ArgumentParser:
             # an epilog of several paragraphs keeps its lines
             formatter_class=plain if "\n\n" in (epilog or "") else argparse.HelpFormatter,
         )
-        made.set_defaults(command=commands.COMMANDS[name], parser=parser)
+        made.set_defaults(command=getattr(commands, command.get("function", name)), parser=parser)
         arguments = texts["scene"] if name in OF_A_SCENE else {}
         _add(made, arguments | command.get("arguments", {}) | (_of_run() if name == "run" else {}))
     return parser

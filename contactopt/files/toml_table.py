@@ -217,23 +217,24 @@ def change(table: Table, changes: Mapping[str, Any]) -> Table:
     lines: dict[Place, int | str] = dict(table.lines)
     for name, value in changes.items():
         told = f"--set {name}={value}"
+        place: Place = ()
         at: Any = table.data
-        *parents, last = place = _path(table, name)
-        for depth, key in enumerate(parents):
-            if key not in (range(len(at)) if isinstance(at, list) else at):
-                raise _lost(table, told, parents[:depth], key, at)
-            at = at[key]
-            if not isinstance(at, (dict, list)):
-                raise table.fail(f"{told}: {key!r} holds {short(at)}, and nothing in it.")
-        if isinstance(at, list) and last not in range(len(at)):
-            raise _lost(table, told, parents, last, at)
-        at[last] = value
-        lines[tuple(place)] = told
+        *parents, last = _keys(name)
+        for key in parents:
+            step = _step(table, told, place, key, at)
+            if step not in (range(len(at)) if isinstance(at, list) else at):
+                raise _lost(table, told, place, step, at)
+            place, at = (*place, step), at[step]
+        step = _step(table, told, place, last, at)
+        if isinstance(at, list) and step not in range(len(at)):
+            raise _lost(table, told, place, step, at)
+        at[step] = value
+        lines[(*place, step)] = told
     return Table(table.file, lines, table.data, table.place, table.asked)
 
 
-def _path(table: Table, name: str) -> list[str | int]:
-    """The keys of a dotted name, written as in TOML, those of arrays as numbers from 0 on."""
+def _keys(name: str) -> list[str]:
+    """The keys of a dotted name, written as in TOML."""
     try:
         data, keys = tomllib.loads(f"{name} = 0"), []
     except tomllib.TOMLDecodeError as error:
@@ -243,19 +244,14 @@ def _path(table: Table, name: str) -> list[str | int]:
     while isinstance(data, dict):
         ((key, data),) = data.items()
         keys.append(key)
-    found: list[str | int] = []
-    at: Any = table.data
-    for key in keys:
-        number = isinstance(at, list) and key.isdigit() and int(key) > 0
-        found.append(int(key) - 1 if number else key)
-        at = (
-            at.get(key)
-            if isinstance(at, dict)
-            else at[found[-1]]
-            if number and int(key) <= len(at)
-            else None
-        )
-    return found
+    return keys
+
+
+def _step(table: Table, told: str, place: Place, key: str, at: Any) -> str | int:
+    """A key of what stands at a place, of an array as a number from 0 on."""
+    if not isinstance(at, dict | list):
+        raise table.fail(f"{told}: {place[-1]!r} holds {short(at)}, and nothing in it.")
+    return int(key) - 1 if isinstance(at, list) and key.isdigit() and int(key) > 0 else key
 
 
 def _lost(table: Table, told: str, parents: Any, key: str | int, at: Any) -> InputError:
