@@ -7,6 +7,7 @@ import json
 import sys
 import tomllib
 from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -266,9 +267,7 @@ def new(options: argparse.Namespace) -> int:
 
 def schema(options: argparse.Namespace) -> int:
     """Print the JSON schema of scene files."""
-    from contactopt.cli.scene_schema import schema
-
-    print(json.dumps(schema(), indent=1))
+    print(files("contactopt.scenes").joinpath("scene_schema.json").read_text("utf-8"), end="")
     return 0
 
 
