@@ -8,7 +8,7 @@ NOISE count as NOISE.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +19,8 @@ SHIFT = 1e-3  # s, of shifted geometric means
 NOISE = 1e-4  # s
 BUSY = 1.2  # wall over CPU time above which a machine is too busy for a ranking
 LEAST = 1e-17  # drawn and compared in place of a certificate of 0
-RESAMPLES, CONFIDENCE, SEED = 2000, 0.95, 0
+RESAMPLES, BATCH, SEED = 2000, 100, 0
+LIKELY = 2.5, 97.5  # percentiles of the ranks that bound an interval
 POINT = ["problem", "method", "tolerance"]
 # what is known of a point: (of the table's column, how the repeats are joined)
 JOINED = {
@@ -78,25 +79,22 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     logs, solved = _logs(points, accuracy)
     low, high = _rank_interval(logs.to_numpy(float))
     claims = points[points["claimed"] & np.isfinite(points["residual"])]
-    ratio = (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median()
     tried = points[points["status"] != "refused"].groupby("method")["problem"].nunique()
     means = mean_times(points, accuracy)
-    made = pd.DataFrame(
-        {
-            "method": logs.columns,
-            "solved": solved.sum().to_numpy(),
-            "of": len(logs),
-            "taken": tried.reindex(logs.columns).fillna(0).astype(int).to_numpy(),
-            "mean": means.to_numpy(),
-            "over the least": (means / means.min()).to_numpy(),
-            "wall mean": mean_times(points, accuracy, "wall").reindex(logs.columns).to_numpy(),
-            "memory": points.groupby("method")["memory"].max().reindex(logs.columns).to_numpy(),
-            "over claim": ratio.reindex(logs.columns).to_numpy(),
-            "rank": means.rank(method="min", na_option="bottom").astype(int).to_numpy(),
-            "best": low,
-            "worst": high,
-        }
-    )
+    columns = {
+        "solved": solved.sum(),
+        "of": len(logs),
+        "taken": tried.reindex(logs.columns, fill_value=0),
+        "mean": means,
+        "over the least": means / means.min(),
+        "wall mean": mean_times(points, accuracy, "wall"),
+        "memory": points.groupby("method")["memory"].max(),
+        "over claim": (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median(),
+        "rank": means.rank(method="min", na_option="bottom").astype(int),
+        "best": low,
+        "worst": high,
+    }
+    made = pd.DataFrame(columns, index=logs.columns).rename_axis("method").reset_index()
     return made.sort_values(["rank", "method"], ignore_index=True)
 
 
@@ -136,22 +134,17 @@ def _logs(
 
 
 def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest rank of each method that resampling the instances leaves likely."""
-    from scipy.stats import bootstrap, rankdata
+    """The least and the largest rank of each method that resampling the problems leaves likely."""
+    from scipy.stats import rankdata
 
-    def ranks(index: np.ndarray, axis: int) -> np.ndarray:
-        means = logs[index].mean(axis=-2)
-        return np.moveaxis(rankdata(means, method="min", axis=-1).astype(float), -1, 0)
-
-    if len(logs) < 2:
-        only = rankdata(logs.mean(axis=0), method="min") if len(logs) else np.zeros(logs.shape[1])
-        return only.astype(int), only.astype(int)
-    options: dict[str, Any] = {"n_resamples": RESAMPLES, "batch": 100, "method": "percentile"}
-    rng = np.random.default_rng(SEED)
-    found = bootstrap(
-        (np.arange(len(logs)),), ranks, axis=-1, rng=rng, confidence_level=CONFIDENCE, **options
-    ).confidence_interval
-    return np.floor(found.low).astype(int), np.ceil(found.high).astype(int)
+    rng, ranks = np.random.default_rng(SEED), [np.ones((1, logs.shape[1]))]
+    if len(logs):
+        drawn = (
+            rng.integers(len(logs), size=(BATCH, len(logs))) for _ in range(RESAMPLES // BATCH)
+        )
+        ranks = [rankdata(logs[index].mean(axis=1), method="min", axis=1) for index in drawn]
+    low, high = np.percentile(np.concatenate(ranks), LIKELY, axis=0)
+    return np.floor(low).astype(int), np.ceil(high).astype(int)
 
 
 def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
