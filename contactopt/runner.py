@@ -45,13 +45,8 @@ if TYPE_CHECKING:
 Note = Callable[[str], None]
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = (
-    "approach",
-    "shift",
-    "shear_force",
-    "contact_half_width",
-    "stick_half_width",
-    "friction_work",
-)
+    "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
+)  # fmt: skip
 WIDTHS = "contact_half_width", "stick_half_width"
 # option -> field of Limits
 BOUNDS = {"max_unknowns": "unknowns", "time_limit": "seconds", "max_memory": "memory"}
