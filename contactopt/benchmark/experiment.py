@@ -21,7 +21,7 @@ from contactopt.benchmark.keys import KINDS as FIGURE_KINDS
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, MethodSpec, Run, method_spec
-from contactopt.benchmark.testset import of_set
+from contactopt.benchmark.testset.problem_set import of_set
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table

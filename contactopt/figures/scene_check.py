@@ -214,15 +214,12 @@ def _gap_notes(scene: Scene, made: Posed) -> list[str]:
     notes, length = [], scene.units[0]
     for pair, own in zip(scene.pairs, made.couplings):
         size, least = _size(own), float(own.gap.min())
-        if least < -SHARE * size:
+        how = f"overlap by up to {-least:.4g} {length}"
+        how = how if least < 0 else f"are {least:.4g} {length} or more apart"
+        if abs(least) > SHARE * size:
             notes.append(
-                f"the surfaces of '{pair.name}' overlap by up to {-least:.4g} {length}, more than"
-                f" {SHARE:.0%} of their extent: is a body misplaced, or a unit of length wrong?"
-            )
-        if least > SHARE * size:
-            notes.append(
-                f"the surfaces of '{pair.name}' are {least:.4g} {length} or more apart, more than"
-                f" {SHARE:.0%} of their extent: is a body misplaced, or a unit of length wrong?"
+                f"the surfaces of '{pair.name}' {how}, more than {SHARE:.0%} of their extent: is a"
+                " body misplaced, or a unit of length wrong?"
             )
     return notes
 

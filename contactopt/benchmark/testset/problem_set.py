@@ -96,17 +96,9 @@ def problems(
 def of_set(
     testset: str, folder: Path, tier: str = "", tags: str = "", every: int = 1
 ) -> list[Problem]:
-    """Find the problems that an entry `testset = ...` of an experiment file means.
-
-    Parameters
-    ----------
-    testset, folder, tier : as for `problems`
-    tags : conditions, with commas between them
-    every : only each so-manieth problem is taken, for a quick look at the whole set
-
-    Returns
-    -------
-    The problems. InputError if there are none.
+    """The problems that an entry `testset = ...` of an experiment file means; InputError if there
+    are none. `tags` are conditions with commas between them. Only each so-manieth problem is taken,
+    as `every` says, for a quick look at the whole set.
     """
     check_count("every", every)
     found = problems(tier, [text for text in tags.split(",") if text.strip()], testset, folder)
