@@ -10,6 +10,7 @@ import numpy as np
 from contactopt.cards import card, count, force_unit, line
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
+from contactopt.methods.method import NATIVE
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.readings.resultants import resultant_words
 from contactopt.scenes.scene import Scene
@@ -80,28 +81,39 @@ def squeeze(t: np.ndarray) -> np.ndarray:
 
 
 def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
-    """The numbers of a run in words and with units, for a page or a notebook."""
+    """The numbers of a run in words and with units, for a terminal, a page or a notebook."""
     length, stress = summary["units"]
-    newton = force_unit((length, stress))
+    newton, backends = force_unit((length, stress)), ("normal_backend", "tangential_backend")
+    used = {summary[backend] for backend in backends} - {NATIVE}
+    by = f" with {' and '.join(sorted(used))}" if used else ""
     rows = {
         "status": f"{summary['status']}: {summary.get('message')}",
         "residual (certificate)": f"{summary['residual']:.2e}",
         "unknowns of the bodies": str(summary["dofs"]),
         "contacts": str(summary["contact_nodes"]),
         "friction coefficient": f"{summary['mu']:g}",
-        "method": f"{summary['method']}, {summary['outer_iterations']} iterations",
-        "sum of the normal forces": f"{summary['normal_force']:.5g} {newton}",
-        "largest pressure": f"{summary['max_pressure']:.5g} {stress}",
+        "method": f"{summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
+        "sum of the normal forces": f"{summary['normal_force']:.6g} {newton}",
+        "largest pressure": f"{summary['max_pressure']:.6g} {stress}",
     }
+    if summary["q"] == "implicit":
+        rows["Q"] = f"{summary['products']} products with vectors"
     for name, force in resultant_words(summary).items():
-        rows[f"force on the upper body of {name}"] = f"{force} {newton}"
+        pair = summary["pairs"][name]
+        rows[f"contact '{name}'"] = (
+            f"force on the upper body {force} {newton}; largest pressure"
+            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
+            f" {pair['slip']} slip"
+        )
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:
-            rows[words] = f"{summary[key]:.5g} {length}"
+            rows[words] = f"{summary[key]:.6g} {length}"
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
-        told = f"{error}, asked for {found['target']:g}: {found['message']}"
-        rows[f"accuracy of the {found['quantity']}"] = told
+        rows[found["quantity"]] = (
+            f"{found['value']:.6g}, estimated relative error {error}, asked for"
+            f" {found['target']:g}: {found['message']}"
+        )
         sizes = (str(level["unknowns"]) for level in found["levels"])
         rows["unknowns of the meshes"] = ", ".join(sizes)
     return rows

@@ -11,11 +11,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from contactopt.cards import count, force_unit
+from contactopt.cards import count
 from contactopt.cli.test_set import problems  # noqa: F401 (a command, too)
 from contactopt.errors import InputError
-from contactopt.methods.method import NATIVE
-from contactopt.readings.resultants import resultant_words
+from contactopt.outcome import summary_rows
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -97,41 +96,18 @@ def run(options: argparse.Namespace) -> int:
 
 def _print_result(result: Any, out: str) -> None:
     s = result.summary
-    contacts = count(s["contact_nodes"], "contact node")
-    print(f"{s['scene']}: {count(s['dofs'], 'unknown')}, {contacts}, mu = {s['mu']:g}")
-    steps = count(s["outer_iterations"], "iteration")
-    print(f"{s['status']}: {result.solution.message}; {steps}, residual {s['residual']:.1e}")
-    if s["q"] == "implicit":
-        print(f"Q by {s['products']} products with vectors")
-    native = s["normal_backend"] == s["tangential_backend"] == NATIVE
-    by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
-    print(f"method {s['method']}" + ("" if native else by))
-    length, stress = result.scene.units
-    force = force_unit((length, stress))
-    approach = "" if s["approach"] is None else f"approach {s['approach']:.6g} {length}, "
-    print(
-        f"sum of normal forces {s['normal_force']:.6g} {force}, {approach}"
-        f"largest pressure {s['max_pressure']:.6g} {stress}"
-    )
-    for name, words in resultant_words(s).items():
-        pair = s["pairs"][name]
-        print(
-            f"contact '{name}': force on the upper body {words} {force}; largest pressure"
-            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
-            f" {pair['slip']} slip"
-        )
-    if s["contact_half_width"] is not None:
-        print(
-            f"contact half-width {s['contact_half_width']:.6g} {length}, "
-            f"stick half-width {s['stick_half_width']:.6g} {length}"
-        )
+    print(s["scene"])
+    for name, words in summary_rows(s).items():
+        print(f"{name}: {words}")
     for name, found in s.get("quantities", {}).items():
         error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
         print(f"{name} {found['value']:.6g}; its relative error on this mesh: {error}")
     for remark in s["remarks"]:
         print(f"note: {remark}")
-    if result.estimate is not None:
-        _print_estimate(result.estimate)
+    if (estimate := result.estimate) is not None:
+        print(estimate.guarantee.sentence)
+        for one in estimate.levels:
+            print(f"  {one.mesh}: {one.unknowns} unknowns, {one.value:.6g}, {one.seconds:.2f} s")
     phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
     print(f"{s['seconds']['total']:.1f} s: {phases}")
     from contactopt.figures.output import SINGLE
@@ -140,19 +116,6 @@ def _print_result(result: Any, out: str) -> None:
     single = [name for name in names if SINGLE.search(name)]
     listed = ", ".join(name for name in names if name not in single)
     print(f"files in {out}: {listed}" + (f", {len(single)} of single states" if single else ""))
-
-
-def _print_estimate(estimate: Any) -> None:
-    error = "unknown" if estimate.error is None else f"{estimate.error:.1e}"
-    print(
-        f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for"
-        f" {estimate.target:g}:"
-    )
-    print(f"  {estimate.message}\n  {estimate.guarantee.sentence}")
-    for level in estimate.levels:
-        print(
-            f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s"
-        )
 
 
 def view(options: argparse.Namespace) -> int:
