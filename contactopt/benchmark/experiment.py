@@ -137,14 +137,15 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
 
     problems = reader.expanded("problems", (*KINDS, "testset"), problem)
     methods = reader.expanded("methods", ("method",), method)
+    skipped = tuple(why for *_, why in reader.absent)
     if not problems or not methods:
-        raise NothingToRun(f"'{path}': nothing is left to run; " + " ".join(reader.skipped))
+        raise NothingToRun(f"'{path}': nothing is left to run; " + " ".join(skipped))
     return replace(
         _without_runs(table, path),
         problems=tuple(problems),
         methods=tuple(methods),
         plugins=paths,
-        skipped=tuple(reader.skipped),
+        skipped=skipped,
         absent=tuple(
             (MethodSpec(name, given).label, why)
             for key, name, given, why in reader.absent

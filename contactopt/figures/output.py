@@ -32,6 +32,7 @@ PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
 SERIES = "states.pvd"
 SINGLE = re.compile(r"-state\d{4}\.vtu$")  # names of the files of single states
+VTU = re.compile(r"(.*?)(-state\d{4})?\.vtu")  # of all fields
 STATUS = ("open", "stick", "slip")
 # of the bodies at all states of a load path, above which only the last state is written
 MOST_NUMBERS = 3_000_000
@@ -152,30 +153,17 @@ def _fits(path: PathResult, last: tuple[Fields, ...]) -> bool:
 def earlier_files(folder: Path) -> set[str]:
     """Name the files that an earlier `contactopt run` wrote into a folder; none where none has run.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for
-    a VTU file per body and per pair of surfaces, told from other people's by the fields in them,
-    and pictures and tables of the pairs that the summary names.
+    Its summary.json names the bodies and pairs, of which there are files beside those of fixed
+    names.
     """
-    with suppress(OSError, ValueError, TypeError):
-        summary = json.loads(_plain_text(folder / "summary.json"))
-        if "contact_nodes" in summary:
-            marks = ('"von_mises"', '"contact_pressure"')
-            found = {
-                file.name
-                for file in folder.glob("*.vtu")
-                if any(mark in _plain_text(file) for mark in marks)
-            }
-            pictures = {
-                f"pressure-{pair}.{ending}"
-                for pair in summary.get("pairs", {})
-                for ending in FORMATS
-            }
-            pictures |= {f"contact-{pair}.csv" for pair in summary.get("pairs", {})}
-            found |= {file.name for file in folder.iterdir() if file.name in pictures}
-            return found | {name for name in RUN_FILES if (folder / name).exists()}
+    told = folder / "summary.json"
+    with suppress(OSError, ValueError, TypeError, LookupError):
+        summary = json.loads(told.read_text()) if told.is_file() else {}
+        pairs, bodies = [*summary["pairs"]], [*summary["limits"]["bodies"]]
+        fixed = {f"pressure-{pair}.{ending}" for pair in pairs for ending in FORMATS}
+        fixed |= {f"contact-{pair}.csv" for pair in pairs} | set(RUN_FILES)
+        names = {*bodies, *(f"contact-{pair}" for pair in pairs)}
+        found = {file.name for file in folder.iterdir()}
+        fields = {file for file in found if (of := VTU.fullmatch(file)) and of[1] in names}
+        return found & fixed | fields
     return set()
-
-
-def _plain_text(file: Path) -> str:
-    """What a regular file holds; nothing for links and devices."""
-    return "" if file.is_symlink() or not file.is_file() else file.read_text(errors="replace")
