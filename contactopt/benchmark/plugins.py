@@ -72,7 +72,7 @@ class Registry:
         """Run plug-in files, each of them once; InputError, naming the file, if one fails."""
         for path in map(Path, paths):
             if path not in self.loaded:
-                for one in vars(_run(path)).values():
+                for one in vars(run_file(path, "plug-in")).values():
                     for table, name, declared in getattr(one, "__dict__", {}).get(MARK, ()):
                         getattr(self, table)[name] = declared
                 self.loaded.add(path)
@@ -158,16 +158,16 @@ def _name(kind: str, make: Any, name: object) -> str:
     return found
 
 
-def _run(path: Path) -> ModuleType:
-    """Run a plug-in file as a module of its own."""
+def run_file(path: Path, what: str) -> ModuleType:
+    """Run a Python file as a module of its own; InputError, which calls it `what`, if it fails."""
     digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
     spec = spec_from_file_location(f"contactopt_plugin_{path.stem}_{digest}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise InputError(f"plug-in '{path}' is not a Python file.")
+        raise InputError(f"{what} '{path}' is not a Python file.")
     module = module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses look their module up
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
+        raise InputError(f"{what} '{path}' failed: {type(error).__name__}: {error}") from error
     return module

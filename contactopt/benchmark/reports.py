@@ -11,13 +11,13 @@ import io
 import os
 import re
 from collections.abc import Mapping, Sequence
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactopt.benchmark.entries import twice_in
 from contactopt.benchmark.experiment import Experiment, read_layout
 from contactopt.benchmark.keys import COLUMNS, USUAL
+from contactopt.benchmark.plugins import run_file
 from contactopt.benchmark.ranking import BUSY, wall_over_cpu
 from contactopt.benchmark.report_figures import FIGURES
 from contactopt.benchmark.store import load, require, save
@@ -139,13 +139,9 @@ def _drawn(layout: Experiment, number: int, entry: Mapping[str, Any], table: pd.
 
 def _findings(layout: Experiment, table: pd.DataFrame) -> list[str]:
     path = layout.path.parent / layout.findings
-    spec = spec_from_file_location(f"contactopt_findings_{path.stem}", path)
-    if spec is None or spec.loader is None or not path.is_file():
-        raise InputError(f"'{layout.path}': findings '{layout.findings}' is not a Python file.")
-    module = module_from_spec(spec)
+    made = run_file(path, f"'{layout.path}': findings")
     try:
-        spec.loader.exec_module(module)
-        return list(module.findings(table))
+        return list(made.findings(table))
     except Exception as error:
         raise InputError(f"findings '{path}' failed: {type(error).__name__}: {error}") from error
 
