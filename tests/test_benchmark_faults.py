@@ -544,6 +544,16 @@ def test_a_process_that_grows_goes_on():
     assert len(numbers) == 1
 
 
+def test_a_worker_says_nothing_to_the_pythons_of_others(monkeypatch):
+    """A peer in another Python would take packages of this one for its own."""
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    made = process.Process()
+    try:
+        assert made.ask(60, "look", os.getenv, "PYTHONPATH") is None
+    finally:
+        made.kill()
+
+
 def test_a_half_space_goes_to_other_processes_by_its_kernel():
     """No array is made of its Q, so that its size is no limit."""
     (spec,) = problems.named(

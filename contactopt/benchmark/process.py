@@ -30,7 +30,12 @@ MOST_WORDS = 10e6  # bytes of print that are kept on disk; more is thrown away
 KEPT_WORDS = 4000  # bytes of what a process printed last, which may tell why it ended
 MEMORY_WORDS = re.compile(rb"MemoryError|bad_alloc|[Oo]ut of memory|Cannot allocate memory")
 KILLED = "killed from outside, as the system does when memory runs out"
-PROGRAM = "from contactopt.benchmark.process import serve; serve({}, {})"
+PROGRAM = """
+import sys
+sys.path[:] = {}
+from contactopt.benchmark.process import serve
+serve({}, {})
+"""
 
 
 class Ended(Exception):
@@ -62,13 +67,12 @@ class Process:
         self.ready, self.known = False, {}  # until it has said so
         self.noise = tempfile.TemporaryFile()  # noqa: SIM115
         self.pipe, theirs = Pipe()
-        program = PROGRAM.format(theirs.fileno(), os.getpid())
-        # a solver's last words tell more than the stack of a crashed process
-        told = {"PYTHONFAULTHANDLER": "", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        program = PROGRAM.format(sys.path, theirs.fileno(), os.getpid())
         try:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", program],
-                env=os.environ | ONE_THREAD | told,
+                # a solver's last words tell more than the stack of a crashed process
+                env=os.environ | ONE_THREAD | {"PYTHONFAULTHANDLER": ""},
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,  # Ctrl-C is for the campaign
                 stdin=subprocess.DEVNULL,
