@@ -87,9 +87,11 @@ def _of_run() -> dict[str, dict[str, Any]]:
             told |= {"metavar": option.value, "type": option.kind}
         if option.kind is tuple:
             told |= {"nargs": "+", "type": str}
-    made["--figures"] |= {"choices": NAMES["figures"], "group": "pictures"}
-    none = {"dest": "figures", "action": "store_const", "const": (), "group": "pictures"}
-    return made | {"--no-figures": none | {"help": "draw no figures"}}
+        if name == "figures":
+            told |= {"choices": NAMES[name], "group": "pictures"}
+            none = {"dest": name, "action": "store_const", "const": (), "group": "pictures"}
+            made["--no-figures"] = none | {"help": "draw no figures"}
+    return made
 
 
 def _named(text: str) -> tuple[str, float]:
