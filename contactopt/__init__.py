@@ -82,7 +82,6 @@ _HOMES = {
 }
 _MODULES = {
     "analytic": "analytic",
-    "animation": "figures.animation",
     "benchmark": "benchmark",
     "fclib": "fclib",
     "laws": "problem.laws",

@@ -7,15 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.cards import card, count, line
+from contactopt.cards import card, count, force_unit, line
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
+from contactopt.methods.method import NATIVE
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.readings.resultants import resultant_words
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 
 if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
+
+
+LENGTHS = {
+    "approach": "approach of the bodies",
+    "contact_half_width": "half-width of the contact",
+    "stick_half_width": "half-width of the stick zone",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +58,7 @@ class Outcome:
         return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
 
     def _repr_html_(self) -> str:
-        s, (length, stress) = self.summary, self.scene.units
-        rows: dict[str, object] = {
-            "status": f"{s['status']}: {self.solution.message}",
-            "residual (certificate)": f"{s['residual']:.2e}",
-            "unknowns, contacts": f"{s['dofs']}, {s['contact_nodes']}",
-            "sum of normal forces": f"{s['normal_force']:.6g} {stress} {length}^2",
-            "largest pressure": f"{s['max_pressure']:.6g} {stress}",
-        }
-        for key in ("approach", "contact_half_width", "stick_half_width"):
-            if s[key] is not None:
-                rows[key.replace("_", " ")] = f"{s[key]:.6g} {length}"
-        if self.estimate is not None:
-            rows[self.estimate.quantity] = f"{self.estimate.value:.6g}; {self.estimate.message}"
-            levels = self.estimate.levels
-            rows["meshes"] = "; ".join(f"{one.unknowns}: {one.value:.6g}" for one in levels)
-        return card(f"{self.scene.name}, {self.scene.friction}", rows)
+        return card(f"{self.scene.name}, {self.scene.friction}", summary_rows(self.summary))
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -84,3 +78,42 @@ class Outcome:
 def squeeze(t: np.ndarray) -> np.ndarray:
     """Drop the second axis of tangential components (k, d) where d is one, as in 2D."""
     return t[:, 0] if t.shape[1] == 1 else t
+
+
+def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
+    """The numbers of a run in words and with units, for a terminal, a page or a notebook."""
+    length, stress = summary["units"]
+    newton, backends = force_unit((length, stress)), ("normal_backend", "tangential_backend")
+    used = {summary[backend] for backend in backends} - {NATIVE}
+    by = f" with {' and '.join(sorted(used))}" if used else ""
+    rows = {
+        "status": f"{summary['status']}: {summary.get('message')}",
+        "residual (certificate)": f"{summary['residual']:.2e}",
+        "unknowns of the bodies": str(summary["dofs"]),
+        "contacts": str(summary["contact_nodes"]),
+        "friction coefficient": f"{summary['mu']:g}",
+        "method": f"{summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
+        "sum of the normal forces": f"{summary['normal_force']:.6g} {newton}",
+        "largest pressure": f"{summary['max_pressure']:.6g} {stress}",
+    }
+    if summary["q"] == "implicit":
+        rows["Q"] = f"{summary['products']} products with vectors"
+    for name, force in resultant_words(summary).items():
+        pair = summary["pairs"][name]
+        rows[f"contact '{name}'"] = (
+            f"force on the upper body {force} {newton}; largest pressure"
+            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
+            f" {pair['slip']} slip"
+        )
+    for key, words in LENGTHS.items():
+        if summary.get(key) is not None:
+            rows[words] = f"{summary[key]:.6g} {length}"
+    if found := summary.get("accuracy"):
+        error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
+        rows[found["quantity"]] = (
+            f"{found['value']:.6g}, estimated relative error {error}, asked for"
+            f" {found['target']:g}: {found['message']}"
+        )
+        sizes = (str(level["unknowns"]) for level in found["levels"])
+        rows["unknowns of the meshes"] = ", ".join(sizes)
+    return rows

@@ -7,10 +7,13 @@ contactopt.run takes them as keywords, `contactopt run` as options of the same n
 from __future__ import annotations
 
 import inspect
+import re
 import textwrap
+import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import Field, dataclass, field, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields
+from importlib.resources import files
+from typing import Any, NamedTuple, TypeVar
 
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
@@ -19,116 +22,34 @@ TOGETHER = "accuracy and quantity belong together: the bound, and the name of wh
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _option(kind: type, value: str, what: str, default: Any = None, in_file: bool = True) -> Any:
-    """An option: its type, its value in help, what it is, whether a scene file may hold it."""
-    told = {"kind": kind, "value": value, "what": what, "in_file": in_file}
-    return field(default=default, metadata=told)
-
-
 @dataclass(frozen=True)
 class RunOptions:
     """How a scene is solved, and what is drawn of it. None stands for what is usual.
 
     Each is a keyword of contactopt.run and an option of `contactopt run`, where `max_unknowns` is
     written --max-unknowns. Those that the table [solve] of a scene file may hold are marked.
+    run_options.toml says what each of them is.
     """
 
-    method: str | None = _option(
-        str, "NAME", "the method (default: auto; alternating if a backend is named)"
-    )
-    normal: str | None = _option(str, "BACKEND", "QP backend that finds the normal forces")
-    tangential: str | None = _option(
-        str,
-        "BACKEND",
-        "backend that finds the friction forces: QP (2D, axisymmetric) or conic (3D)",
-    )
-    preconditioner: str | None = _option(
-        str,
-        "NAME",
-        "an approximate inverse of Q, of methods that take"
-        " products with Q; it implies the implicit form",
-    )
-    Q: str = _option(
-        str, "FORM", "Q as an array (explicit), or known by its products only (implicit)", "auto"
-    )
-    solver: str = _option(str, "NAME", "solver of the bodies' linear systems", "auto")
-    tol: float = _option(
-        float, "T", f"largest natural-map residual that counts as solved (default: {TOL:g})", TOL
-    )
-    accuracy: float | None = _option(
-        float,
-        "X",
-        "refine the mesh until the estimated relative error of a quantity is below X, or a sentence"
-        " says why not; `elements` only scales the first mesh",
-    )
-    quantity: str | None = _option(
-        str, "NAME", "the quantity of the accuracy; NAME:PAIR is that of one pair of surfaces"
-    )
-    read: tuple[str, ...] = _option(
-        tuple,
-        "NAME",
-        "quantities that are read from the solution, such as von_mises:BODY:BOUNDARY, each with the"
-        " error that its one mesh lets expect",
-        (),
-        in_file=False,
-    )
-    adaptive: bool = _option(
-        bool,
-        "",
-        "for the accuracy, refine the mesh only where the quantity needs it, each body by itself;"
-        " quadrilaterals become triangles",
-        False,
-    )
-    max_unknowns: int | None = _option(
-        int, "N", "for the accuracy: no mesh has more displacement unknowns"
-    )
-    time_limit: float | None = _option(
-        float,
-        "S",
-        "the solution, or the search for the accuracy, ends after so many seconds; what was found"
-        " is written, and `resume` goes on",
-    )
-    max_memory: float | None = _option(
-        float, "GB", "for the accuracy: the search takes no more memory (default: 2)"
-    )
-    simplest: bool = _option(
-        bool,
-        "",
-        "first leave out all that makes no error, proved by a certificate of the whole;"
-        " `contactopt simplify SCENE` says what this is",
-        False,
-        in_file=False,
-    )
-    resume: bool = _option(
-        bool,
-        "",
-        "go on where a run into the same folder was stopped by time, memory or a person",
-        False,
-        in_file=False,
-    )
-    start: str | None = _option(
-        str,
-        "DIR",
-        "start from the forces in the folder of another run, of this scene or of one with other"
-        " numbers or meshes",
-        in_file=False,
-    )
-    figures: tuple[str, ...] = _option(
-        tuple,
-        "FORMAT",
-        "formats of the figures (default: png); none are drawn if there are none, which saves half"
-        " of the time of a small scene",
-        ("png",),
-        in_file=False,
-    )
-    html: bool = _option(
-        bool,
-        "",
-        "also write view.html, the result as a page to"
-        " explore (needs: pip install 'contactopt[view]')",
-        False,
-        in_file=False,
-    )
+    method: str | None = None
+    normal: str | None = None
+    tangential: str | None = None
+    preconditioner: str | None = None
+    Q: str = "auto"
+    solver: str = "auto"
+    tol: float = TOL
+    accuracy: float | None = None
+    quantity: str | None = None
+    read: tuple[str, ...] = ()
+    adaptive: bool = False
+    max_unknowns: int | None = None
+    time_limit: float | None = None
+    max_memory: float | None = None
+    simplest: bool = False
+    resume: bool = False
+    start: str | None = None
+    figures: tuple[str, ...] = ("png",)
+    html: bool = False
 
     def __post_init__(self) -> None:
         if self.preconditioner is not None and self.Q == "explicit":
@@ -162,8 +83,31 @@ class RunOptions:
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
-OPTIONS: dict[str, Field[Any]] = {one.name: one for one in fields(RunOptions)}
-IN_FILES = tuple(name for name, one in OPTIONS.items() if one.metadata["in_file"])
+class Option(NamedTuple):
+    """An option: its annotation, type and usual value, and of its help what stands for the value,
+    and what it is.
+    """
+
+    annotation: Any
+    kind: type
+    default: Any
+    value: str
+    what: str
+
+
+def _options() -> dict[str, Option]:
+    made = {}
+    for one in fields(RunOptions):
+        kind = KINDS[re.split(r"\W", str(one.type))[0]]
+        value, what = (_TEXTS["in_scene_files"] | _TEXTS["elsewhere"])[one.name]
+        made[one.name] = Option(one.type, kind, one.default, value, what.format(one.default))
+    return made
+
+
+KINDS: dict[str, type] = {kind.__name__: kind for kind in (str, float, int, bool, tuple)}
+_TEXTS = tomllib.loads(files("contactopt").joinpath("run_options.toml").read_text("utf-8"))
+OPTIONS = _options()
+IN_FILES = tuple(name for name in OPTIONS if name in _TEXTS["in_scene_files"])
 
 
 def choose(
@@ -181,7 +125,7 @@ def explained(only: str = "") -> str:
     """The options as lines of a docstring, with `only` added to those of a scene file."""
     return "\n".join(
         textwrap.fill(
-            f"{name} : {one.metadata['what']}{only if name in IN_FILES else ''}",
+            f"{name} : {one.what}{only if name in IN_FILES else ''}",
             96,
             subsequent_indent="    ",
         )
@@ -197,7 +141,7 @@ def takes_options(function: F) -> F:
     *own, keywords = signature.parameters.values()
     options = [
         inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=one.default, annotation=one.type
+            name, inspect.Parameter.KEYWORD_ONLY, default=one.default, annotation=one.annotation
         )
         for name, one in OPTIONS.items()
     ]

@@ -45,13 +45,8 @@ if TYPE_CHECKING:
 Note = Callable[[str], None]
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = (
-    "approach",
-    "shift",
-    "shear_force",
-    "contact_half_width",
-    "stick_half_width",
-    "friction_work",
-)
+    "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
+)  # fmt: skip
 WIDTHS = "contact_half_width", "stick_half_width"
 # option -> field of Limits
 BOUNDS = {"max_unknowns": "unknowns", "time_limit": "seconds", "max_memory": "memory"}
@@ -88,7 +83,7 @@ class Result(Outcome):
         if file is None:
             file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
         with tempfile.TemporaryDirectory() as folder:
-            write(self, Path(folder), states=True)
+            write(self, Path(folder))
             (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
             made = write_page(folder, file)
         if show:
@@ -371,7 +366,7 @@ def _written(
             with _clock(seconds, "figures"):
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
-            write(result, folder, states=options.html)
+            write(result, folder)
             if result.path is None:
                 restart.finished(result.solution)
             restart.save(folder / FILE, result.solution.solved)

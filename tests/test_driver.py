@@ -6,7 +6,7 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, solve
-from contactopt.benchmark.families.random_frames import rigid_bodies
+from contactopt.benchmark.families.packings import rigid_bodies
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import METHODS

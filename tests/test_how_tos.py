@@ -54,7 +54,7 @@ def test_a_page_runs_as_it_stands(name, tmp_path, monkeypatch, capsys):
                 assert main(line.split()[1:]) == 0, capsys.readouterr().err
     if name == "experiment_files":
         report = Path("out/bench/friction/report.md").read_text()
-        assert report.count("*Table ") == 3 and report.count("*Figure ") == 6
+        assert report.count("*Table ") == 3 and report.count("*Figure ") == 5
         assert Path("out/bench/friction/report.html").exists()
 
 

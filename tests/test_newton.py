@@ -19,7 +19,7 @@ from contactopt import (
     transfer,
 )
 from contactopt.benchmark.families.of_scenes import tangential
-from contactopt.benchmark.families.random_frames import rigid_bodies
+from contactopt.benchmark.families.packings import rigid_bodies
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.bonded import Bonded

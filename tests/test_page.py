@@ -133,7 +133,7 @@ def test_bodies_of_long_paths_stay_and_the_page_says_so(tmp_path, monkeypatch):
     text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
     assert not data["moving"] and len(decoded(data["bodies"][0]["move"])) == 1
     assert "The bodies are those of the last state" in text
-    assert not (tmp_path / "states.npz").exists()
+    assert not list(tmp_path.glob("*-state*.vtu"))
 
 
 def test_the_page_stands_alone_and_is_small(folder):

@@ -13,7 +13,6 @@ from test_scene_files import SMALL, written
 import contactopt
 from contactopt import HalfSpace, InputError, Material, Rigid, Scene
 from contactopt.cli import main
-from contactopt.cli.scene_schema import schema
 from contactopt.scenes.example import EXAMPLE
 from contactopt.scenes.material_library import STRESSES, library
 from contactopt.scenes.rough_surfaces import self_affine
@@ -207,7 +206,8 @@ def matches(value, rule):
 
 
 def test_the_schema_accepts_what_the_reader_accepts(tmp_path, capsys):
-    rule = schema()
+    assert main(["schema"]) == 0
+    rule = json.loads(capsys.readouterr().out)
     assert matches(tomllib.loads(EXAMPLE), rule) and matches(tomllib.loads(SMALL), rule)
     commented = [
         line[2:] for line in EXAMPLE.splitlines() if line.startswith("# ") and " = " in line
@@ -228,5 +228,3 @@ def test_the_schema_accepts_what_the_reader_accepts(tmp_path, capsys):
         SMALL.replace("nu = 0.3", "mu = 0.3"),
     ):
         assert not matches(tomllib.loads(wrong), rule), wrong
-    assert main(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(rule))

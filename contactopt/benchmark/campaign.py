@@ -13,10 +13,9 @@ from typing import Any
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
 from contactopt.benchmark.measure import Task, absent_row
 from contactopt.benchmark.pool import History, run_locally
-from contactopt.benchmark.process import end_orphans
 from contactopt.benchmark.report_page import report_campaign
-from contactopt.benchmark.reports import build, has_table, publish, read_layout
-from contactopt.benchmark.store import Store, lines, load, require, save, told
+from contactopt.benchmark.reports import build, layouts, publish
+from contactopt.benchmark.store import Store, lines, load, require, save
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.writing import remove_files, whole_file
@@ -41,7 +40,7 @@ def run_campaign(
     out : The folder of the results; by default out/bench/NAME.
     jobs : Number of worker processes; by default one per core.
     resume : Whether to go on where an interrupted campaign stopped. No finished run is repeated.
-    filters : "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match.
+    filters : "COLUMN=PATTERN" on problem, method, setting or repeat; all must match.
     quiet : Whether no progress is shown.
 
     Returns
@@ -53,10 +52,9 @@ def run_campaign(
     InputError : On an experiment that cannot be run, filters that no run matches, results in the
         folder without `resume`, and a folder that cannot be written to.
     """
-    require("loky", "pandas", "psutil", "pyarrow", "tqdm")
+    require("pandas", "psutil", "pyarrow", "tqdm")
     from tqdm import tqdm
 
-    end_orphans()
     e = experiment if isinstance(experiment, Experiment) else read_experiment(experiment)
     jobs = jobs if jobs is not None else os.cpu_count() or 1
     check_count("jobs", jobs)
@@ -120,7 +118,7 @@ def run_reports(
 
     Returns
     -------
-    The page with all reports.
+    The folder of the reports.
 
     Raises
     ------
@@ -136,21 +134,14 @@ def run_reports(
     work = Path("out", version)
     target = work / "reports" if version == "quick" else Path(reports)
     if version:
-        found = Counter(read_layout(path).name for path in paths)  # before anything is run
-        for name in [name for name, n in found.items() if n > 1]:
-            raise InputError(
-                f"two experiments are called {name!r}; their results would be mixed, rename one."
-            )
+        layouts(paths)  # two of one name would mix their results
         for path in paths:
             if path.stem in names or not names:
                 _renew(path, version == "quick", work, target, jobs)
-    page = build(paths, target)
-    for path in paths:
-        layout = read_layout(path)
-        ranked = any(entry["kind"] == "leader_table" for entry in layout.figures)
-        if ranked and has_table(target / layout.name):
-            report_campaign(target / layout.name, path)
-    return page
+    for layout in build(paths, target):
+        if any(entry["kind"] == "leader_table" for entry in layout.figures):
+            report_campaign(target / layout.name, layout.path)
+    return target
 
 
 def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
@@ -161,6 +152,5 @@ def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) 
         print(f"left out: {error}", file=sys.stderr)
         return
     folder = work / experiment.name
-    with told(folder):
-        remove_files(folder, WRITTEN)
+    remove_files(folder, WRITTEN)
     publish(path, run_campaign(experiment, folder, jobs=jobs), target)

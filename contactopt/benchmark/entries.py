@@ -20,13 +20,11 @@ LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
 class Entries:
     """Expands the tables below the keys of one file.
 
-    skipped  why optional entries are left out
-    absent   (key, name, values, why) of each of them
+    absent  (key, name, values, why) of each optional entry that is left out
     """
 
     def __init__(self, table: Table):
         self.table = table
-        self.skipped: list[str] = []
         self.absent: list[tuple[str, str, dict[str, Any], str]] = []
 
     def expanded(self, key: str, kinds: Sequence[str], make: Callable[..., list[Any]]) -> list[Any]:
@@ -45,9 +43,8 @@ class Entries:
                         message = f"{str(error).rstrip('.')}."
                         culprit = _blamed(message, entry, own[0])
                         raise self.table.fail(message, key, index, culprit) from error
-                    self.skipped.append(str(error))
                     self.absent.append((key, name, values, str(error)))
-        if twice := twice_in(spec.label for spec in made):
+        if twice := twice_in(getattr(one, "spec", one).label for one in made):
             raise self.table.fail(f"two {key} are called {twice!r}.", key)
         return made
 

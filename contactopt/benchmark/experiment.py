@@ -7,38 +7,33 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from contactopt.benchmark.entries import Entries, size_of, twice_in
+from contactopt.benchmark.keys import EXPERIMENT
+from contactopt.benchmark.keys import KINDS as FIGURE_KINDS
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
-from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run, method_spec
-from contactopt.benchmark.testset import of_set
+from contactopt.benchmark.runs import SETTINGS, MethodSpec, Run, method_spec
+from contactopt.benchmark.testset.problem_set import of_set
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
 
 MOST_RUNS = 200_000  # of one experiment
-# key -> type of its value, and how a message names that
-TYPES: dict[str, tuple[type, str]] = {
-    **dict.fromkeys(("name", "title", "text", "findings"), (str, "a text")),
-    **dict.fromkeys(
-        ("plugins", "settings", "starts", "problems", "methods", "figures", "columns"),
-        (list, "a list"),
-    ),
-    "quick": (dict, "a table"),
-    "diagnose": (bool, "true or false"),
-}
-# s; GB: less than the least holds no NumPy and SciPy
-BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}
-# key -> least and most; NumPy's generator takes no larger seed
-WHOLE = {"repeats": (1, MOST_RUNS), "max_iterations": (1, 10**9), "seed": (0, 2**32 - 1)}
-FILTERED = ("problem", "method", "setting", "start", "repeat")
+# key -> the limits of its value, closed; s; GB: less holds no NumPy and SciPy; NumPy's generator
+# takes no larger seed
+LIMITS = {
+    "repeats": (1, MOST_RUNS), "max_iterations": (1, 10**9), "seed": (0, 2**32 - 1),
+    "time_limit": (1e-9, 1e6), "memory_limit": (0.2, 1e4),
+}  # fmt: skip
+FILTERED = ("problem", "method", "setting", "repeat")
 
 
 class NothingToRun(InputError):
@@ -47,7 +42,7 @@ class NothingToRun(InputError):
 
 @dataclass(frozen=True)
 class Experiment:
-    """One experiment file.
+    """One experiment file, or what it says of its report, without problems and methods.
 
     Its fields are the keys of the file, which `contactopt.benchmark.keys` describes. Lists and
     ranges in problems and methods are expanded, and plug-in files are named by their whole path.
@@ -58,13 +53,12 @@ class Experiment:
     """
 
     name: str
-    problems: tuple[ProblemSpec, ...]
-    methods: tuple[MethodSpec, ...]
+    problems: tuple[ProblemSpec, ...] = ()
+    methods: tuple[MethodSpec, ...] = ()
     title: str = ""
     text: str = ""
     plugins: tuple[str, ...] = ()
     settings: tuple[str | float, ...] = ("default",)
-    starts: tuple[str, ...] = ("cold",)
     repeats: int = 1
     time_limit: float = 60.0
     memory_limit: float = 4.0
@@ -92,10 +86,10 @@ class Experiment:
             str(setting): SETTINGS.get(str(setting)) or float(setting) for setting in self.settings
         }
         runs = [
-            Run(problem, method, setting, tolerance, start, repeat)
+            Run(problem, method, setting, tolerance, repeat)
             for problem in self.problems
-            for repeat, (setting, tolerance), start, method in product(
-                range(self.repeats), tolerances.items(), self.starts, self.methods
+            for repeat, (setting, tolerance), method in product(
+                range(self.repeats), tolerances.items(), self.methods
             )
         ]
         return [run for run in runs if all(_matches(run, text) for text in filters)]
@@ -124,62 +118,120 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
     ------
     InputError : On anything that cannot be run. The message names file and line.
     """
-    path = Path(path)
+    table, path = _checked(Path(path), quick), Path(path)
+    _check_number_of_runs(table)
+    reader, folder = Entries(table), path.parent
+    paths = tuple(str((folder / plugin).resolve()) for plugin in table.data.get("plugins", ()))
+    registry = _registry(table, paths)
+
+    def problem(kind: str, name: str, parameters: dict[str, Any]) -> list[ProblemSpec]:
+        if kind == "testset":
+            return [found.spec for found in of_set(name, folder=folder, **parameters)]
+        found = named(kind, name, parameters, folder)
+        for spec in found:
+            spec.check(registry.problems)
+        return found
+
+    def method(kind: str, name: str, settings: dict[str, Any]) -> list[MethodSpec]:
+        return [method_spec(name, settings, registry)]
+
+    problems = reader.expanded("problems", (*KINDS, "testset"), problem)
+    methods = reader.expanded("methods", ("method",), method)
+    skipped = tuple(why for *_, why in reader.absent)
+    if not problems or not methods:
+        raise NothingToRun(f"'{path}': nothing is left to run; " + " ".join(skipped))
+    return replace(
+        _without_runs(table, path),
+        problems=tuple(problems),
+        methods=tuple(methods),
+        plugins=paths,
+        skipped=skipped,
+        absent=tuple(
+            (MethodSpec(name, given).label, why)
+            for key, name, given, why in reader.absent
+            if key == "methods"
+        ),
+    )
+
+
+def read_layout(path: str | Path) -> Experiment:
+    """What an experiment file says of its report; its problems and methods may be missing here."""
+    return _without_runs(_checked(Path(path)), Path(path))
+
+
+def _without_runs(table: Table, path: Path) -> Experiment:
+    values: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in table.data.items()
+        if key not in ("problems", "methods")
+    }
+    return Experiment(**{"title": values["name"]} | values, path=path)
+
+
+def _checked(path: Path, quick: bool = False) -> Table:
+    """The table of a file without unknown keys and wrong values; nothing is built yet."""
     root = read_table(path, "experiment")
-    own = root.data.get("quick", {}) if quick else {}
-    if not isinstance(own, dict):
-        raise root.fail("'quick' must be a table.", "quick")
+    own = root.take("quick", dict, {}) if quick else {}
     lines = {place: line for place, line in root.lines.items() if place[0] not in own}
     if own:
         lines |= {place[1:]: line for place, line in root.lines.items() if place[0] == "quick"}
     table = Table(root.file, lines, root.data | own)
-    _check(table)
-    return _Reader(table, path).experiment()
-
-
-def _check(table: Table) -> None:
-    """Refuse unknown keys, wrong values, and more runs than MOST_RUNS, before anything is built."""
-    data, known = table.data, {f.name for f in fields(Experiment)} - {"path", "skipped", "absent"}
-    for key in data:
-        if key not in known:
+    for key in table.data:
+        if key not in EXPERIMENT:
             raise table.fail(f"unknown key {key!r}.", key)
-    for key in ("name", "problems", "methods"):
-        if not data.get(key):
-            raise table.fail(f"an experiment needs '{key}'.", key)
-    for key, (kind, what) in TYPES.items():
-        table.take(key, kind, what=what)
-    if not re.fullmatch(r"[\w.-]+", data["name"]):
+    for key, (_, example) in EXPERIMENT.items():
+        kind = type(tomllib.loads(f"x = {example}")["x"])
+        value = table.take(key, kind)
+        if key in LIMITS and value is not None:
+            low, high = LIMITS[key]
+            if not low <= value <= high:
+                whole = "a whole number" if kind is int else "a number"
+                must = f"{key!r} must be {whole} from {low:g} to {high:g}"
+                raise table.fail(f"{must}; got {short(value)}.", key)
+    _check_texts(table)
+    return table
+
+
+def _check_texts(table: Table) -> None:
+    """Refuse names of folders, settings, columns and figures that cannot be used."""
+    name = table.take("name", str, needed=True)
+    if not re.fullmatch(r"[\w.-]+", name):
         raise table.fail(
             "'name' becomes a directory: letters, digits, '-', '_' and '.' only.", "name"
         )
     with table.about("name"):
-        check_name("'name'", data["name"])
+        check_name("'name'", name)
     for key in ("plugins", "columns"):
-        if not all(isinstance(value, str) for value in data.get(key, ())):
+        if not all(isinstance(value, str) for value in table.data.get(key, ())):
             raise table.fail(f"'{key}' must be a list of texts.", key)
-    for key, (least, most) in WHOLE.items():
-        value = table.take(key, int, 1, what=f"a whole number from {least} to {most}")
-        if not least <= value <= most:
-            raise table.fail(
-                f"'{key}' must be a whole number from {least} to {most}; got {short(value)}.", key
-            )
-    for key, (low, high) in BOUNDS.items():
-        table.take(key, float, low=low, high=high)
-    for key, choices, more in (("settings", SETTINGS, " or a number"), ("starts", STARTS, "")):
-        values = data.get(key, ())
-        for value in values:
-            if more and not isinstance(value, str):
-                with table.about(key):
-                    check_number("a setting", value, 0.0)
-            elif value not in choices:
-                raise table.fail(
-                    f"unknown {key[:-1]} {value!r}; choose from {', '.join(choices)}{more}.", key
-                )
-        if twice := twice_in(map(str, values)):
-            raise table.fail(f"'{key}' holds {twice} twice.", key)
-    number = data.get("repeats", 1)
-    for key in ("settings", "starts"):
-        number *= len(data.get(key, ("default",)))
+    settings = table.data.get("settings", ())
+    for value in settings:
+        if not isinstance(value, str):
+            with table.about("settings"):
+                check_number("a setting", value, 0.0)
+        elif value not in SETTINGS:
+            known = f"choose from {', '.join(SETTINGS)} or a number"
+            raise table.fail(f"unknown setting {value!r}; {known}.", "settings")
+    if twice := twice_in(map(str, settings)):
+        raise table.fail(f"'settings' holds {twice} twice.", "settings")
+    for number, entry in enumerate(table.tables("figures"), 1):
+        kind, caption, where = (entry.data.get(key) for key in ("kind", "caption", "where"))
+        if not isinstance(kind, str) or kind not in FIGURE_KINDS:
+            known = f"unknown kind {kind!r}; choose from {', '.join(FIGURE_KINDS)}."
+            raise entry.fail(f"figure {number}: {known}", "kind")
+        if not caption or not isinstance(caption, str):
+            raise entry.fail(f"figure {number}: it needs a caption.", "caption")
+        if not isinstance(where, dict | None):
+            must = "'where' must be a table of columns and values."
+            raise entry.fail(f"figure {number}: {must}", "where")
+
+
+def _check_number_of_runs(table: Table) -> None:
+    data = table.data
+    for key in ("problems", "methods"):
+        if not data.get(key):
+            raise table.fail(f"an experiment needs '{key}'.", key)
+    number = data.get("repeats", 1) * len(data.get("settings", ("default",)))
     for key in ("problems", "methods"):
         entries = [entry for entry in data[key] if isinstance(entry, dict)]
         number *= max(1, sum(math.prod(map(size_of, entry.values())) for entry in entries))
@@ -191,53 +243,15 @@ def _check(table: Table) -> None:
         )
 
 
-class _Reader(Entries):
-    """Expands the problems and methods of one file whose other keys were checked."""
-
-    def __init__(self, table: Table, path: Path):
-        super().__init__(table)
-        self.path = path
-
-    def experiment(self) -> Experiment:
-        data, folder = self.table.data, self.path.parent
-        paths = tuple(str((folder / plugin).resolve()) for plugin in data.get("plugins", ()))
-        registry = self.registry(paths)
-
-        def problem(kind: str, name: str, parameters: dict[str, Any]) -> list[ProblemSpec]:
-            if kind == "testset":
-                return [found.spec for found in of_set(name, folder=folder, **parameters)]
-            found = named(kind, name, parameters, folder)
-            for spec in found:
-                spec.check(registry.problems)
-            return found
-
-        def method(kind: str, name: str, settings: dict[str, Any]) -> list[MethodSpec]:
-            return [method_spec(name, settings, registry)]
-
-        problems = self.expanded("problems", (*KINDS, "testset"), problem)
-        methods = self.expanded("methods", ("method",), method)
-        if not problems or not methods:
-            raise NothingToRun(f"'{self.path}': nothing is left to run; " + " ".join(self.skipped))
-        values: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in data.items()
-        }
-        values |= {"problems": tuple(problems), "methods": tuple(methods), "plugins": paths}
-        absent = tuple(
-            (MethodSpec(name, given).label, why)
-            for key, name, given, why in self.absent
-            if key == "methods"
-        )
-        return Experiment(**values, path=self.path, skipped=tuple(self.skipped), absent=absent)
-
-    def registry(self, paths: tuple[str, ...]) -> Registry:
-        """What the plug-ins declare."""
-        found = Registry()
-        with self.table.about("plugins"):
-            found.load(paths)
-        for name in found.problems:
-            if name in FAMILIES:
-                raise self.table.fail(
-                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it.",
-                    "plugins",
-                )
-        return found
+def _registry(table: Table, paths: tuple[str, ...]) -> Registry:
+    """What the plug-ins declare."""
+    found = Registry()
+    with table.about("plugins"):
+        found.load(paths)
+    for name in found.problems:
+        if name in FAMILIES:
+            raise table.fail(
+                f"plug-in problem {name!r} has the name of a family of contactopt; rename it.",
+                "plugins",
+            )
+    return found

@@ -10,6 +10,7 @@ _texts = tomllib.loads(files("contactopt.benchmark").joinpath("keys.toml").read_
 EXPERIMENT: dict[str, tuple[str, str]] = _texts["experiment"]
 FIGURE: dict[str, tuple[str, str]] = _texts["figure"]
 KINDS: dict[str, str] = _texts["kinds"]
+USUAL: list[dict[str, str]] = _texts["usual"]  # figures of a report that asks for none
 # column -> type, what it is
 COLUMNS: dict[str, tuple[str, str]] = _texts["columns"]
 ENDS: dict[str, str] = _texts["statuses"]  # how runs end besides with a word of contactopt.Status

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -23,7 +23,6 @@ from contactopt.benchmark.runs import Run
 from contactopt.benchmark.store import ABSENT, SCHEMA, UNKNOWN, pack
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Status, natural_map_residual
-from contactopt.problem.laws.associated import Associated
 
 
 @dataclass(frozen=True)
@@ -54,15 +53,12 @@ def blank(task: Task) -> dict[str, Any]:
         "settings": json.dumps(run.method.settings),
         "label": run.method.label,
         "backend": run.method.backends(2, 3),
-        "law": run.method.law,
         "setting": run.setting,
         "tolerance": run.tolerance,
         "time_limit": task.time_limit,
-        "start": run.start,
         "repeat": run.repeat,
         "status": "error",
         "residual": np.inf,
-        "law_residual": np.inf,
         "history": "[]",
     }
 
@@ -74,7 +70,6 @@ def absent_row(experiment: str, method: str, why: str) -> dict[str, Any]:
         "experiment": experiment,
         "method": method,
         "name": method.partition("(")[0],
-        "law": "coulomb",
         "status": ABSENT,
         "message": one_line(why),
     }
@@ -126,18 +121,12 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
         residual = natural_map_residual(problem, r, lam)
     except InputError as error:
         return out | {"status": "error", "message": one_line(error)}
-    own = residual if task.run.method.law == "coulomb" else associated_residual(problem, r, lam)
-    out |= {"residual": residual, "law_residual": own}
+    out["residual"] = residual
     if not np.all(np.isfinite(r)) or (lam is not None and not np.all(np.isfinite(lam))):
         return out | {"status": "not_finite"}
     out["answer"] = pack(r)
-    if own > task.run.tolerance:
+    if residual > task.run.tolerance:
         return out | {"status": "false_claim" if claimed else answer.status}
     if answer.seconds > task.time_limit:
         return out | {"status": "time_limit", "message": "certified, but after the time limit"}
     return out | {"status": "solved", "success": True}
-
-
-def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """The natural-map residual [-] of the same problem under the associated law."""
-    return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

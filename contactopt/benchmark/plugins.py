@@ -1,5 +1,6 @@
-"""Methods and problems of the user: decorated in a file, or entry points of a package. The
-campaign's process runs the file, to know what it declares; the functions are called in workers
+"""Methods and problems of the user, decorated in a file.
+
+The campaign's process runs the file, to know what it declares; the functions are called in workers
 only.
 """
 
@@ -9,21 +10,19 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from contextvars import ContextVar
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from contactopt.benchmark.peers import Peer
 from contactopt.errors import InputError
 from contactopt.methods import METHODS
 
-GROUP = "contactopt.methods"  # of entry points
-LAWS = ("coulomb", "associated")
+MARK = "_contactopt"  # attribute of what a file declares: table of the registry, name, entry
 # to a plug-in, if it has such an argument
-PASSED = ("tol", "time_limit", "max_iterations", "start")
+PASSED = ("tol", "time_limit", "max_iterations")
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,6 @@ class Plugin:
 
     name: str
     make: Callable[..., Any]
-    law: str = "coulomb"
     peer: Peer | None = None
 
     @property
@@ -74,41 +72,21 @@ class Registry:
         """Run plug-in files, each of them once; InputError, naming the file, if one fails."""
         for path in map(Path, paths):
             if path not in self.loaded:
-                token = _receiving.set(self)
-                try:
-                    _run(path)
-                finally:
-                    _receiving.reset(token)
+                for one in vars(run_file(path, "plug-in")).values():
+                    for table, name, declared in getattr(one, "__dict__", {}).get(MARK, ()):
+                        getattr(self, table)[name] = declared
                 self.loaded.add(path)
 
-    def find(self, name: str) -> Plugin | None:
-        """The method of that name, from a loaded file or an entry point; None if there is none."""
-        if name not in self.methods:
-            for point in entry_points(group=GROUP, name=name):
-                try:
-                    self.methods[name] = Plugin(name, point.load())
-                except Exception as error:
-                    text = f"plug-in '{point.value}' failed: {type(error).__name__}: {error}"
-                    raise InputError(text) from error
-        return self.methods.get(name)
 
-
-# The registry that receives what the plug-in file declares that is being run; None at any other
-# time.
-_receiving: ContextVar[Registry | None] = ContextVar("receiving", default=None)
-
-
-def method(
-    make: Any = None, *, name: str | None = None, law: str = "coulomb", peer: Peer | None = None
-) -> Any:
+def method(make: Any = None, *, name: str | None = None, peer: Peer | None = None) -> Any:
     """Declare a function or class as a method of the benchmark.
 
     The declaration counts where a campaign runs the file. Everywhere else the function or class is
     returned as it is.
 
-    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s],
-    `max_iterations` and `start` (a Solution or None) are passed if it has such arguments, `tol` not
-    at the setting "default" if it has a default. It returns reactions (k, dim), or (reactions,
+    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s] and
+    `max_iterations` are passed if it has such arguments, `tol` not at the setting "default" if it
+    has a default. It returns reactions (k, dim), or (reactions,
     multipliers), or a Solution, or an Answer. Returning forces claims success; raising does not,
     and InputError means that the problem is not one for this method.
 
@@ -116,8 +94,6 @@ def method(
     ----------
     make : The function or class, where the decorator is written without arguments.
     name : The name of the method; by default that of the function.
-    law : "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles
-        compare within, one law.
     peer : The solver of others that it calls, without which it is left out.
 
     Returns
@@ -126,21 +102,16 @@ def method(
 
     Raises
     ------
-    InputError : For an unknown law, and for the name of a method of contactopt.
+    InputError : For the name of a method of contactopt.
     """
-    if law not in LAWS:
-        raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
 
     def register(make: Any) -> Any:
-        plugin = Plugin(_name("method", make, name), make, law, peer)
+        plugin = Plugin(_name("method", make, name), make, peer)
         if plugin.name in METHODS:
             raise InputError(
                 f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it."
             )
-        registry = _receiving.get()
-        if registry is not None:
-            registry.methods[plugin.name] = plugin
-        return make
+        return _marked(make, "methods", plugin.name, plugin)
 
     return register if make is None else register(make)
 
@@ -164,12 +135,15 @@ def problem(make: Any = None, *, name: str | None = None) -> Any:
     """
 
     def register(make: Any) -> Any:
-        found, registry = _name("problem", make, name), _receiving.get()
-        if registry is not None:
-            registry.problems[found] = make
-        return make
+        return _marked(make, "problems", _name("problem", make, name), make)
 
     return register if make is None else register(make)
+
+
+def _marked(make: Any, *declared: Any) -> Any:
+    """The function or class with a note for the registry that runs its file."""
+    setattr(make, MARK, (*getattr(make, "__dict__", {}).get(MARK, ()), declared))
+    return make
 
 
 def _name(kind: str, make: Any, name: object) -> str:
@@ -184,15 +158,16 @@ def _name(kind: str, make: Any, name: object) -> str:
     return found
 
 
-def _run(path: Path) -> None:
-    """Run a plug-in file as a module of its own."""
+def run_file(path: Path, what: str) -> ModuleType:
+    """Run a Python file as a module of its own; InputError, which calls it `what`, if it fails."""
     digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
     spec = spec_from_file_location(f"contactopt_plugin_{path.stem}_{digest}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise InputError(f"plug-in '{path}' is not a Python file.")
+        raise InputError(f"{what} '{path}' is not a Python file.")
     module = module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses look their module up
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
+        raise InputError(f"{what} '{path}' failed: {type(error).__name__}: {error}") from error
+    return module

@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections import deque
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -29,10 +28,6 @@ LONG = 1.0  # s of a run above which it is not repeated
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
 
-class NotBuilt(Exception):
-    """A problem could not be built; the message says how."""
-
-
 class Worker:
     """Two processes: one builds problems and never runs a method, one runs methods and never builds
     a problem.
@@ -46,9 +41,6 @@ class Worker:
         self.held = ""  # label of the problem that is held, with the columns that it fills
         self.problem: InterfaceProblem
         self.facts: dict[str, Any]
-        self.sent = ""  # label of the problem that the solver keeps
-        self.warm: set[tuple[str, int]] = set()  # methods and dimensions that were warmed up there
-        self.doubted = ""  # method that failed in the process and may have left it in disorder
         self.broken: dict[str, str] = {}  # problems that cannot be built -> how
 
     def __enter__(self) -> Worker:
@@ -69,10 +61,9 @@ class Worker:
     def run(self, task: Task, hopeless: bool = False) -> dict[str, Any]:
         """The row of this run, whatever happens to the processes; a `hopeless` one is not made."""
         row = blank(task)
-        try:
-            self._build(task)
-        except NotBuilt as error:
-            return row | {"status": "not_built", "message": str(error)}
+        self._build(task)
+        if (label := task.run.problem.label) in self.broken:
+            return row | {"status": "not_built", "message": self.broken[label]}
         row |= self.facts
         try:
             row["backend"] = task.run.method.backends(self.problem.dim)
@@ -85,50 +76,41 @@ class Worker:
         try:
             row |= judge(task, self.problem, self._answer(task))
         except Ended as end:
-            row |= {"status": end.status, "message": str(end)}
-            row["call_seconds"] = time.perf_counter() - begin
-            if end.phase == "neighbour":
-                how = f"{end.status} while its warm start was sought: {end}"
-                row |= {"status": "not_built", "message": how}
-            return row
+            spent = time.perf_counter() - begin
+            return row | {"status": end.status, "message": str(end), "call_seconds": spent}
         # a peer fails in its own process
         alone = task.run.method.foreign and not task.run.method.peer
         if alone and not row["success"] and row["status"] != "refused":
-            self.doubted = task.run.method.label
+            self.solver.known["doubted"] = task.run.method.label
         return row
 
     def _build(self, task: Task) -> None:
-        """Hold the task's problem; raises NotBuilt."""
+        """Hold the task's problem, or why it cannot be built."""
         spec = task.run.problem
-        if spec.label in self.broken:
-            raise NotBuilt(self.broken[spec.label])
-        if self.held == spec.label:
+        if spec.label in (self.held, *self.broken):
             return
         self.solver.start()  # imports at the same time
         foreign = spec.kind == "family" and spec.name not in FAMILIES
         request = (spec, task.plugins if foreign else (), task.diagnose, task.memory_limit)
-        try:
+        for _ in range(2):  # killed once may be chance, and would cost all runs of the problem
             try:
                 found = self.builder.ask(BUILD_LIMIT, "build", worker.build, *request)
+                break
             except Ended as end:
+                found = one_line(f"{end.status} while the problem was built: {end}".rstrip(": "))
                 if str(end) != KILLED:
-                    raise
-                # once may be chance, and would cost all runs of the problem
-                found = self.builder.ask(BUILD_LIMIT, "build", worker.build, *request)
-        except Ended as end:
-            found = one_line(f"{end.status} while the problem was built: {end}".rstrip(": "))
-        finally:
-            if foreign:  # a plug-in may have changed the library there
-                self.builder.kill()
+                    break
+        if foreign:  # a plug-in may have changed the library there
+            self.builder.kill()
         if isinstance(found, str):
             self.broken[spec.label] = found
-            raise NotBuilt(found)
-        self.held, (self.problem, self.facts) = spec.label, found
+        else:
+            self.held, (self.problem, self.facts) = spec.label, found
 
     def _answer(self, task: Task) -> Answer:
         """What the method answers. Raises Ended if its process did not outlive it."""
-        if self.doubted not in ("", task.run.method.label):
-            self._restart()
+        if self.solver.known.get("doubted") not in (None, task.run.method.label):
+            self.solver.kill()
         answer = None
         while answer is None:  # its process may have been replaced since it got the problem
             try:
@@ -136,10 +118,8 @@ class Worker:
                 hard = MARGIN * task.time_limit + GRACE
                 hard += PEER_GRACE if task.run.method.peer else 0.0
                 answer = self.solver.ask(hard, "solve", worker.execute, task)
-                if answer is None:
-                    self._forget()
             except Ended as end:
-                self._restart()
+                self.solver.kill()
                 if end.phase == START:
                     raise InputError(
                         f"a worker process cannot start ({end.status},"
@@ -149,34 +129,22 @@ class Worker:
                     raise
                 _cold.add(task.run.method.name)
         if answer.status == "out_of_memory":
-            self._restart()  # its memory is fragmented at best
+            self.solver.kill()  # its memory is fragmented at best
         return answer
 
     def _prepare(self, task: Task) -> None:
-        """Give the process the problem, a warm start if asked for, and the method's imports."""
+        """Give the process the problem, and let it import what the method needs."""
         method, dim = task.run.method, self.problem.dim
-        if not self.solver.running:
-            self._forget()
-        if self.sent != self.held:
+        if self.solver.known.get("problem") != self.held:
             given = (self.held, self.problem, task.plugins)
             self.solver.ask(BUILD_LIMIT, "send", worker.hold, *given)
-            self.sent = self.held
-        if task.run.start == "warm":
-            self.solver.ask(BUILD_LIMIT, "neighbour", worker.find_start, self.held)
-        if (method.label, dim) not in self.warm and method.name not in _cold:
+            self.solver.known["problem"] = self.held
+        warm = f"warm {method.label} {dim}"
+        if warm not in self.solver.known and method.name not in _cold:
             least = PLUGIN_WARM_UP if method.foreign else WARM_UP
             limit = max(MARGIN * task.time_limit + GRACE, least)
             self.solver.ask(limit, "warm up", worker.warm_up, task, dim)
-            self.warm.add((method.label, dim))
-
-    def _restart(self) -> None:
-        self.solver.kill()
-        self._forget()
-
-    def _forget(self) -> None:
-        """What the process knew that is not there any more."""
-        self.sent = self.doubted = ""
-        self.warm = set()
+            self.solver.known[warm] = method.label
 
 
 class Shares:
@@ -184,25 +152,22 @@ class Shares:
 
     def __init__(self, tasks: Sequence[Task]):
         self.lock = threading.Lock()
-        self.tasks: dict[str, deque[Task]] = {}
-        for task in tasks:
-            self.tasks.setdefault(task.run.problem.label, deque()).append(task)
+        self.tasks: dict[str, list[Task]] = {}  # of each problem, the next one last
+        for task in reversed(tasks):
+            self.tasks.setdefault(task.run.problem.label, []).append(task)
         self.holders: dict[object, str] = {}
 
     def take(self, worker: object) -> Task | None:
         """The next task of this worker; None when there is none."""
         with self.lock:
-            if not self.tasks:
+            own, others = self.holders.pop(worker, ""), {*self.holders.values()}
+            left = [name for name, tasks in self.tasks.items() if tasks]
+            if not left:
                 return None
-            label = self.holders.get(worker)
-            if label not in self.tasks:
-                free = [name for name in self.tasks if name not in self.holders.values()]
-                label = free[0] if free else max(self.tasks, key=lambda name: len(self.tasks[name]))
-            self.holders[worker] = label
-            task = self.tasks[label].popleft()
-            if not self.tasks[label]:
-                del self.tasks[label]
-            return task
+            free = [name for name in reversed(left) if name not in others]
+            most = max(left, key=lambda name: len(self.tasks[name]))
+            self.holders[worker] = own if own in left else next(iter(free), most)
+            return self.tasks[self.holders[worker]].pop()
 
 
 class History:
@@ -220,7 +185,7 @@ class History:
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Take a row into account."""
-        key = row["problem"], row["method"], row["start"]
+        key = row["problem"], row["method"]
         if row["call_seconds"] > LONG:
             self.slow.add((*key, row["setting"]))
         if row["status"] in ("time_limit", "killed"):
@@ -228,13 +193,12 @@ class History:
 
     def repeated(self, run: Run) -> bool:
         """Whether a run is a repeat of a slow one."""
-        key = run.problem.label, run.method.label, run.start, run.setting
+        key = run.problem.label, run.method.label, run.setting
         return run.repeat > 0 and key in self.slow
 
     def hopeless(self, run: Run) -> bool:
         """Whether the same method had not enough time for a looser tolerance."""
-        key = run.problem.label, run.method.label, run.start
-        return run.tolerance < self.ended.get(key, 0.0)
+        return run.tolerance < self.ended.get((run.problem.label, run.method.label), 0.0)
 
 
 def run_locally(

@@ -20,8 +20,7 @@ from contactopt.benchmark.families.of_scenes import (
     skewed,
     tangential,
 )
-from contactopt.benchmark.families.packings import packing
-from contactopt.benchmark.families.random_frames import rigid_bodies
+from contactopt.benchmark.families.packings import packing, rigid_bodies
 from contactopt.benchmark.families.rigid_blocks import rigid_blocks
 from contactopt.benchmark.families.springs import springs
 from contactopt.benchmark.families.unsolvable import dragged, squeezed, toppled

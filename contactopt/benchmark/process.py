@@ -1,5 +1,5 @@
-"""A process in which code of the user may run, seen from outside: the one worker of an executor of
-loky, with limits of time, the end of all that it started, and what it printed last.
+"""A process in which code of the user may run, seen from outside: limits of time, the end of all
+that it started, and what it printed last.
 """
 
 from __future__ import annotations
@@ -7,23 +7,20 @@ from __future__ import annotations
 import os
 import re
 import signal
+import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
-from concurrent.futures import Future
+from collections.abc import Callable
 from contextlib import suppress
-from typing import IO, TYPE_CHECKING, Any
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any
 
 from contactopt.errors import InputError
 
-if TYPE_CHECKING:
-    import psutil
-
 LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "RAYON")
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in LIBRARIES} | {"VECLIB_MAXIMUM_THREADS": "1"}
-# environment variable of all that a campaign starts: number and start time of its process
-MARK = "CONTACTOPT_CAMPAIGN"
 START = "start"  # the phase until the process answers at all
 START_LIMIT = 120.0  # s for it
 # of a process that is killed in it: once may be chance, each time is its limit of memory
@@ -33,6 +30,12 @@ MOST_WORDS = 10e6  # bytes of print that are kept on disk; more is thrown away
 KEPT_WORDS = 4000  # bytes of what a process printed last, which may tell why it ended
 MEMORY_WORDS = re.compile(rb"MemoryError|bad_alloc|[Oo]ut of memory|Cannot allocate memory")
 KILLED = "killed from outside, as the system does when memory runs out"
+PROGRAM = """
+import sys
+sys.path[:] = {}
+from contactopt.benchmark.process import serve
+serve({}, {})
+"""
 
 
 class Ended(Exception):
@@ -46,172 +49,142 @@ class Ended(Exception):
 class Process:
     """One process at a time, started when it is first asked and again after it died.
 
-    Use from one thread.
+    Use from one thread. `known` is for notes about the present process, and empty in a new one.
     """
 
     def __init__(self) -> None:
-        self.executor: Any = None
-        self.number: int | None = None  # of the process, once it has answered
-        self.noise: IO[bytes]
-        self.ready: Future[int]
+        self.process: subprocess.Popen[bytes] | None = None
+        self.known: dict[str, str] = {}
 
     @property
     def running(self) -> bool:
-        return self.executor is not None
+        return self.process is not None
 
     def start(self) -> None:
         """Let the process start, if there is none; nobody waits for it here."""
-        if self.executor is not None:
+        if self.process is not None:
             return
-        from loky import ProcessPoolExecutor
-
+        self.ready, self.known = False, {}  # until it has said so
+        self.noise = tempfile.TemporaryFile()  # noqa: SIM115
+        self.pipe, theirs = Pipe()
+        program = PROGRAM.format(sys.path, theirs.fileno(), os.getpid())
         try:
-            self.noise = tempfile.NamedTemporaryFile("a+b", delete=False)  # noqa: SIM115
-            # a solver's last words tell more than the stack of a crashed process
-            environment = ONE_THREAD | {"PYTHONFAULTHANDLER": "", MARK: _mark()}
-            told = (self.noise.name, os.getpid())
-            self.executor = ProcessPoolExecutor(
-                1, env=environment, initializer=prepare, initargs=told
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", program],
+                # a solver's last words tell more than the stack of a crashed process
+                env=os.environ | ONE_THREAD | {"PYTHONFAULTHANDLER": ""},
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,  # Ctrl-C is for the campaign
+                stdin=subprocess.DEVNULL,
+                stdout=self.noise,
+                stderr=subprocess.STDOUT,
             )
-            self.ready = self.executor.submit(os.getpid)
         except OSError as error:
             raise InputError(
                 f"a worker process cannot start: {error.strerror or error}."
             ) from error
+        finally:
+            theirs.close()
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function returns that the process calls; Ended, with `phase`, if it died or took
         more than `limit` seconds. One that died before the call is started anew, STARTS times.
         """
-        from loky.process_executor import BrokenProcessPool
-
         for _ in range(STARTS):
             self.start()
             try:
-                if self.number is None:
-                    self.number = self._wait(self.ready, START_LIMIT, START)
-                    os.unlink(self.noise.name)
-                answer = self.executor.submit(function, *arguments)
+                if not self.ready:
+                    self.ready = self._wait(START_LIMIT, START)
+                self.pipe.send((function, arguments))
+                break
             except Ended as end:
                 last = end
-            except BrokenProcessPool as error:
-                last = Ended(START, *self._death(error))
-            else:
-                return self._wait(answer, limit, phase)
-        raise last
+            except OSError:  # it died while nobody asked it
+                last = Ended(START, *self._death())
+        else:
+            raise last
+        answer = self._wait(limit, phase)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
 
-    def _wait(self, future: Future[Any], limit: float, phase: str) -> Any:
-        from loky.process_executor import BrokenProcessPool
-
+    def _wait(self, limit: float, phase: str) -> Any:
+        """What the process says next."""
+        assert self.process is not None
         deadline = time.monotonic() + limit
-        while True:
-            try:
-                return future.result(max(0.0, min(BEAT, deadline - time.monotonic())))
-            except BrokenProcessPool as error:
-                raise Ended(phase, *self._death(error)) from None
-            except TimeoutError:
-                if os.fstat(self.noise.fileno()).st_size > MOST_WORDS:
-                    self.noise.truncate(0)
-                if time.monotonic() >= deadline:
-                    self.kill()
-                    raise Ended(phase, "killed", f"still running after {limit:g} s") from None
+        while not self.pipe.poll(max(0.0, min(BEAT, deadline - time.monotonic()))):
+            if self.process.poll() is not None:  # a copy of it may hold the pipe open
+                raise Ended(phase, *self._death())
+            if os.fstat(self.noise.fileno()).st_size > MOST_WORDS:
+                self.noise.truncate(0)
+            if time.monotonic() >= deadline:
+                self.kill()
+                raise Ended(phase, "killed", f"still running after {limit:g} s")
+        try:
+            return self.pipe.recv()
+        except (EOFError, OSError):
+            raise Ended(phase, *self._death()) from None
 
-    def _death(self, error: Exception) -> tuple[str, str]:
+    def _death(self) -> tuple[str, str]:
         """How the process ended by itself: (status, message)."""
+        assert self.process is not None
+        code = self.process.wait()
         self.noise.seek(max(0, os.fstat(self.noise.fileno()).st_size - KEPT_WORDS))
         said = self.noise.read(KEPT_WORDS)
         self.kill()
         last = said.strip().splitlines()[-1].decode(errors="replace") if said.strip() else ""
         if MEMORY_WORDS.search(said):
             return "out_of_memory", one_line(last)
-        told = f"{error.__cause__} {error}"
-        found = re.search(r"exit codes of the workers are \{(\w+)\((-?\d+)\)", told)
-        name, code = found.groups() if found else ("EXIT", "unknown")
-        if name == "SIGKILL":
+        if code == -signal.SIGKILL:
             return "out_of_memory", KILLED
-        name = f"exit code {code}" if name == "EXIT" else name
+        name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         return "crashed", one_line(f"{name}: {last}".rstrip(": "))
 
     def interrupt(self) -> None:
-        """Kill the process from another thread; the one that uses it sees it end."""
+        """Kill the process and all that it started, also from another thread; the one that uses the
+        process sees it end.
+        """
         import psutil
 
-        if self.number is not None:
-            with suppress(psutil.Error):
-                process = psutil.Process(self.number)
-                _kill([process, *process.children(recursive=True)])
+        if self.process is None:
+            return
+        with suppress(psutil.Error):  # what it started in sessions of their own
+            for child in psutil.Process(self.process.pid).children(recursive=True):
+                child.kill()
+        with suppress(OSError):
+            os.killpg(self.process.pid, signal.SIGKILL)
 
     def kill(self) -> None:
         """End the process with all that it started."""
-        if self.executor is None:
+        if self.process is None:
             return
         self.interrupt()
-        self.executor.shutdown(wait=True, kill_workers=True)
+        self.process.wait()
+        self.pipe.close()
         self.noise.close()
-        with suppress(OSError):
-            os.unlink(self.noise.name)
-        self.executor = self.number = None
-        end_orphans()
+        self.process, self.known = None, {}
 
 
-def prepare(noise: str, parent: int) -> None:
-    """Make the new process ready: it ends with the process of the number `parent`, leaves Ctrl-C to
-    it, and prints into the file `noise`.
-
-    loky would end a process that has grown by 300 MB, as large problems let it grow. A call that
-    comes at that moment gets no answer. Limits of memory are the campaign's own.
+def serve(pipe_number: int, parent: int) -> None:
+    """What the process does: it calls the functions that come, and ends with the campaign, the
+    process of the number `parent`. What it starts remains its child whatever else ends.
     """
-    from loky import process_executor
-
-    process_executor._MAX_MEMORY_LEAK_SIZE = float("inf")
     if sys.platform == "linux":
         import ctypes
 
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: however the parent ends
+        ctypes.CDLL(None).prctl(36, 1)  # PR_SET_CHILD_SUBREAPER
         if os.getppid() != parent:
-            os._exit(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    file = os.open(noise, os.O_WRONLY | os.O_APPEND)
-    for stream in (1, 2):
-        os.dup2(file, stream)
-    os.close(file)
-
-
-def _mark() -> str:
-    """Number and start of this process, which tell those of this campaign from all others."""
-    import psutil
-
-    return f"{os.getpid()} {psutil.Process().create_time()}"
-
-
-def end_orphans() -> None:
-    """Kill what solvers of this campaign, or of a dead one, left in other sessions."""
-    import psutil
-
-    for process in psutil.process_iter():
-        with suppress(psutil.Error, ValueError):
-            if (found := process.environ().get(MARK)) is None:
-                continue
-            number, began = found.split()
-            alive = psutil.pid_exists(int(number)) and psutil.Process(
-                int(number)
-            ).create_time() == float(began)
-            family = (process.pid, *(parent.pid for parent in process.parents()))
-            if not alive or (int(number) == os.getpid() and os.getpid() not in family):
-                _kill([process])
-
-
-def _kill(processes: Iterable[psutil.Process]) -> None:
-    """Kill processes; what frees shared memory after them is left to end by itself."""
-    import psutil
-
-    killed = []
-    for process in processes:
-        with suppress(psutil.Error):
-            if "resource_tracker" not in " ".join(process.cmdline()):
-                process.kill()
-                killed.append(process)
-    psutil.wait_procs(killed, timeout=1)
+            return
+    os.set_inheritable(pipe_number, False)
+    pipe: Connection[Any, Any] = Connection(pipe_number)
+    pipe.send(True)
+    while True:
+        function, arguments = pipe.recv()
+        try:
+            pipe.send(function(*arguments))
+        except Exception as error:  # also of an answer that cannot be sent
+            pipe.send(RuntimeError(one_line(error)))
 
 
 def one_line(error: object) -> str:

@@ -1,6 +1,6 @@
 """Who is first: methods compared at the accuracy that they reach, not at the one asked for.
 
-The runs of a method on an instance (a problem and a start) are points: median time and worst
+The runs of a method on a problem are points: median time and worst
 certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
 front, straight in logarithms; what does not reach it counts as its time limit, and times below
 NOISE count as NOISE.
@@ -8,7 +8,7 @@ NOISE count as NOISE.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +19,9 @@ SHIFT = 1e-3  # s, of shifted geometric means
 NOISE = 1e-4  # s
 BUSY = 1.2  # wall over CPU time above which a machine is too busy for a ranking
 LEAST = 1e-17  # drawn and compared in place of a certificate of 0
-RESAMPLES, CONFIDENCE, SEED = 2000, 0.95, 0
-POINT = ["problem", "start", "method", "tolerance"]
+RESAMPLES, BATCH, SEED = 2000, 100, 0
+LIKELY = 2.5, 97.5  # percentiles of the ranks that bound an interval
+POINT = ["problem", "method", "tolerance"]
 # what is known of a point: (of the table's column, how the repeats are joined)
 JOINED = {
     "cpu": ("cpu_seconds", "median"),
@@ -34,7 +35,7 @@ JOINED = {
 
 
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row per problem, start, method and tolerance: times [s], worst certificate, memory."""
+    """A row per problem, method and tolerance: times [s], worst certificate, memory."""
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     groups = table.assign(_memory=memory).groupby(POINT, sort=False)
@@ -44,8 +45,8 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
-    """Seconds to a certificate of `accuracy` (instance, method), inf if not reached."""
-    fronts = points.groupby(["problem", "start", "method"], sort=False)[[time, "residual", "limit"]]
+    """Seconds to a certificate of `accuracy` (problem, method), inf if not reached."""
+    fronts = points.groupby(["problem", "method"], sort=False)[[time, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
 
@@ -78,25 +79,22 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     logs, solved = _logs(points, accuracy)
     low, high = _rank_interval(logs.to_numpy(float))
     claims = points[points["claimed"] & np.isfinite(points["residual"])]
-    ratio = (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median()
     tried = points[points["status"] != "refused"].groupby("method")["problem"].nunique()
     means = mean_times(points, accuracy)
-    made = pd.DataFrame(
-        {
-            "method": logs.columns,
-            "solved": solved.sum().to_numpy(),
-            "of": len(logs),
-            "taken": tried.reindex(logs.columns).fillna(0).astype(int).to_numpy(),
-            "mean": means.to_numpy(),
-            "over the least": (means / means.min()).to_numpy(),
-            "wall mean": mean_times(points, accuracy, "wall").reindex(logs.columns).to_numpy(),
-            "memory": points.groupby("method")["memory"].max().reindex(logs.columns).to_numpy(),
-            "over claim": ratio.reindex(logs.columns).to_numpy(),
-            "rank": means.rank(method="min", na_option="bottom").astype(int).to_numpy(),
-            "best": low,
-            "worst": high,
-        }
-    )
+    columns = {
+        "solved": solved.sum(),
+        "of": len(logs),
+        "taken": tried.reindex(logs.columns, fill_value=0),
+        "mean": means,
+        "over the least": means / means.min(),
+        "wall mean": mean_times(points, accuracy, "wall"),
+        "memory": points.groupby("method")["memory"].max(),
+        "over claim": (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median(),
+        "rank": means.rank(method="min", na_option="bottom").astype(int),
+        "best": low,
+        "worst": high,
+    }
+    made = pd.DataFrame(columns, index=logs.columns).rename_axis("method").reset_index()
     return made.sort_values(["rank", "method"], ignore_index=True)
 
 
@@ -128,7 +126,7 @@ def _logs(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """log(t + SHIFT) of the instances that somebody solved, and which methods solved them."""
     seconds = achieved(points, accuracy, time)
-    limits = points.groupby(["problem", "start"], sort=False)["limit"].max()
+    limits = points.groupby("problem", sort=False)["limit"].max()
     solved = np.isfinite(seconds)
     kept = solved.any(axis=1)
     shown = seconds.where(solved, limits.reindex(seconds.index), axis=0)[kept]
@@ -136,22 +134,17 @@ def _logs(
 
 
 def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest rank of each method that resampling the instances leaves likely."""
-    from scipy.stats import bootstrap, rankdata
+    """The least and the largest rank of each method that resampling the problems leaves likely."""
+    from scipy.stats import rankdata
 
-    def ranks(index: np.ndarray, axis: int) -> np.ndarray:
-        means = logs[index].mean(axis=-2)
-        return np.moveaxis(rankdata(means, method="min", axis=-1).astype(float), -1, 0)
-
-    if len(logs) < 2:
-        only = rankdata(logs.mean(axis=0), method="min") if len(logs) else np.zeros(logs.shape[1])
-        return only.astype(int), only.astype(int)
-    options: dict[str, Any] = {"n_resamples": RESAMPLES, "batch": 100, "method": "percentile"}
-    rng = np.random.default_rng(SEED)
-    found = bootstrap(
-        (np.arange(len(logs)),), ranks, axis=-1, rng=rng, confidence_level=CONFIDENCE, **options
-    ).confidence_interval
-    return np.floor(found.low).astype(int), np.ceil(found.high).astype(int)
+    rng, ranks = np.random.default_rng(SEED), [np.ones((1, logs.shape[1]))]
+    if len(logs):
+        drawn = (
+            rng.integers(len(logs), size=(BATCH, len(logs))) for _ in range(RESAMPLES // BATCH)
+        )
+        ranks = [rankdata(logs[index].mean(axis=1), method="min", axis=1) for index in drawn]
+    low, high = np.percentile(np.concatenate(ranks), LIKELY, axis=0)
+    return np.floor(low).astype(int), np.ceil(high).astype(int)
 
 
 def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:

@@ -8,25 +8,14 @@ for long ones.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.figure_style import (
-    FLOOR,
-    LEAST_RESIDUAL,
-    NAMES,
-    NO_LABELS,
-    set_ticks,
-    short_label,
-    short_tick,
-    write_numbers,
-)
 from contactopt.benchmark.ranking import achieved, mean_times, points
 from contactopt.benchmark.tables import INSTANCE, groups
-from contactopt.errors import InputError
 from contactopt.figures.style import (
     COLOURS,
     FAINT,
@@ -34,6 +23,7 @@ from contactopt.figures.style import (
     LINE,
     MARKS,
     add_colours,
+    draw_lines,
     label_ends,
     paper_axes,
 )
@@ -42,6 +32,29 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
+# residuals below this fraction of the tolerance asked for are drawn there: they answer no question
+FLOOR = 1e-2
+LONGEST = 20  # characters of a label
+CELLS = 240  # of a map, above which no numbers are written into them
+NO_LABELS: Mapping[str, str] = MappingProxyType({})
+NAMES = {
+    "solve_seconds": "time of the method [s]",
+    "call_seconds": "time of the call [s]",
+    "cpu_seconds": "CPU time of the call [s]",
+    "peak_mb": "peak memory [MB]",
+    "iterations": "outer iterations [-]",
+    "error": "relative error of the forces [-]",
+    "residual": "natural-map residual [-]",
+    "contacts": "contacts [-]",
+    "problem.contacts": "contacts [-]",
+    "problem.mu": r"friction coefficient $\mu$ [-]",
+    "problem.stiffness_ratio": r"$E_\mathrm{lower}\,/\,E_\mathrm{upper}$ [-]",
+    "problem.elements": "elements across the half-width [-]",
+    "method.rho": r"penalty factor $\rho$ [-]",
+    "problem.coupling": r"Dundurs' constant $\beta$ [-]",
+    "method.factor": "penalty factor [-]",
+    "problem.upper_nu": r"Poisson's ratio $\nu$ [-]",
+}
 
 
 def _look(rank: int) -> dict[str, Any]:
@@ -155,15 +168,13 @@ def time_to_accuracy(
     found, which = points(table), "wall" if time == "call_seconds" else "cpu"
     across = np.geomspace(*ACCURACIES)
     curves = [mean_times(found, accuracy, which) for accuracy in across]
-    ends = []
-    for rank, full in enumerate(curves[len(curves) // 2].sort_values().index):
-        height = [float(curve.get(full, np.nan)) for curve in curves]
-        ax.loglog(across, height, **_look(rank))
-        if rank < len(COLOURS):
-            ends.append((across[-1], height[-1], short_label(str(full), labels), COLOURS[rank]))
+    lines = [
+        (short_label(str(full), labels), [*across], [curve.get(full, np.nan) for curve in curves])
+        for full in curves[len(curves) // 2].sort_values().index
+    ]
     ax.set(xlim=ACCURACIES[:2], xlabel="certificate that is reached [-]")
+    draw_lines(ax, lines, ["-"] * len(lines))
     ax.set(ylabel=NAMES.get(time, time) + ", mean")
-    label_ends(ax, ends)
     return figure
 
 
@@ -189,20 +200,15 @@ def time_against_size(
     The eight fastest at their largest sizes have colours and names.
     """
     figure, (ax,) = paper_axes()
-    ends, found = [], []
+    found = []
     for full, rows in groups(table[table["success"]], by):
         medians = rows.groupby(size)[metric].median()
-        found.append((full, medians.index.to_numpy(float), medians.to_numpy()))
-    found.sort(key=lambda own: (-own[1][-1], own[2][-1]))
-    for rank, (full, x, y) in enumerate(found):
+        x, y = medians.index.to_numpy(float), medians.to_numpy()
         exponent, label = fitted_exponent(x, y), short_label(full, labels)
-        label += "" if np.isnan(exponent) else f" $n^{{{exponent:.1f}}}$"
-        ax.loglog(x, y, marker=MARKS[rank % len(MARKS)], label=label, **_look(rank))
-        if rank < len(COLOURS):
-            ends.append((x[-1], y[-1], label, COLOURS[rank]))
+        found.append((label + ("" if np.isnan(exponent) else f" $n^{{{exponent:.1f}}}$"), x, y))
+    draw_lines(ax, sorted(found, key=lambda own: (-own[1][-1], own[2][-1])))
     ax.set(xlabel=NAMES.get(size, size), ylabel=NAMES.get(metric, metric) + ", median")
     set_ticks(ax.xaxis)
-    label_ends(ax, ends)
     return figure
 
 
@@ -313,42 +319,61 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
             ax.plot(*(line if upright else line[::-1]), style, **look)
 
 
-def convergence(
-    table: pd.DataFrame,
-    x: str = "iterations",
-    by: str = "method",
-    labels: Mapping[str, str] = NO_LABELS,
-) -> Any:
-    """Draw the residual over outer iterations, or over time ("seconds"), of first repeats."""
-    if x not in ("iterations", "seconds"):
-        raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
-    figure, (ax,) = paper_axes()
-    ends = []
-    for rank, (name, rows) in enumerate(groups(table, by)):
-        history = json.loads(rows.sort_values("repeat")["history"].iloc[0])
-        if not history:
-            continue
-        residual, seconds, iterations = history
-        along = iterations if x == "iterations" else seconds
-        residual = np.maximum(residual, max(LEAST_RESIDUAL, FLOOR * float(rows["tolerance"].min())))
-        label = short_label(name, labels)
-        ax.loglog(along, residual, label=label, **_look(rank))
-        if rank < len(COLOURS):
-            ends.append((along[-1], residual[-1], label, COLOURS[rank]))
-    across = "outer iteration [-]" if x == "iterations" else "time [s]"
-    ax.set(xlabel=across, ylabel="natural-map residual [-]")
-    label_ends(ax, ends)
-    return figure
-
-
 FIGURES: dict[str, Callable[..., Any]] = {
     f.__name__: f
     for f in (
-        speed_accuracy,
-        time_to_accuracy,
-        performance_profile,
-        time_against_size,
-        stability_map,
-        convergence,
+        speed_accuracy, time_to_accuracy, performance_profile, time_against_size, stability_map,
     )
-}
+}  # fmt: skip
+
+
+def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
+    """The label given for a name, else the name with the values of its settings only."""
+    if name in labels:
+        return str(labels[name])
+    head, bracket, settings = name.partition("(")
+    if len(name) <= LONGEST or not bracket:
+        return name
+    words = [head]
+    for setting in settings.rstrip(")").split(", "):
+        key, _, value = setting.partition("=")
+        if value == "True":
+            words.append(key)
+        elif value.startswith("'"):
+            words.append(value.strip("'"))
+        elif value != "False":
+            try:
+                words.append(short_tick(float(value)))
+            except ValueError:
+                words.append(setting)
+    return " ".join(words)
+
+
+def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
+    """Write the numbers of a map in its cells, black on light colours and white on dark ones."""
+    values = grid.to_numpy(float)
+    if values.size > CELLS:
+        return
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = "black" if float(norm(max(value, norm.vmin))) > 0.6 else "white"
+            text = short_tick(float(f"{value:.0f}" if 10 <= abs(value) < 1000 else f"{value:.1g}"))
+            ax.text(column, row, text, ha="center", va="center", fontsize=size, color=colour)
+
+
+def set_ticks(axis: Any) -> None:
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high < 100 * low:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def short_tick(value: float) -> str:
+    """A number as short as it can be: 100000.0 becomes 1e5."""
+    plain = f"{value:g}"
+    power = f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
+    return power if len(power) < len(plain) and float(power) == value else plain

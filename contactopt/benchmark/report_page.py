@@ -6,9 +6,11 @@ links lead to, and every run with its repeats in one row.
 
 from __future__ import annotations
 
+import base64
 import html
 import json
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.benchmark.experiment import Experiment, read_layout
 from contactopt.benchmark.ranking import (
     NOISE,
     RESAMPLES,
@@ -28,7 +31,7 @@ from contactopt.benchmark.ranking import (
     wall_over_cpu,
     warning,
 )
-from contactopt.benchmark.reports import Layout, read_layout, rendered, write_report
+from contactopt.benchmark.reports import write_report
 from contactopt.benchmark.store import ABSENT, load, require
 from contactopt.benchmark.testset import problems
 from contactopt.errors import InputError
@@ -62,22 +65,14 @@ def report_campaign(
     figures: Sequence[str] = (),
 ) -> Path:
     """Write the report of a finished campaign into its folder: report.md with figures, and
-    report.html to look things up, one file with everything in it.
+    report.html to look things up, one file with everything in it, which is returned. InputError if
+    the folder holds no results, or if a figure does not fit them.
 
-    Parameters
-    ----------
-    folder : of the campaign, with rows.jsonl, rows.parquet or rows.csv
-    experiment : its file; None: the copy in the folder, without which the usual figures are drawn
-    others : files or folders with rows of other people, which join those of the campaign
-    figures : formats of the figures, of png, svg and pdf; PNG is always written
-
-    Returns
-    -------
-    Path : of report.html
-
-    Raises
-    ------
-    InputError : if the folder holds no results, or if a figure does not fit them
+    folder      with rows.jsonl, rows.parquet or rows.csv
+    experiment  file of the campaign; by default the copy in the folder, without which the usual
+                figures are drawn
+    others      files or folders with rows of other people, which join those of the campaign
+    figures     formats of the figures, of png, svg and pdf; PNG is always written
     """
     require("markdown_it", "pandas")
     folder = Path(folder)
@@ -88,11 +83,11 @@ def report_campaign(
     path = folder / "experiment.toml" if experiment is None else Path(experiment)
     name = str(table["experiment"].iloc[0])
     known = experiment is not None or path.exists()
-    layout = read_layout(path) if known else Layout(path, name, name)
+    layout = read_layout(path) if known else Experiment(name, title=name, path=path)
     if not (path.parent / layout.findings).is_file():  # beside a copy there is none
         layout = replace(layout, findings="")
     text = write_report(layout, folder, table, figures)
-    body = filled("report.html", title=html.escape(layout.title), static=rendered(text, folder))
+    body = filled("report.html", title=html.escape(layout.title), static=_rendered(text, folder))
     data = page_data(table) | {"absent": _absent(rows)}
     return write_html(folder / PAGE, layout.title, body, data, ["report.js"], plotly=False)
 
@@ -107,7 +102,7 @@ def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
     tables = [own]
     for other in map(Path, others):
         rows = load(other, absent=True)
-        pairs = own.merge(rows, on=["problem", "method", "setting", "start", "repeat"])
+        pairs = own.merge(rows, on=["problem", "method", "setting", "repeat"])
         pairs = pairs[pairs["success_x"] & pairs["success_y"]]
         ratios = pairs["cpu_seconds_y"] / pairs["cpu_seconds_x"]
         factor = float(np.exp(np.log(ratios).mean())) if len(pairs) else 1.0
@@ -120,22 +115,20 @@ def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
 
 
 def page_data(table: pd.DataFrame) -> dict[str, Any]:
-    """What the page shows of the runs under Coulomb's law, or of all if there are none."""
-    own = table[table["law"] == "coulomb"]
-    own = _with_starts(own if len(own) else table)
-    found = points(own)
-    names, methods = list(dict.fromkeys(own["problem"])), sorted(set(own["method"]))
+    """What the page shows of the runs."""
+    found = points(table)
+    names, methods = list(dict.fromkeys(table["problem"])), sorted(set(table["method"]))
     of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in problems()}
-    tags = {name: _tags(rows.iloc[0], of_set) for name, rows in own.groupby("problem")}
+    tags = {name: _tags(rows.iloc[0], of_set) for name, rows in table.groupby("problem")}
     accuracies = _accuracies(found)
-    times = [achieved(found, a).droplevel("start").reindex(names)[methods] for a in accuracies]
+    times = [achieved(found, a).reindex(names)[methods] for a in accuracies]
     first = ranking(found, accuracies[len(accuracies) // 2])["method"]
     number = {name: i for i, name in enumerate(names)}
     shown = [
         [number[p], methods.index(m), *(_plain(value) for value in rest)]
         for p, m, *rest in found[["problem", "method", *COLUMNS_SHOWN]].itertuples(index=False)
     ]
-    ratio = wall_over_cpu(own)
+    ratio = wall_over_cpu(table)
     return {
         "methods": methods,
         "order": list(first) + [name for name in methods if name not in set(first)],
@@ -149,18 +142,12 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
             for group, rows, members in _groups(found, tags, number)
             for a in accuracies
         ],
-        "histories": _histories(own, number, methods),
+        "histories": _histories(table, number, methods),
         "cards": _cards(table),
         "busy": warning(ratio),
-        "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(own, found)),
+        "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(table, found)),
         "colours": COLOURS[:7],
     }
-
-
-def _with_starts(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with a warm start as a problem of its own."""
-    warm = table["start"] == "warm"
-    return table.assign(problem=table["problem"].where(~warm, table["problem"] + ", warm start"))
 
 
 def _accuracies(found: pd.DataFrame) -> list[float]:
@@ -182,7 +169,7 @@ def _tags(row: pd.Series, of_set: Mapping[str, dict[str, Any]]) -> dict[str, Any
     """What is known of a problem: some columns of its runs, and the tags of the test set."""
     own = {name: _plain(row[name]) for name in ("family", "dim", "contacts")}
     own["plates"] = bool(row["plates"])
-    return own | of_set.get(str(row["problem"]).removesuffix(", warm start"), {})
+    return own | of_set.get(str(row["problem"]), {})
 
 
 def _groups(
@@ -268,3 +255,17 @@ def refusals(table: pd.DataFrame) -> list[str]:
         f"{number} {'run was' if number == 1 else 'runs were'} refused: {reason}"
         for reason, number in reasons.most_common()
     ]
+
+
+def _rendered(text: str, folder: Path) -> str:
+    """HTML of Markdown, with the pictures in `folder` embedded; raw HTML is shown as text, and
+    links to files become text, since the page may stand elsewhere.
+    """
+    from markdown_it import MarkdownIt
+
+    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
+    made = re.sub(r'<a href="(?!https?:|#)[^"]*">(.*?)</a>', r"\1", str(parser.render(text)))
+    for file in folder.glob("figure-*.png"):
+        data = base64.b64encode(file.read_bytes()).decode()
+        made = made.replace(f'src="{file.name}"', f'src="data:image/png;base64,{data}"')
+    return made

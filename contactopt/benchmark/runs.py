@@ -1,4 +1,4 @@
-"""What is run: a problem, a method, a setting, a start, a repeat."""
+"""What is run: a problem, a method, a setting, a repeat."""
 
 from __future__ import annotations
 
@@ -18,18 +18,14 @@ from contactopt.methods.driver import TOL
 from contactopt.methods.method import NATIVE
 
 SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
-STARTS = ("cold", "warm")
-# methods of contactopt that solve another problem than Coulomb's
-OTHER_LAWS = {"relaxation": "associated"}
 
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method or plug-in with settings and law, and the solver of others that it calls."""
+    """A method or plug-in with settings, and the solver of others that it calls."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
-    law: str = "coulomb"
     peer: str = ""
 
     @property
@@ -52,17 +48,17 @@ class MethodSpec:
 
 def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> MethodSpec:
     """The method with these settings; InputError if unknown, or a backend is not installed."""
-    law, peer = OTHER_LAWS.get(name, "coulomb"), ""
+    peer = ""
     if name in METHODS:
         find_method(name, **settings)
-    elif (plugin := registry.find(name)) is not None:
+    elif (plugin := registry.methods.get(name)) is not None:
         plugin.check(settings)
-        law, peer = plugin.law, plugin.version
+        peer = plugin.version
     else:
         raise InputError(
             f"unknown method {name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
         )
-    spec = MethodSpec(name, settings, law, peer)
+    spec = MethodSpec(name, settings, peer)
     spec.backends(2, 3)
     return spec
 
@@ -94,11 +90,10 @@ class Run:
     method: MethodSpec
     setting: str
     tolerance: float
-    start: str
     repeat: int
 
     @cached_property
     def key(self) -> str:
         method, backends = self.method.label, self.method.backends(2, 3)
-        parts = (self.problem.label, method, backends, self.setting, self.start, self.repeat)
+        parts = (self.problem.label, method, backends, self.setting, self.repeat)
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

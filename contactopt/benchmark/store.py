@@ -11,7 +11,6 @@ import json
 import logging
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ import numpy as np
 
 from contactopt.benchmark.keys import COLUMNS, ENDS
 from contactopt.errors import InputError
-from contactopt.files.writing import replace_file
+from contactopt.files.writing import check_folder, whole_file
 from contactopt.problem import Status
 
 if TYPE_CHECKING:
@@ -45,17 +44,6 @@ def require(*modules: str) -> None:
         )
 
 
-@contextmanager
-def told(place: Path, advice: str = "choose another directory") -> Iterator[None]:
-    """Turn an OSError within the block, as of a full disk, into one sentence with what to do."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(
-            f"cannot write into '{place}': {error.strerror or error}; {advice}."
-        ) from error
-
-
 class Store:
     """The appending end, for one campaign at a time (file lock), a context manager; InputError for
     results without `resume`, another campaign, or a folder that cannot be written.
@@ -63,9 +51,9 @@ class Store:
 
     def __init__(self, folder: Path, resume: bool):
         self.path = folder / "rows.jsonl"
-        with told(folder, "choose another --out"):
-            folder.mkdir(parents=True, exist_ok=True)
-            self.file = open(self.path, "a+b", buffering=0)  # noqa: SIM115
+        check_folder(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.file = open(self.path, "a+b", buffering=0)  # noqa: SIM115
         wrong = ""
         try:
             fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -227,12 +215,8 @@ def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None
     """
     path = Path(path)
     chosen = table[[c for c in columns or COLUMNS if c in table]]
-
-    def write(file: Path) -> None:
+    with whole_file(path) as file:
         if path.suffix == ".parquet":
             chosen.to_parquet(file, index=False, compression="zstd")
         else:
             chosen.to_csv(file, index=False, float_format="%.6g")
-
-    with told(path, "make room or choose another directory; finished runs are kept"):
-        replace_file(path, write)

@@ -13,21 +13,21 @@ from contactopt.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-INSTANCE = ["problem", "setting", "start"]
+INSTANCE = ["problem", "setting"]
 
 
-def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
-    """The rows of one law, or of all at '', whose columns have the values `where`, one, a list or
-    '' for none; InputError on an unknown column, or if no row is left.
+def select(table: pd.DataFrame, **where: Any) -> pd.DataFrame:
+    """The rows whose columns have the values `where`, one, a list or '' for none; InputError on an
+    unknown column, or if no row is left.
     """
-    rows = table[table["law"] == law] if law else table
+    rows = table
     for column, value in where.items():
         if column not in rows:
             raise InputError(f"the table has no column {column!r}.")
         values = list(value) if isinstance(value, list | tuple) else [value]
         rows = rows[rows[column].isin(values) | (rows[column].isna() & ("" in values))]
     if rows.empty:
-        raise InputError(f"no row with law {law!r} and {where}.")
+        raise InputError(f"no row with {where}.")
     return rows
 
 

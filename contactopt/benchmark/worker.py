@@ -4,41 +4,45 @@ at any moment (contactopt.benchmark.process), keep what was loaded, and judge no
 
 from __future__ import annotations
 
+import errno
+import inspect
 import os
+import random
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.calls import call, measure
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.peers import Answer
-from contactopt.benchmark.plugins import Registry
+from contactopt.benchmark.plugins import PASSED, Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
-from contactopt.errors import InputError
+from contactopt.benchmark.store import STATUSES
+from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
+from contactopt.methods import find_method
 from contactopt.methods.driver import solve
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.laws.coulomb import Coulomb
 
-NEIGHBOUR = 0.9  # load and friction of the problem whose solution is the warm start
 MOST_ROWS = 3000  # components up to which a Q of products is made a matrix
-UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAlgError)
+POINTS = 100  # of a history
+MB = 1e6
+FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
 
 
 @dataclass
 class Kept:
-    """Plug-ins, and the problem of a label with its warm start, or why there is none."""
+    """Plug-ins, and the problem of a label."""
 
     plugins: Registry = field(default_factory=Registry)
     label: str = ""
     problem: InterfaceProblem | None = None
-    start: Solution | None = None
-    missing: Exception | None = None
 
 
 _kept = Kept()
@@ -89,57 +93,148 @@ def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
 def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
     """Keep a problem and plug-ins for the runs that follow."""
     _kept.plugins.load(paths)
-    _kept.label, _kept.problem, _kept.start, _kept.missing = label, problem, None, None
+    _kept.label, _kept.problem = label, problem
 
 
 def warm_up(task: Task, dim: int) -> None:
     """Run the method untimed on two contacts, so that imports and compilation are not timed."""
-    Q = np.eye(2 * dim) + 0.1
     q = np.zeros((2, dim))
     q[:, 0], q[:, 1] = -1.0, 0.5
-    own = os.getpid()
-    with suppress(Exception, SystemExit, KeyboardInterrupt):  # the run itself will tell
-        _limit_memory(task.memory_limit)
-        call(task, InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5))), None, _kept.plugins)
-    _only(own)
-
-
-def find_start(label: str) -> None:
-    """Solve the problem kept at NEIGHBOUR times its load and friction, for warm starts."""
-    problem = _kept.problem
-    if problem is None or _kept.label != label or _kept.start is not None:
-        return
-    q, s = problem.q, NEIGHBOUR * problem.s
-    if not len(s):
-        q = NEIGHBOUR * q
-    try:
-        found = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
-        if not found.solved:
-            raise InputError(f"no warm start: {found.message}")
-        _kept.start = found
-    except UNBUILT as error:
-        _kept.missing = error
+    _measured(task, InterfaceProblem(np.eye(2 * dim) + 0.1, q, Coulomb(np.full(2, 0.5))))
 
 
 def execute(task: Task) -> Answer | None:
     """The answer to one task; None if its problem is not kept here."""
-    problem, start, own = _kept.problem, None, os.getpid()
-    if problem is None or _kept.label != task.run.problem.label:
+    if _kept.problem is None or _kept.label != task.run.problem.label:
         return None
-    if task.run.start == "warm":
-        start = _kept.start
-        if start is None:
-            return Answer("not_built", one_line(_kept.missing or "no warm start"))
+    return _measured(task, _kept.problem)
+
+
+def _measured(task: Task, problem: InterfaceProblem) -> Answer:
+    """Run a method: its answer, or how it failed, with what was measured."""
     _limit_memory(task.memory_limit)
-    answer = measure(task, problem, start, _kept.plugins)
-    _only(own)
-    return answer
-
-
-def _only(own: int) -> None:
-    """End this process if it is a copy of the true one, which a method forked and forgot."""
-    if os.getpid() != own:
+    random.seed(task.seed)
+    np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
+    own, measured = os.getpid(), {"base_mb": _reset_peak()}
+    wall, cpu = time.perf_counter(), time.process_time()
+    try:
+        answer = _called(task, problem)
+    except (Exception, SystemExit, KeyboardInterrupt) as error:
+        answer = Answer(_word(error), one_line(error))
+    measured["call_seconds"] = time.perf_counter() - wall
+    measured["cpu_seconds"] = time.process_time() - cpu
+    measured["peak_mb"] = _memory("VmHWM")
+    if os.getpid() != own:  # a copy of the true process, which a method forked and forgot
         os._exit(1)
+    try:
+        # a peer measures itself, in its own process
+        measured |= answer.measured
+        if answer.reactions is not None:
+            answer = _in_form(answer, problem, measured["call_seconds"])
+    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
+        answer = Answer("error", f"its answer has the wrong form: {wrong}")
+    return replace(answer, message=one_line(answer.message), measured=measured)
+
+
+def _word(error: BaseException) -> str:
+    """The status of a run that ended with an error."""
+    if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+        return "out_of_memory"
+    return next((word for kind, word in FAILURES.items() if isinstance(error, kind)), "error")
+
+
+def _called(task: Task, problem: InterfaceProblem) -> Answer:
+    """The answer of a method, in whatever form it gave it. Its own errors pass through."""
+    spec, usual = task.run.method, task.run.setting == "default"
+    plugin = _kept.plugins.methods[spec.name] if spec.foreign else None
+    given: dict[str, Any] = {
+        "tol": task.run.tolerance,
+        "time_limit": task.time_limit,
+        "max_iterations": task.max_iterations,
+    }
+    if plugin is None or plugin.iterates:
+        if plugin is None:
+            method = find_method(spec.name, **spec.settings)
+        else:
+            method = plugin.make(**spec.settings)
+        if usual:
+            del given["tol"]
+        s = solve(problem, method, **given)
+        return _of_solution(s, s.method, s.seconds["solve"])
+    wanted = inspect.signature(plugin.make).parameters
+    passed = {name: given[name] for name in PASSED if name in wanted and name not in spec.settings}
+    if usual and "tol" in passed and wanted["tol"].default is not inspect.Parameter.empty:
+        del passed["tol"]
+    answer = plugin.make(problem, **passed, **spec.settings)
+    if isinstance(answer, Answer):
+        return replace(answer, label=spec.label)
+    if isinstance(answer, Solution):
+        return _of_solution(answer, spec.label)
+    reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)
+    return Answer(Status.SOLVED.label, "", reactions, multipliers, spec.label)
+
+
+def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Answer:
+    forces = (s.reactions, s.multipliers)
+    return Answer(s.status.label, s.message, *forces, label, s.iterations, seconds, s.history)
+
+
+def _in_form(answer: Answer, problem: InterfaceProblem, seconds: float) -> Answer:
+    """The answer in its one form; TypeError or ValueError if it has another."""
+    r = _real(answer.reactions)
+    lam = None if answer.multipliers is None else _real(answer.multipliers)
+    if r.size != problem.q.size:
+        raise ValueError(
+            f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}"
+        )
+    if lam is not None and lam.shape != problem.s.shape:
+        raise ValueError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}")
+    if answer.status not in STATUSES:
+        raise ValueError(f"{answer.status!r} is no status")
+    return Answer(
+        answer.status,
+        answer.message,
+        r.reshape(problem.q.shape),
+        lam,
+        str(answer.label),
+        float(answer.iterations),
+        seconds if np.isnan(answer.seconds) else float(answer.seconds),
+        _thinned(answer.history),
+    )
+
+
+def _real(values: Any) -> np.ndarray:
+    """An array of floats of its own; TypeError or ValueError if the values are not real numbers."""
+    array = np.asarray(values)
+    if np.iscomplexobj(array):
+        raise TypeError("complex numbers")
+    return np.array(array, dtype=float, order="C", subok=False)
+
+
+def _thinned(history: Sequence[Mapping[str, float]] | None) -> Any:
+    """Residuals, seconds, iterations, at most POINTS with the last; None without any."""
+    if not history:
+        return None
+    index = np.unique(np.geomspace(1, len(history), POINTS).astype(int)) - 1
+    residuals, seconds = (
+        [float(f"{history[i].get(key, np.nan):.3g}") for i in index]
+        for key in ("residual", "seconds")
+    )
+    return residuals, seconds, [int(i) + 1 for i in index]
+
+
+def _reset_peak() -> float:
+    """Forget the largest resident memory so far; the present one [MB]."""
+    with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
+        file.write("5")
+    return _memory("VmRSS")
+
+
+def _memory(field: str) -> float:
+    """What the system tells of this process [MB]; nan where it tells nothing."""
+    with suppress(OSError), open("/proc/self/status") as file:
+        return next(int(line.split()[1]) * 1024 / MB for line in file if line.startswith(field))
+    return np.nan
 
 
 def _limit_memory(gigabytes: float) -> None:

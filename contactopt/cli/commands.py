@@ -6,17 +6,15 @@ import argparse
 import json
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from contactopt.cards import count, force_unit
-from contactopt.cli.test_set import problems
+from contactopt.cards import count
+from contactopt.cli.test_set import problems  # noqa: F401 (a command, too)
 from contactopt.errors import InputError
-from contactopt.methods.method import NATIVE
-from contactopt.readings.resultants import resultant_words
-
-Command = Callable[[argparse.Namespace], int]
+from contactopt.outcome import summary_rows
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -98,41 +96,18 @@ def run(options: argparse.Namespace) -> int:
 
 def _print_result(result: Any, out: str) -> None:
     s = result.summary
-    contacts = count(s["contact_nodes"], "contact node")
-    print(f"{s['scene']}: {count(s['dofs'], 'unknown')}, {contacts}, mu = {s['mu']:g}")
-    steps = count(s["outer_iterations"], "iteration")
-    print(f"{s['status']}: {result.solution.message}; {steps}, residual {s['residual']:.1e}")
-    if s["q"] == "implicit":
-        print(f"Q by {s['products']} products with vectors")
-    native = s["normal_backend"] == s["tangential_backend"] == NATIVE
-    by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
-    print(f"method {s['method']}" + ("" if native else by))
-    length, stress = result.scene.units
-    force = force_unit((length, stress))
-    approach = "" if s["approach"] is None else f"approach {s['approach']:.6g} {length}, "
-    print(
-        f"sum of normal forces {s['normal_force']:.6g} {force}, {approach}"
-        f"largest pressure {s['max_pressure']:.6g} {stress}"
-    )
-    for name, words in resultant_words(s).items():
-        pair = s["pairs"][name]
-        print(
-            f"contact '{name}': force on the upper body {words} {force}; largest pressure"
-            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
-            f" {pair['slip']} slip"
-        )
-    if s["contact_half_width"] is not None:
-        print(
-            f"contact half-width {s['contact_half_width']:.6g} {length}, "
-            f"stick half-width {s['stick_half_width']:.6g} {length}"
-        )
+    print(s["scene"])
+    for name, words in summary_rows(s).items():
+        print(f"{name}: {words}")
     for name, found in s.get("quantities", {}).items():
         error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
         print(f"{name} {found['value']:.6g}; its relative error on this mesh: {error}")
     for remark in s["remarks"]:
         print(f"note: {remark}")
-    if result.estimate is not None:
-        _print_estimate(result.estimate)
+    if (estimate := result.estimate) is not None:
+        print(estimate.guarantee.sentence)
+        for one in estimate.levels:
+            print(f"  {one.mesh}: {one.unknowns} unknowns, {one.value:.6g}, {one.seconds:.2f} s")
     phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
     print(f"{s['seconds']['total']:.1f} s: {phases}")
     from contactopt.figures.output import SINGLE
@@ -143,29 +118,21 @@ def _print_result(result: Any, out: str) -> None:
     print(f"files in {out}: {listed}" + (f", {len(single)} of single states" if single else ""))
 
 
-def _print_estimate(estimate: Any) -> None:
-    error = "unknown" if estimate.error is None else f"{estimate.error:.1e}"
-    print(
-        f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for"
-        f" {estimate.target:g}:"
-    )
-    print(f"  {estimate.message}\n  {estimate.guarantee.sentence}")
-    for level in estimate.levels:
-        print(
-            f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s"
-        )
-
-
 def view(options: argparse.Namespace) -> int:
     """Write the page of a run and open it in the browser."""
-    import webbrowser
-
     from contactopt.figures.view_page import write_page
 
     page = write_page(options.folder, options.out or Path(options.folder) / "view.html")
+    return _shown(page, options, f"{page} is the result as a page; open it in a browser")
+
+
+def _shown(page: Path, options: argparse.Namespace, words: str) -> int:
+    """Open a page, unless that is not wanted, and say where it is."""
+    import webbrowser
+
     if not options.no_open:
         webbrowser.open(page.resolve().as_uri())
-    print(f"{page} is the result as a page; open it in a browser")
+    print(words)
     return 0
 
 
@@ -179,8 +146,6 @@ def show(options: argparse.Namespace) -> int:
 
 def mesh(options: argparse.Namespace) -> int:
     """Mesh a part of a CAD program, or read a mesh file; say and draw what it holds."""
-    import webbrowser
-
     from contactopt.figures.check_page import write_mesh_page
     from contactopt.figures.mesh_words import mesh_words
     from contactopt.meshes.cad import ENDINGS, mesh_part
@@ -199,10 +164,8 @@ def mesh(options: argparse.Namespace) -> int:
         return 0 if meshes else 2
     page = Path(f"out/{path.stem}-mesh.html")
     write_mesh_page(str(path), named, text, refused, page)
-    if not options.no_open:
-        webbrowser.open(page.resolve().as_uri())
-    print(f"# {page} shows the bodies and their boundaries; open it in a browser")
-    return 0
+    words = f"# {page} shows the bodies and their boundaries; open it in a browser"
+    return _shown(page, options, words)
 
 
 def simplify(options: argparse.Namespace) -> int:
@@ -216,8 +179,6 @@ def simplify(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """Say what is known of a scene before it is solved, and write it as a page."""
-    import webbrowser
-
     from contactopt.figures.check_page import write_check_page
     from contactopt.figures.scene_check import check_scene
     from contactopt.runner import states_of
@@ -228,10 +189,8 @@ def check(options: argparse.Namespace) -> int:
     if options.no_page:
         return 0
     page = write_check_page(found, options.out or f"out/{Path(options.scene).stem}-check.html")
-    if not options.no_open:
-        webbrowser.open(page.resolve().as_uri())
-    print(f"{page} shows bodies, boundaries, loads and pairs; open it in a browser")
-    return 0
+    words = f"{page} shows bodies, boundaries, loads and pairs; open it in a browser"
+    return _shown(page, options, words)
 
 
 def export(options: argparse.Namespace) -> int:
@@ -271,9 +230,7 @@ def new(options: argparse.Namespace) -> int:
 
 def schema(options: argparse.Namespace) -> int:
     """Print the JSON schema of scene files."""
-    from contactopt.cli.scene_schema import schema
-
-    print(json.dumps(schema(), indent=1))
+    print(files("contactopt.scenes").joinpath("scene_schema.json").read_text("utf-8"), end="")
     return 0
 
 
@@ -324,12 +281,12 @@ def report(options: argparse.Namespace) -> int:
     if options.merge or options.figures:
         raise InputError("--merge and --figures are for the folder of a campaign; name it first.")
     paths = sorted(Path(options.experiments).glob("*.toml"))
-    page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
-    print(f"reports in {page.parent}, all of them in {page}")
+    folder = run_reports(paths, options.reports, options.run, options.names, options.jobs)
+    print(f"reports in {folder}")
     return 0
 
 
-def listing(options: argparse.Namespace) -> int:
+def list_names(options: argparse.Namespace) -> int:
     """Print everything that can be chosen by its name."""
     from contactopt.bodies.solvers import SOLVERS
     from contactopt.linear.operators import FORMS
@@ -374,21 +331,3 @@ def completion(options: argparse.Namespace) -> int:
 
     print(script(options.parser, options.shell))
     return 0
-
-
-COMMANDS: dict[str, Command] = {
-    "run": run,
-    "view": view,
-    "show": show,
-    "check": check,
-    "mesh": mesh,
-    "simplify": simplify,
-    "export": export,
-    "new": new,
-    "schema": schema,
-    "bench": bench,
-    "report": report,
-    "problems": problems,
-    "list": listing,
-    "completion": completion,
-}

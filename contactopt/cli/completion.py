@@ -20,7 +20,6 @@ from contactopt.readings.places import PLACED
 from contactopt.readings.quantities import ROWS
 from contactopt.scenes import SCENES
 
-SHELLS = ("bash", "zsh", "fish", "tcsh")
 # argument -> the names that it takes; a scene may be a file, too, and a quantity is of a place
 NAMES = {
     "scene": tuple(SCENES),
@@ -36,7 +35,7 @@ NAMES = {
 
 
 def script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """Write the completion script of a shell of SHELLS. The parser is changed: it takes none but
+    """Write the completion script of a shell. The parser is changed: it takes none but
     the known names afterwards.
     """
     import shtab

@@ -22,28 +22,10 @@ if TYPE_CHECKING:
 
 SHOWN = 8  # contacts up to which the forces of all solutions are printed
 TOL = 1e-10  # certificate of the forces at which subproblems are made
-EPILOG = """Examples:
-  contactopt problems list --tier small --tag dim=3 --tag 'contacts<50'
-  contactopt problems show 'springs*nodes=1*'      tags, reference answer, all solutions, proofs
-  contactopt problems write 'punch-2d*' --as npz   quadratic programs for a QP solver
-  contactopt problems list --testset folder        problems of yours: files of FCLib or Siconos
-
-A NAME may be a pattern with * and ?. Tags: dim, contacts, motions (columns of V), law, mu,
-form (dense, sparse, products), symmetric, feasible, rank, condition, unique_below and several_from
-(thresholds of friction), solutions (their number, where all of them were listed)."""
 
 
 def problems(options: argparse.Namespace) -> int:
-    """List, show or write problems of a test set.
-
-    Parameters
-    ----------
-    options : of the command `problems`
-
-    Returns
-    -------
-    int : the exit code, 0
-    """
+    """List, show or write problems of a test set."""
     from contactopt.benchmark import testset
 
     found = testset.problems(options.tier or "", options.tag, options.testset)
@@ -138,7 +120,7 @@ def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> It
     answer = solve(problem, tol=TOL)
     if not answer.solved:
         raise InputError(f"it was not solved ({answer.status}).")
-    for kind in kinds or PROGRAM_NAMES:
+    for kind in kinds or programs.PROGRAMS:
         if form == "npz" and problem.dim == 3 and kind != "normal" and not kinds:
             continue  # no quadratic program
         path = stem.with_name(f"{stem.name}_{kind}.{form}")
@@ -147,30 +129,3 @@ def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> It
 
 
 ACTIONS = {"list": _list, "show": _show, "write": _write}
-FORMATS = ("npz", "cbf", "fclib")
-# the names in contactopt.benchmark.testset, whose import takes half a second
-TIERS = ("small", "medium", "large")
-PROGRAM_NAMES = ("normal", "tangential", "tresca", "associated")
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Give the parser of the command `problems` its options."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = EPILOG
-    parser.add_argument(
-        "action",
-        choices=tuple(ACTIONS),
-        help="list names; show tags, the reference answer, and proofs; write files",
-    )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="name of a problem, or a pattern")
-    what = "the number of a test set (default: 1), a TOML file, or a folder of problems"
-    parser.add_argument("--testset", default="1", metavar="SET", help=what)
-    parser.add_argument("--tier", choices=TIERS, help="only problems of this tier")
-    what = "only problems of which this holds; the option may be given several times"
-    parser.add_argument("--tag", action="append", default=[], metavar="TAG=VALUE", help=what)
-    what = "npz: quadratic programs; cbf: cone programs; fclib (default): the contact problem"
-    parser.add_argument("--as", dest="format", choices=FORMATS, default="fclib", help=what)
-    what = "which subproblem: normal, tangential, tresca, associated (default: all of them)"
-    parser.add_argument("--program", action="append", choices=PROGRAM_NAMES, help=what)
-    what = "folder of the files (default: out/problems)"
-    parser.add_argument("--out", default="out/problems", metavar="DIR", help=what)

@@ -6,7 +6,6 @@ H' M^-1 f + w. Format: FCLib 1.x.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -143,56 +142,33 @@ def _read_global(group: Any) -> InterfaceProblem:
     f = _array(group, "vectors/f").astype(float)
     M = _read_matrix(_item(group, "M"), (len(f), len(f)))
     H = _read_matrix(_item(group, "H"), (len(f), w.size))
-    solve = _inverse_of(M)
-    W = sp.csr_array(H.T @ solve(H))
-    q = H.T @ solve(sp.csr_array(f[:, None])).toarray()[:, 0] + w.ravel()
+    W = sp.csr_array(H.T @ _solved(M, H))
+    q = H.T @ _solved(M, sp.csr_array(f[:, None])).toarray()[:, 0] + w.ravel()
     return InterfaceProblem(compact(W), q.reshape(-1, dim), mu)
 
 
-def _inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
-    """X -> M^-1 X for sparse X. Blocks of rigid bodies are inverted one by one, other matrices are
-    factorised. RuntimeError or LinAlgError if M is singular.
+def _solved(M: sp.csr_array, X: sp.csr_array) -> sp.csr_array:
+    """M^-1 X. RuntimeError if M is singular.
+
+    M^-1 is sparse if M has a small block for each rigid body, and is found by as many solutions as
+    a block has rows.
     """
+    factors, n = splu(sp.csc_array(M)), M.shape[0]
     count, body = connected_components(M, directed=False)
     sizes = np.bincount(body, minlength=count)
     if sizes.max(initial=0) <= RIGID:
-        inverse = _block_inverse(M, body, sizes)
-        return lambda X: sp.csr_array(inverse @ X)
-    factors = splu(M.tocsc())
-
-    def solve(X: sp.csr_array) -> sp.csr_array:
-        X = sp.csc_array(X)
-        parts = [
-            factors.solve(X[:, i : i + COLUMNS].toarray()) for i in range(0, X.shape[1], COLUMNS)
-        ]
-        return sp.csr_array(sp.hstack([sp.csc_array(part) for part in parts]))
-
-    return solve
-
-
-def _block_inverse(M: sp.csr_array, body: np.ndarray, sizes: np.ndarray) -> sp.csr_array:
-    """M^-1 where the unknowns i with body[i] = b form blocks of sizes[b] that are coupled to no
-    other.
-    """
-    order = np.argsort(body, kind="stable")
-    first = np.cumsum(sizes) - sizes
-    place = np.empty(len(body), dtype=int)
-    place[order] = np.arange(len(body)) - first[body[order]]
-    entries = sp.coo_array(M)
-    rows, columns = entries.coords
-    parts = [sp.coo_array(M.shape)]
-    for size in np.unique(sizes):
-        bodies = np.flatnonzero(sizes == size)
-        number = np.full(len(sizes), -1)
-        number[bodies] = np.arange(len(bodies))
-        mine = number[body[rows]] >= 0
-        blocks = np.zeros((len(bodies), size, size))
-        where = number[body[rows[mine]]], place[rows[mine]], place[columns[mine]]
-        np.add.at(blocks, where, entries.data[mine])
-        members = order[first[bodies][:, None] + np.arange(size)]
-        i, j = np.repeat(members, size, axis=1).ravel(), np.tile(members, (1, size)).ravel()
-        parts.append(sp.coo_array((np.linalg.inv(blocks).ravel(), (i, j)), shape=M.shape))
-    return sum(sp.csr_array(part) for part in parts)
+        order, place = np.argsort(body, kind="stable"), np.zeros(n, dtype=int)
+        place[order] = np.arange(n) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+        own = sp.csr_array((np.ones(n), (np.arange(n), body)), shape=(n, count))
+        i, j = (own @ own.T).nonzero()
+        found = factors.solve(np.eye(sizes.max(initial=0))[place])
+        return sp.csr_array((found[i, place[j]], (i, j)), shape=M.shape) @ X
+    X = sp.csc_array(X)
+    parts = [
+        sp.csc_array(factors.solve(X[:, i : i + COLUMNS].toarray()))
+        for i in range(0, X.shape[1], COLUMNS)
+    ]
+    return sp.csr_array(sp.hstack(parts))
 
 
 def _vectors(group: Any, name: str) -> tuple[int, np.ndarray, np.ndarray]:

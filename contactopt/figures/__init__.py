@@ -1,1 +1,1 @@
-"""Plots and animations of solved scenes."""
+"""Plots and pages of solved scenes."""

@@ -33,14 +33,14 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
     scene = check.scene
     pairs = [_pair(*both) for both in zip(scene.pairs, check.posed.couplings)]
     elastic = [body for body in check.posed.bodies if isinstance(body, AssembledElastic)]
-    meshes = {body.name: (body.part, body.body.basis.mesh) for body in elastic}
+    meshes = {body.name: body.body.basis.mesh for body in elastic}
     posed: Any = SimpleNamespace(scene=scene, planes=check.posed.planes)
     planes = [[scene.components.index(own["axis"]), own["place"]] for own in mirrors(posed)]
-    items = [item for both in meshes.values() for item in _boundaries(scene, *both)]
+    items = [item for body in elastic for item in _boundaries(scene, body.part, meshes[body.name])]
     items.sort(key=lambda item: item["role"] == 0)
     told = "Nothing has been solved yet. This is what will be solved."
     words = told, check.text, check.notes
-    return _write(scene, list(meshes.values()), (pairs, items), ROLES, planes, words, file)
+    return _write(scene, meshes, (pairs, items), ROLES, planes, words, file)
 
 
 def write_mesh_page(
@@ -50,48 +50,38 @@ def write_mesh_page(
     InputError if the file cannot be written.
     """
     dim = len(next(iter(meshes.values())).p)
-    own: Any = SimpleNamespace(
-        name=name,
-        units=("length", "stress"),
-        dim=dim,
-        components=COMPONENTS["solid"][:dim],
-        kind="solid",
-        surfaces_of=lambda part: (),
-    )
-    parts: list[Any] = [
-        (SimpleNamespace(name=body, supports=(), loads=()), mesh) for body, mesh in meshes.items()
+    own: Any = SimpleNamespace(name=name, units=("length", "stress"), dim=dim, kind="solid")
+    own.components = COMPONENTS["solid"][:dim]
+    roles = [
+        "none",
+        *dict.fromkeys(side for one in meshes.values() for side in one.boundaries or {}),
     ]
-    names = dict.fromkeys(side for mesh in meshes.values() for side in mesh.boundaries or {})
-    roles = ["none", *names]
     items = [
-        item | {"name": item["name"].removesuffix(f" ({ROLES[0]})")}
-        for both in parts
-        for item in _boundaries(own, *both)
+        item | {"name": f"{body}: {side}", "role": roles.index(side)}
+        for body, mesh in meshes.items()
+        for side, item in _sides(mesh)
     ]
-    for item in items:
-        item["role"] = roles.index(item["name"].partition(": ")[2])
     told = "This is what the mesh file holds. The list switches each boundary on and off."
-    return _write(own, parts, ([], items), roles, [], (told, f"{name}\n{text}", notes), file)
+    return _write(own, meshes, ([], items), roles, [], (told, f"{name}\n{text}", notes), file)
 
 
 def _write(
     scene: Any,
-    bodies: list[tuple[Part, Any]],
+    meshes: Mapping[str, Any],
     shown: tuple[list[dict[str, Any]], list[dict[str, Any]]],
     roles: Sequence[str],
     planes: list[Any],
     words: tuple[str, str, Sequence[str]],
     file: str | Path,
 ) -> Path:
-    """The page of bodies with their meshes, of pairs and boundaries with their roles, and of words:
-    a sentence, a text and notes.
+    """The page of bodies, the meshes by name, of pairs and boundaries with their roles, and of
+    words: a sentence, a text and notes.
     """
     pairs, items = shown
     what = "what it is for" if roles is ROLES else "boundary"
     units = [*scene.units, force_unit(scene.units)]
-    parts, meshes = [part for part, _ in bodies], [mesh for _, mesh in bodies]
     places = [item["places"] for item in (*items, *pairs)]
-    box = whole_box(box_of([*places, *(_spatial(mesh.p) for mesh in meshes)]), planes)
+    box = whole_box(box_of([*places, *(_spatial(mesh.p) for mesh in meshes.values())]), planes)
     near = box_of([item["places"] for item in pairs]) if pairs else box
     wide = 0.2 * float(np.ptp(near, axis=0).max())
     data = {
@@ -107,7 +97,7 @@ def _write(
         "most_scale": 1.0,
         "words": {"role": [what, ""], "gap": ["initial gap", scene.units[0]]},
         "roles": roles,
-        "bodies": _bodies(scene, parts, meshes, planes),
+        "bodies": _bodies(scene, meshes, planes),
         "contacts": [_packed(item, scene.dim) for item in (*pairs, *items)],
         "states": 1,
         "moving": False,
@@ -130,19 +120,17 @@ def _write(
     )
 
 
-def _bodies(
-    scene: Scene, parts: list[Part], meshes: list[Any], planes: list[Any]
-) -> list[dict[str, Any]]:
+def _bodies(scene: Scene, meshes: Mapping[str, Any], planes: list[Any]) -> list[dict[str, Any]]:
     """The bodies with meshes, each coloured by its number."""
-    inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes) <= MOST_INSIDE
+    inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes.values()) <= MOST_INSIDE
     made = []
-    for number, (part, mesh) in enumerate(zip(parts, meshes)):
+    for number, (name, mesh) in enumerate(meshes.items()):
         kind, elements = elements_of(mesh)
         block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
         count = mesh.doflocs.shape[1]
         values = {"move": np.zeros((1, count, scene.dim)), "body": np.full((1, count), number)}
         drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
-        made.append({"name": part.name} | body_arrays(drawn, values, planes, inside))
+        made.append({"name": name} | body_arrays(drawn, values, planes, inside))
     return made
 
 
@@ -165,40 +153,43 @@ def _pair(pair: Any, made: Any) -> dict[str, Any]:
 
 def _boundaries(scene: Scene, part: Part, mesh: Any) -> Iterator[dict[str, Any]]:
     """The named boundaries of a body, and what its loads are."""
-    kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
     held = {support.boundary for support in part.supports}
     loads = {load.boundary: load for load in part.loads if not isinstance(load, BodyForce)}
-    for name, facets in (mesh.boundaries or {}).items():
-        load, nodes = loads.get(name), facet_nodes(mesh, np.asarray(facets))
+    for name, item in _sides(mesh):
+        load = loads.get(name)
         role = 3 if isinstance(load, Plate) else 2 if load else 1 if name in held else 0
         if role == 0 and name in scene.surfaces_of(part):
             continue  # the pairs show it
-        vector = np.zeros((len(nodes), 3))
+        places, vector = item["places"], item["vector"]
         if isinstance(load, Traction):
             vector[:, : scene.dim] = load.value
         elif isinstance(load, Plate):
-            middle = mesh.doflocs[:, nodes].mean(axis=1, keepdims=True)
-            nearest = np.argmin(np.linalg.norm(mesh.doflocs[:, nodes] - middle, axis=0))
+            nearest = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
             vector[nearest, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
-        own = _faces_on(mesh, np.asarray(facets), kind, faces) if scene.dim == 3 else faces[:0]
-        place = np.zeros(mesh.doflocs.shape[1], dtype=int)
-        place[nodes] = np.arange(len(nodes))
-        yield {
-            "name": f"{part.name}: {name} ({ROLES[role]})",
-            "places": _spatial(mesh.doflocs[:, nodes]),
-            "cells": place[triangles(pieces(kind, own))] if len(own) else own,
-            "role": role,
-            "vector": vector,
-        }
+        yield item | {"name": f"{part.name}: {name} ({ROLES[role]})", "role": role}
     for force in part.loads:
         if isinstance(force, BodyForce):
             yield {
                 "name": f"{part.name}: force per volume",
                 "places": _spatial(mesh.p.mean(axis=1, keepdims=True)),
-                "cells": faces[:0],
+                "cells": np.zeros((0, 3), dtype=int),
                 "role": 2,
                 "vector": np.pad(np.array([force.value]), ((0, 0), (0, 3 - scene.dim))),
             }
+
+
+def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The nodes of each named boundary, in space the triangles between them, and no arrows."""
+    kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
+    for name, side in (mesh.boundaries or {}).items():
+        facets = np.asarray(side)
+        nodes, place = facet_nodes(mesh, facets), np.zeros(mesh.doflocs.shape[1], dtype=int)
+        place[nodes] = np.arange(len(nodes))
+        cells = np.zeros((0, 3), dtype=int)
+        if len(mesh.p) == 3:
+            cells = place[triangles(pieces(kind, _faces_on(mesh, facets, kind, faces)))]
+        places = _spatial(mesh.doflocs[:, nodes])
+        yield name, {"places": places, "cells": cells, "vector": np.zeros(places.shape)}
 
 
 def _faces_on(mesh: Any, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:

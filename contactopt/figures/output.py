@@ -30,15 +30,16 @@ if TYPE_CHECKING:
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
-STATES, SERIES = "states.npz", "states.pvd"
+SERIES = "states.pvd"
 SINGLE = re.compile(r"-state\d{4}\.vtu$")  # names of the files of single states
+VTU = re.compile(r"(.*?)(-state\d{4})?\.vtu")  # of all fields
 STATUS = ("open", "stick", "slip")
 # of the bodies at all states of a load path, above which only the last state is written
 MOST_NUMBERS = 3_000_000
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz", STATES, SERIES, FILE,
+    PAGE, "interface.npz", "history.csv", "path.npz", SERIES, FILE,
 )  # fmt: skip
 
 
@@ -55,24 +56,19 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
         picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
         save(picture.figure, "deformed")
     if any(part.elastic and not part.meshed for part in result.scene.parts):
-        from contactopt.figures.maps import maps_figure
-
-        save(maps_figure(result.reduction, result.solution), "maps")
+        save(plots.maps_figure(result.reduction, result.solution), "maps")
     for pair in problem.pairs:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
         save(plots.contact_figure(result.scene, *alone(problem, solution, pair)), name)
     if result.path is not None:
-        from contactopt.figures.animation import path_figure
-
-        save(path_figure(result.path), "path")
+        save(plots.path_figure(result.path), "path")
     if result.estimate is not None:
         save(plots.refinement_figure(result.estimate), "refinement")
 
 
-def write(result: Outcome, folder: Path, states: bool) -> None:
+def write(result: Outcome, folder: Path) -> None:
     """Write the fields of a result as VTU files, its contacts and states as tables, and its contact
-    forces and load path as arrays, into a folder. With `states` also the bodies at all states of
-    the path, for a page on which they move.
+    forces and load path as arrays, into a folder.
     """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
@@ -103,8 +99,6 @@ def write(result: Outcome, folder: Path, states: bool) -> None:
     else:
         path.write(folder)
         write_series(path, result.fields, folder)
-        if states and (found := body_states(path, result.fields)):
-            np.savez(folder / STATES, **found)
     write_tables(result, surfaces, folder)
 
 
@@ -150,24 +144,6 @@ def write_series(path: PathResult, last: tuple[Fields, ...], folder: Path) -> No
     )
 
 
-def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
-    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and
-    von_mises (n, nodes).
-
-    It is empty where there would be more than MOST_NUMBERS, or where the path kept no
-    displacements.
-    """
-    if not _fits(path, last):
-        return {}
-    made = {}
-    for own in zip(*(path.fields(step) for step in range(len(path.states)))):
-        made[f"displacement/{own[0].name}"] = np.array(
-            [f.displacement.T for f in own], dtype=np.float32
-        )
-        made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
-    return made
-
-
 def _fits(path: PathResult, last: tuple[Fields, ...]) -> bool:
     """Whether a path kept displacements, and not too many numbers for files."""
     numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
@@ -177,30 +153,17 @@ def _fits(path: PathResult, last: tuple[Fields, ...]) -> bool:
 def earlier_files(folder: Path) -> set[str]:
     """Name the files that an earlier `contactopt run` wrote into a folder; none where none has run.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for
-    a VTU file per body and per pair of surfaces, told from other people's by the fields in them,
-    and pictures and tables of the pairs that the summary names.
+    Its summary.json names the bodies and pairs, of which there are files beside those of fixed
+    names.
     """
-    with suppress(OSError, ValueError, TypeError):
-        summary = json.loads(_plain_text(folder / "summary.json"))
-        if "contact_nodes" in summary:
-            marks = ('"von_mises"', '"contact_pressure"')
-            found = {
-                file.name
-                for file in folder.glob("*.vtu")
-                if any(mark in _plain_text(file) for mark in marks)
-            }
-            pictures = {
-                f"pressure-{pair}.{ending}"
-                for pair in summary.get("pairs", {})
-                for ending in FORMATS
-            }
-            pictures |= {f"contact-{pair}.csv" for pair in summary.get("pairs", {})}
-            found |= {file.name for file in folder.iterdir() if file.name in pictures}
-            return found | {name for name in RUN_FILES if (folder / name).exists()}
+    told = folder / "summary.json"
+    with suppress(OSError, ValueError, TypeError, LookupError):
+        summary = json.loads(told.read_text()) if told.is_file() else {}
+        pairs, bodies = [*summary["pairs"]], [*summary["limits"]["bodies"]]
+        fixed = {f"pressure-{pair}.{ending}" for pair in pairs for ending in FORMATS}
+        fixed |= {f"contact-{pair}.csv" for pair in pairs} | set(RUN_FILES)
+        names = {*bodies, *(f"contact-{pair}" for pair in pairs)}
+        found = {file.name for file in folder.iterdir()}
+        fields = {file for file in found if (of := VTU.fullmatch(file)) and of[1] in names}
+        return found & fixed | fields
     return set()
-
-
-def _plain_text(file: Path) -> str:
-    """What a regular file holds; nothing for links and devices."""
-    return "" if file.is_symlink() or not file.is_file() else file.read_text(errors="replace")

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from contactopt.cards import force_unit
 from contactopt.figures.html import packed, packed_short
-from contactopt.figures.output import SINGLE, STATES
+from contactopt.figures.output import SERIES, SINGLE
 from contactopt.figures.pieces import (
     mesh_lines,
     outline,
@@ -33,7 +33,6 @@ SHARP = np.cos(np.deg2rad(30))
 ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
 MOST_INSIDE = 40_000
-MOVING = {"move": "displacement", "von_mises": "von_mises"}  # and their names in STATES
 
 
 def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
@@ -45,13 +44,16 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     bodies = {name: mesh for name, mesh in meshes.items() if "von_mises" in mesh.point_data}
     interface = _arrays(folder / "interface.npz")
     path = _arrays(folder / "path.npz") if (folder / "path.npz").exists() else None
-    moving = _arrays(folder / STATES) if path is not None and (folder / STATES).exists() else None
+    moving = path is not None and (folder / SERIES).exists()
     pairs = {name: meshes[f"contact-{name}"] for name in summary["pairs"]}
     axes = {"axisymmetric": ["r", "z"], "plane-strain": ["x", "y"]}.get(
         summary["kind"], ["x", "y", "z"]
     )
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
-    fields = {name: _body_values(name, mesh, len(axes), moving) for name, mesh in bodies.items()}
+    fields = {name: _body_values(mesh.point_data, len(axes)) for name, mesh in bodies.items()}
+    if path is not None and moving:
+        for name, values in fields.items():
+            values |= _at_all_states(folder, name, len(path["reactions"]), len(axes))
     box = whole_box(box_of([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
     near = _near_contact(whole_box(box_of([mesh.points for mesh in pairs.values()]), mirrors), box)
     largest = max((float(np.abs(values["move"]).max()) for values in fields.values()), default=0.0)
@@ -83,7 +85,7 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         ],
         "contacts": contacts,
         "states": 1 if path is None else len(path["reactions"]),
-        "moving": moving is not None,
+        "moving": moving,
         "history": None if path is None else _history(folder / "history.csv"),
     }
 
@@ -133,17 +135,19 @@ def _touching(pairs: dict[str, Any], box: np.ndarray) -> np.ndarray:
     return np.stack([np.maximum(box[0], centre - half), np.minimum(box[1], centre + half)])
 
 
-def _body_values(
-    name: str, mesh: Any, dim: int, moving: dict[str, np.ndarray] | None
-) -> dict[str, np.ndarray]:
-    """`move` (s, n, dim), von_mises (s, n) and stresses (1, n) of a body, at the last or all
-    states.
-    """
-    data = mesh.point_data
+def _body_values(data: dict[str, np.ndarray], dim: int) -> dict[str, np.ndarray]:
+    """`move` (1, n, dim), von_mises (1, n) and stresses (1, n) of a body at the last state."""
     values = {key: data[key][None] for key in data if key.startswith(("von_mises", "stress_"))}
-    if moving is None:
-        return values | {"move": data["displacement"][None, :, :dim]}
-    return values | {key: moving[f"{file}/{name}"] for key, file in MOVING.items()}
+    return values | {"move": data["displacement"][None, :, :dim]}
+
+
+def _at_all_states(folder: Path, name: str, states: int, dim: int) -> dict[str, np.ndarray]:
+    """`move` (s, n, dim) and von_mises (s, n) of a body, from the series of its files."""
+    import meshio
+
+    files = [folder / f"{name}-state{step + 1:04d}.vtu" for step in range(states)]
+    found = [_body_values(meshio.read(file).point_data, dim) for file in files]
+    return {key: np.concatenate([own[key] for own in found]) for key in ("move", "von_mises")}
 
 
 def body_arrays(

@@ -7,17 +7,16 @@ do not.
 
 from __future__ import annotations
 
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.coupling.reduction import Reduction
 from contactopt.figures.bodies import deformed
+from contactopt.figures.path_plots import energies, loop, path_figure
 from contactopt.figures.pieces import triangles
 from contactopt.figures.style import (
     BLUE,
-    COLOURS,
-    GREEN,
     GREY,
     LETTERS,
     MARK,
@@ -31,22 +30,21 @@ from contactopt.figures.style import (
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_edge
+from contactopt.readings.half_space_readings import surface_maps
 from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
-    from contactopt.derivatives.design import Design
-    from contactopt.derivatives.fit import Fit
 
 __all__ = [
-    "BLUE", "GREEN", "GREY", "ORANGE", "contact_figure", "contact_line", "contact_place",
-    "convergence", "deformed", "design", "fit", "pressure", "refinement_figure", "stick_map",
-    "traction",
+    "contact_figure", "contact_line", "contact_place", "deformed", "energies", "loop",
+    "maps_figure", "path_figure", "pressure", "refinement_figure", "stick_map", "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
 SMALL = 6.0  # parts of a contact line of which the contact zone fills one, if it is drawn alone
+COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels wide
 ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
@@ -271,46 +269,47 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
     return figure
 
 
-def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
-    """Natural-map residual against outer iterations, one line per solve."""
-    ax = make_axes(ax)
-    for colour, (label, solution) in zip(cycle(COLOURS), solutions.items()):
-        residual = [h["residual"] for h in solution.history]
-        ax.semilogy(range(1, len(residual) + 1), residual, "o-", color=colour, label=label)
-    ax.set(xlabel="outer iteration [-]", ylabel="natural-map residual [-]")
-    add_legend(ax)
-    return ax
+def maps_figure(reduction: Reduction, solution: Solution) -> Any:
+    """Draw pressure, gap, and where there is friction traction, slip and stick, of half-spaces."""
+    from matplotlib.colors import ListedColormap
 
-
-def fit(found: Fit, ax: Any = None) -> Any:
-    """Draw what the model leaves of the data, over the standard deviation of the noise."""
-    ax = make_axes(ax)
-    for (name, measured), colour in zip(found.data.items(), cycle(COLOURS)):
-        rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
-        ax.plot(np.arange(len(rest)), rest, "o-", color=colour, label=name)
-    ax.axhline(0.0, color=GREY, lw=0.8)
-    ax.axhspan(-1.96, 1.96, color=GREY, alpha=0.12, lw=0, label="95 % of normal noise")
-    found_values = "; ".join(f"{name} = {value:.4g}" for name, value in found.values.items())
-    ax.set(xlabel=f"state [-]; {symbols(found_values)}", ylabel="(measured - computed) / noise [-]")
-    add_legend(ax)
-    return ax
-
-
-def design(found: Design, ax: Any = None) -> Any:
-    """Draw the pressure of the designed contact over the place along the surface, and its mean."""
-    ax = make_axes(ax)
-    scene, problem = found.reduction.scene, found.reduction.problem
-    place = problem.chart.places[0]
-    order = np.argsort(place)
-    touching = problem.law.pressed(found.solution.reactions)
-    mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
-    points = "." if problem.dim == 3 else ".-"
-    ax.plot(place[order], found.pressure[order], points, color=BLUE, label="pressure")
-    ax.axhline(mean, color=GREY, lw=0.8, label=f"mean (largest / mean = {found.unevenness:.4f})")
-    ax.set(xlabel=f"place [{scene.units[0]}]", ylabel=f"pressure [{scene.units[1]}]")
-    ax.set_ylim(0.0, 1.2 * found.peak)
-    add_legend(ax)
-    return ax
+    scene, problem, maps = reduction.scene, reduction.problem, surface_maps(reduction, solution)
+    length, stress = scene.units
+    closed = maps["status"] > 0
+    panels = [
+        ("pressure", closed, maps["pressure"], f"pressure [{stress}]", "viridis"),
+        ("gap", ~closed, maps["gap"], f"gap [{length}]", "cividis"),
+    ]
+    if problem.law.rough.any():
+        traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
+        two: Any = ListedColormap([BLUE, ORANGE])
+        panels += [
+            ("traction", closed, traction, f"tangential traction [{stress}]", "viridis"),
+            ("slip", closed, slip, f"slip [{length}]", "cividis"),
+            ("status", closed, maps["status"], "", two),
+        ]
+    line = maps["pressure"].ndim == 1
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    figure, axes = paper_axes(columns, rows, height=1.7 if line else 2.3)
+    for (name, where, known, label, colours), ax in zip(panels, axes):
+        values = np.where(where, known, np.nan)
+        if line:
+            ax.plot(problem.chart.places[0], values)
+            ax.set(xlabel=f"${scene.components[0]}$ [{length}]", ylabel=label)
+            continue
+        x, y = problem.chart.places
+        extent = (x.min(), x.max(), y.min(), y.max())
+        look = {"origin": "lower", "interpolation": "nearest", "cmap": colours}
+        image = ax.imshow(values.T, extent=extent, **look)
+        ax.set(xlabel=f"$x$ [{length}]", ylabel=f"$y$ [{length}]")
+        bar = add_colours(image, ax, label, orientation="horizontal", shrink=1.0)
+        if name == "status":
+            image.set_clim(0.5, 2.5)
+            bar.set_ticks([1, 2], labels=["stick", "slip"])
+    for ax in axes[len(panels) :]:
+        ax.set_axis_off()
+    return figure
 
 
 def refinement_figure(estimate: Estimate) -> Any:

@@ -69,14 +69,8 @@ class SceneCheck:
 def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) -> SceneCheck:
     """Look at a scene without solving it. InputError for a scene that cannot be solved at all.
 
-    Parameters
-    ----------
-    states : the scene, or the states of its load path
-    solve : options of the run that it is meant for: method, Q, solver
-
-    Returns
-    -------
-    SceneCheck : with the words of the last state
+    states  the scene, or the states of its load path, of which the last one is described
+    solve   options of the run that it is meant for: method, Q, solver
     """
     scene, options = states[-1], solve or {}
     made = posed(scene)
@@ -220,15 +214,12 @@ def _gap_notes(scene: Scene, made: Posed) -> list[str]:
     notes, length = [], scene.units[0]
     for pair, own in zip(scene.pairs, made.couplings):
         size, least = _size(own), float(own.gap.min())
-        if least < -SHARE * size:
+        how = f"overlap by up to {-least:.4g} {length}"
+        how = how if least < 0 else f"are {least:.4g} {length} or more apart"
+        if abs(least) > SHARE * size:
             notes.append(
-                f"the surfaces of '{pair.name}' overlap by up to {-least:.4g} {length}, more than"
-                f" {SHARE:.0%} of their extent: is a body misplaced, or a unit of length wrong?"
-            )
-        if least > SHARE * size:
-            notes.append(
-                f"the surfaces of '{pair.name}' are {least:.4g} {length} or more apart, more than"
-                f" {SHARE:.0%} of their extent: is a body misplaced, or a unit of length wrong?"
+                f"the surfaces of '{pair.name}' {how}, more than {SHARE:.0%} of their extent: is a"
+                " body misplaced, or a unit of length wrong?"
             )
     return notes
 

@@ -167,11 +167,13 @@ def draw_lines(
     for number, (name, x, y) in enumerate(lines):
         style = styles[number] if styles else MARKS[number % len(MARKS)] + "-"
         across, up = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        colour = COLOURS[number] if number < len(COLOURS) else str(FAINT["color"])
-        ax.loglog(across, up, style, color=colour, mfc="white" if "--" in style else colour)
+        look = {"color": COLOURS[number]} if number < len(COLOURS) else FAINT
+        colour = str(look["color"])
+        mark = {"mfc": "white" if "--" in style else colour, "label": name}
+        ax.loglog(across, up, style, **mark, **look)
         shown = np.flatnonzero(up > 0)
         if number < len(COLOURS) and len(shown):
-            last = shown[np.argmax(across[shown])]
+            last = shown[np.argmax(-across[shown] if ax.xaxis_inverted() else across[shown])]
             ends.append((float(across[last]), float(up[last]), name, colour))
     label_ends(ax, ends)
 

@@ -5,7 +5,7 @@ displacement; their deformation follows a slider. Half and quarter models are sh
 contact surface it shows pressure, traction, gap, slip, and which contacts stick, slip or are open.
 A click on a place shows its values with their units. A load path has a slider over its states and
 the loop of force and displacement. The bodies move with it where the run wrote all of their states,
-which it does for a page if they are small enough (MOST_NUMBERS in contactopt.figures.output).
+which it does if they are small enough (MOST_NUMBERS in contactopt.figures.output).
 """
 
 from __future__ import annotations
@@ -20,19 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.cards import force_unit
 from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import check_installed, filled, write_html
 from contactopt.figures.page_data import page_data
-from contactopt.readings.resultants import resultant_words
+from contactopt.outcome import summary_rows
 
 __all__ = ["check_installed", "write_page"]
-WORDS = {
-    "approach": "approach of the bodies",
-    "contact_half_width": "half-width of the contact",
-    "stick_half_width": "half-width of the stick zone",
-}
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
@@ -91,7 +85,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
     followers = (
         "The contact follows the slider: pressure, traction, status, gap, slip since the state"
         " before, and arrows. The bodies are those of the last state: the run kept no others,"
-        " because it made no page, or because they are too large for one."
+        " because they are too large."
     )
     if data["moving"] or not data["bodies"]:
         followers = (
@@ -99,7 +93,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
             " state. The slip is that since the state before."
         )
     rows = {
-        html.escape(name): html.escape(str(value)) for name, value in _summary_rows(summary).items()
+        html.escape(name): html.escape(str(value)) for name, value in summary_rows(summary).items()
     }
     remarks = (html.escape(text) for text in summary.get("remarks", ()))
     return filled(
@@ -116,29 +110,3 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
             f'<tr><th scope="row">{name}</th><td>{value}</td></tr>' for name, value in rows.items()
         ),
     )
-
-
-def _summary_rows(summary: dict[str, Any]) -> dict[str, Any]:
-    length, stress = summary["units"]
-    newton = force_unit((length, stress))
-    rows = {
-        "status": summary["status"],
-        "unknowns of the bodies": summary["dofs"],
-        "contacts": summary["contact_nodes"],
-        "friction coefficient": f"{summary['mu']:g}",
-        "method": f"{summary['method']}, {summary['outer_iterations']} iterations",
-        "sum of the normal forces": f"{summary['normal_force']:.5g} {newton}",
-        "largest pressure": f"{summary['max_pressure']:.5g} {stress}",
-    }
-    for name, force in resultant_words(summary).items():
-        rows[f"force on the upper body of {name}"] = f"{force} {newton}"
-    for key, words in WORDS.items():
-        if summary.get(key) is not None:
-            rows[words] = f"{summary[key]:.5g} {length}"
-    if found := summary.get("accuracy"):
-        error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
-        told = f"{error}, asked for {found['target']:g}: {found['message']}"
-        rows[f"accuracy of the {found['quantity']}"] = told
-        sizes = (str(level["unknowns"]) for level in found["levels"])
-        rows["unknowns of the meshes"] = ", ".join(sizes)
-    return rows

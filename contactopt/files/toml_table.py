@@ -4,14 +4,14 @@ line.
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from contactopt.checks import check_number, meant, short
 from contactopt.errors import InputError
@@ -37,24 +37,11 @@ KINDS: dict[type, tuple[tuple[type, ...], str]] = {
 Place = tuple[str | int, ...]
 
 
-class Asked(NamedTuple):
-    """What a reader asked a table for: an entry of a type of KINDS, or of any of several."""
-
-    key: str
-    kind: type
-    needed: bool
-    default: Any
-    what: str
-    among: tuple[str, ...]
-    low: float
-
-
 class Table:
     """A table of the file, whose entries are taken by name and type; close() refuses the others.
 
     file   name of the file, for messages
     lines  place of every entry -> line, or the change that was made there
-    asked  place of every table -> what was asked of it; None: nobody notes it
     """
 
     def __init__(
@@ -63,9 +50,8 @@ class Table:
         lines: Mapping[Place, int | str],
         data: dict[str, Any],
         place: Place = (),
-        asked: dict[Place, list[Asked]] | None = None,
     ):
-        self.file, self.lines, self.data, self.place, self.asked = file, lines, data, place, asked
+        self.file, self.lines, self.data, self.place = file, lines, data, place
         self.known: list[str] = []
 
     def fail(self, message: str, *below: str | int) -> InputError:
@@ -96,13 +82,7 @@ class Table:
         of these types of KINDS.
         """
         self.known.append(key)
-        for kind in kinds:
-            self._note(key, kind, False, None, "", (), -math.inf)
         return key in self.data
-
-    def _note(self, key: str, *more: Any) -> None:
-        if self.asked is not None:
-            self.asked.setdefault(self.place, []).append(Asked(key, *more))
 
     def take(
         self,
@@ -121,7 +101,6 @@ class Table:
         calls the type `what`. The limits of a number are those of contactopt.checks.check_number.
         """
         types, usual = KINDS[kind]
-        self._note(key, kind, needed, default, what, tuple(among), limits.get("low", -math.inf))
         what = what or usual
         self.known.append(key)
         if key not in self.data:
@@ -157,7 +136,9 @@ class Table:
         return None if data is None else self._below(data, key)
 
     def _below(self, data: dict[str, Any], *place: str | int) -> Table:
-        return Table(self.file, self.lines, data, (*self.place, *place), self.asked)
+        below = copy(self)
+        below.data, below.place, below.known = data, (*self.place, *place), []
+        return below
 
     def tables(self, key: str) -> list[Table]:
         """Take an array of tables, none if it is not there."""
@@ -217,23 +198,24 @@ def change(table: Table, changes: Mapping[str, Any]) -> Table:
     lines: dict[Place, int | str] = dict(table.lines)
     for name, value in changes.items():
         told = f"--set {name}={value}"
+        place: Place = ()
         at: Any = table.data
-        *parents, last = place = _path(table, name)
-        for depth, key in enumerate(parents):
-            if key not in (range(len(at)) if isinstance(at, list) else at):
-                raise _lost(table, told, parents[:depth], key, at)
-            at = at[key]
-            if not isinstance(at, (dict, list)):
-                raise table.fail(f"{told}: {key!r} holds {short(at)}, and nothing in it.")
-        if isinstance(at, list) and last not in range(len(at)):
-            raise _lost(table, told, parents, last, at)
-        at[last] = value
-        lines[tuple(place)] = told
-    return Table(table.file, lines, table.data, table.place, table.asked)
+        *parents, last = _keys(name)
+        for key in parents:
+            step = _step(table, told, place, key, at)
+            if step not in (range(len(at)) if isinstance(at, list) else at):
+                raise _lost(table, told, place, step, at)
+            place, at = (*place, step), at[step]
+        step = _step(table, told, place, last, at)
+        if isinstance(at, list) and step not in range(len(at)):
+            raise _lost(table, told, place, step, at)
+        at[step] = value
+        lines[(*place, step)] = told
+    return Table(table.file, lines, table.data, table.place)
 
 
-def _path(table: Table, name: str) -> list[str | int]:
-    """The keys of a dotted name, written as in TOML, those of arrays as numbers from 0 on."""
+def _keys(name: str) -> list[str]:
+    """The keys of a dotted name, written as in TOML."""
     try:
         data, keys = tomllib.loads(f"{name} = 0"), []
     except tomllib.TOMLDecodeError as error:
@@ -243,19 +225,14 @@ def _path(table: Table, name: str) -> list[str | int]:
     while isinstance(data, dict):
         ((key, data),) = data.items()
         keys.append(key)
-    found: list[str | int] = []
-    at: Any = table.data
-    for key in keys:
-        number = isinstance(at, list) and key.isdigit() and int(key) > 0
-        found.append(int(key) - 1 if number else key)
-        at = (
-            at.get(key)
-            if isinstance(at, dict)
-            else at[found[-1]]
-            if number and int(key) <= len(at)
-            else None
-        )
-    return found
+    return keys
+
+
+def _step(table: Table, told: str, place: Place, key: str, at: Any) -> str | int:
+    """A key of what stands at a place, of an array as a number from 0 on."""
+    if not isinstance(at, dict | list):
+        raise table.fail(f"{told}: {place[-1]!r} holds {short(at)}, and nothing in it.")
+    return int(key) - 1 if isinstance(at, list) and key.isdigit() and int(key) > 0 else key
 
 
 def _lost(table: Table, told: str, parents: Any, key: str | int, at: Any) -> InputError:

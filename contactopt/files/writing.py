@@ -18,12 +18,7 @@ from pathlib import Path
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
-FRESH = 1.0  # s for which nobody takes a folder without a lock for one that was left behind
+OLD = 86400.0  # s after which a hidden folder was left behind by a program that was killed
 
 
 def check_folder(out: Path) -> None:
@@ -92,40 +87,15 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def _staging(folder: Path) -> Iterator[Path]:
-    """A hidden folder for files to come, locked while it is in use.
-
-    Those of programs that were killed are removed.
+    """A hidden folder for files to come. Those of programs that were killed are removed, once they
+    are OLD.
     """
     for old in folder.glob(".contactopt-*"):
-        with suppress(OSError), _locked(old, fresh=FRESH):
-            shutil.rmtree(old)
-    with (
-        tempfile.TemporaryDirectory(prefix=".contactopt-", dir=folder) as staging,
-        _locked(Path(staging)),
-    ):
+        with suppress(OSError):
+            if time.time() - old.stat().st_mtime > OLD:
+                shutil.rmtree(old)
+    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=folder) as staging:
         yield Path(staging)
-
-
-@contextmanager
-def _locked(folder: Path, fresh: float = -1.0) -> Iterator[None]:
-    """Lock a folder; OSError if another program has it, or if it is so fresh [s] that its maker may
-    not have locked it yet.
-
-    Without locks of files, as on Windows, nothing is locked, and no folder counts as old.
-    """
-    if fcntl is None:
-        if fresh >= 0:
-            raise OSError("nobody knows whether it is in use")
-        yield
-        return
-    if time.time() - folder.stat().st_mtime < fresh:
-        raise OSError("it was made a moment ago")
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _unwritable(out: Path, error: OSError) -> InputError:

@@ -258,7 +258,7 @@ def _solve(table: Table | None) -> dict[str, Any]:
     if table is None:
         return found
     for key in IN_FILES:
-        kind = OPTIONS[key].metadata["kind"]
+        kind = OPTIONS[key].kind
         limits: dict[str, Any] = {"low": 0.0} if kind is float else {}
         if table.has(key, kind):
             found[key] = table.take(key, kind, **limits)

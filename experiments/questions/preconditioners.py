@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce
-from contactopt.benchmark.figure_style import set_ticks
+from contactopt.benchmark.report_figures import set_ticks
 from contactopt.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, label_ends, paper_axes
 from contactopt.linear.operators import Interface
 from contactopt.meshes.structured import graded, rename, tensor_mesh

@@ -24,7 +24,7 @@ import scipy.sparse as sp
 
 from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
 from contactopt.benchmark import testset
-from contactopt.benchmark.testset.invariants import invariants
+from contactopt.benchmark.testset.tags import invariants
 from contactopt.errors import BackendError, InputError
 from contactopt.problem.contact_status import contact_status
 from experiments.report import template, write

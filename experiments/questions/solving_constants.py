@@ -15,8 +15,7 @@ from typing import Any
 from unittest.mock import patch
 
 from contactopt import InterfaceProblem, reduce, scenes, solve
-from contactopt.benchmark.families.packings import packing
-from contactopt.benchmark.families.random_frames import rigid_bodies
+from contactopt.benchmark.families.packings import packing, rigid_bodies
 from contactopt.methods import constants, find_method
 from contactopt.methods.nested import Nested
 from experiments.report import template, write

@@ -1,5 +1,5 @@
 """Discrete problems of many rigid bodies: packings of discs or spheres, of blocks with several
-contact points a face.
+contact points a face, and bodies that touch at random places in random directions.
 
 One implicit time step of rigid bodies with inverse masses 1 / m and 1 / J: W = H M^-1 H', q = H v +
 gap / step, H the contact velocities of the bodies' velocities. More contact components than
@@ -9,10 +9,10 @@ freedom: W is sparse and of deficient rank.
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.spatial import Delaunay
 
-from contactopt.benchmark.families.rigid_motion import velocities
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
@@ -99,3 +99,57 @@ def _places_of_contact(
         spread = 0.25 * rng.uniform(-1, 1, (len(pairs), dim - 1))
         where = where + np.einsum("mij,mj->mi", frame[:, :, 1:], spread)
     return where, frame
+
+
+def velocities(
+    places: np.ndarray, pairs: np.ndarray, where: np.ndarray, frame: np.ndarray
+) -> sp.csr_array:
+    """H (dim m, freedom): velocity of the second body of each pair relative to the first, in the
+    contact's frame, from the velocities and spins of all bodies.
+
+    The n bodies are at `places`; `pairs` (m, 2) of them touch at `where` (m, dim), and the normal,
+    the first column of `frame` (m, dim, dim), points from the first to the second. The columns of H
+    go body by body: dim velocities, then one spin in 2D, or three in 3D.
+    """
+    dim = places.shape[1]
+    freedom = 3 if dim == 2 else 6
+    i, j, x = [], [], []
+    rows = np.arange(len(pairs))[:, None] * dim + np.arange(dim)
+    for side, sign in ((1, 1.0), (0, -1.0)):
+        arm = where - places[pairs[:, side]]
+        move = np.swapaxes(frame, 1, 2)  # (m, dim components, dim)
+        if dim == 2:
+            spin = np.einsum("mai,mi->ma", move, np.stack([-arm[:, 1], arm[:, 0]], axis=1))[
+                :, :, None
+            ]
+        else:
+            spin = np.cross(arm[:, None, :], move)
+        block = sign * np.concatenate([move, spin], axis=2)
+        columns = pairs[:, side, None, None] * freedom + np.arange(freedom)
+        i.append(np.broadcast_to(rows[:, :, None], block.shape).ravel())
+        j.append(np.broadcast_to(columns, block.shape).ravel())
+        x.append(block.ravel())
+    shape = (len(pairs) * dim, len(places) * freedom)
+    return sp.csr_array(
+        sp.coo_array((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=shape)
+    )
+
+
+def rigid_bodies(
+    bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: int = 0
+) -> InterfaceProblem:
+    """Random bodies and frames: Q = H' M^-1 H of low rank, q = H' v: a solution exists."""
+    if bodies < 2 or contacts < 1:
+        raise InputError("rigid_bodies needs at least two bodies and one contact.")
+    rng = np.random.default_rng(seed)
+    H = np.zeros((3 * contacts, 6 * bodies))
+    for c in range(contacts):
+        frame = la.qr(rng.normal(size=(3, 3)))[0]
+        pair = rng.choice(bodies, 2, replace=False)
+        for body, sign in zip(pair, (1.0, -1.0)):
+            arm = rng.normal(size=3)
+            force = np.hstack([frame, np.cross(arm, frame)])
+            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 6] = sign * force
+    inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
+    q = (H @ rng.normal(size=6 * bodies)).reshape(-1, 3)
+    return InterfaceProblem((H * inverse_mass) @ H.T, q, Coulomb(np.full(contacts, mu)))

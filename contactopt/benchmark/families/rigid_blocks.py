@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.benchmark.families.rigid_motion import velocities
+from contactopt.benchmark.families.packings import velocities
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb

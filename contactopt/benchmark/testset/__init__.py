@@ -13,7 +13,7 @@ answer. Set 1 is `set_1.toml` here. A set of yours names files of FCLib or of Si
 An experiment file takes problems of a set by `[[problems]]`, `testset = "1"`, `tier = "small"`.
 """
 
-from contactopt.benchmark.testset.problem_set import TIERS, Problem, of_set, problems
+from contactopt.benchmark.testset.problem_set import TIERS, Problem, problems
 from contactopt.benchmark.testset.tags import TAGS, tags_of
 
-__all__ = ["TAGS", "TIERS", "Problem", "of_set", "problems", "tags_of"]
+__all__ = ["TAGS", "TIERS", "Problem", "problems", "tags_of"]

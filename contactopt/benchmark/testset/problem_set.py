@@ -96,17 +96,9 @@ def problems(
 def of_set(
     testset: str, folder: Path, tier: str = "", tags: str = "", every: int = 1
 ) -> list[Problem]:
-    """Find the problems that an entry `testset = ...` of an experiment file means.
-
-    Parameters
-    ----------
-    testset, folder, tier : as for `problems`
-    tags : conditions, with commas between them
-    every : only each so-manieth problem is taken, for a quick look at the whole set
-
-    Returns
-    -------
-    The problems. InputError if there are none.
+    """The problems that an entry `testset = ...` of an experiment file means; InputError if there
+    are none. `tags` are conditions with commas between them. Only each so-manieth problem is taken,
+    as `every` says, for a quick look at the whole set.
     """
     check_count("every", every)
     found = problems(tier, [text for text in tags.split(",") if text.strip()], testset, folder)
@@ -127,27 +119,16 @@ def read_set(path: Path) -> tuple[Problem, ...]:
     stored = path.with_suffix(".json")
     known = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
 
-    def make(kind: str, name: str, parameters: dict[str, Any]) -> list[_Row]:
+    def make(kind: str, name: str, parameters: dict[str, Any]) -> list[Problem]:
         tier = parameters.pop("tier", "small")
         if tier not in TIERS:
             raise InputError(f"unknown tier {tier!r}; choose from {', '.join(TIERS)}.")
         specs = named(kind, name, parameters, path.parent)
         for spec in specs:
             spec.check({})
-        return [_Row(spec, tier) for spec in specs]
+        return [Problem(spec, tier, known.get(spec.label, {})) for spec in specs]
 
-    rows = Entries(table).expanded("problems", KINDS, make)
-    return tuple(Problem(row.spec, row.tier, known.get(row.label, {})) for row in rows)
-
-
-@dataclass(frozen=True)
-class _Row:
-    spec: ProblemSpec
-    tier: str
-
-    @property
-    def label(self) -> str:
-        return self.spec.label
+    return tuple(Entries(table).expanded("problems", KINDS, make))
 
 
 def _condition(text: str) -> tuple[str, str, Any]:

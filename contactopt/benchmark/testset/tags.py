@@ -1,4 +1,6 @@
-"""What a problem is like: sizes, structure of Q, thresholds of friction."""
+"""What a problem is like: sizes, structure of Q, thresholds of friction; and small numbers by which
+one that was made on another machine is known again.
+"""
 
 from __future__ import annotations
 
@@ -65,3 +67,13 @@ def tags_of(problem: InterfaceProblem) -> dict[str, Any]:
 
 def _short(value: float) -> float | None:
     return float(f"{value:.4g}") if np.isfinite(value) else None
+
+
+def invariants(problem: InterfaceProblem) -> dict[str, float]:
+    """Norms of q, Q x, V' x (x_i = cos i), s and mu, to ten digits, which rounding keeps."""
+    x = np.cos(np.arange(problem.q.size))
+    parts = {"q": problem.q, "Qx": problem.Q @ x, "Vx": problem.V.T @ x, "s": problem.s}
+    return {
+        name: float(f"{np.linalg.norm(part):.10g}")
+        for name, part in (parts | {"mu": problem.mu}).items()
+    }

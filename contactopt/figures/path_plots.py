@@ -1,16 +1,12 @@
-"""Figures of load paths: the loop of force and displacement, energies, and both in motion with the
-tractions.
-"""
+"""Figures of load paths: the loop of force and displacement, and energies."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contactopt.cards import force_unit
-from contactopt.figures.plots import contact_line, contact_place
 from contactopt.figures.style import (
     BLUE,
     GREEN,
@@ -22,10 +18,7 @@ from contactopt.figures.style import (
     paper_axes,
     symbols,
 )
-from contactopt.files.writing import whole_file
 from contactopt.solving.paths import PathResult
-
-FRAMES, FILM = 10, 110  # of a film: pictures per second, pixels per inch
 
 
 def loop(path: PathResult, ax: Any = None) -> Any:
@@ -64,49 +57,6 @@ def path_figure(path: PathResult) -> Any:
     title = f"{scene.name}, {symbols(scene.friction)}, {len(path.states)} states"
     figure.suptitle(title, fontsize=LETTERS)
     return figure
-
-
-def animate(path: PathResult, file: str | Path) -> None:
-    """The path as a GIF: tangential traction within its bounds, and the point on the loop."""
-    from matplotlib.animation import FuncAnimation, PillowWriter
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure, (left, right) = paper_axes(2, wide=True)
-    FigureCanvasAgg(figure)
-    problem, scene = path.reduction.problem, path.states[-1].scene
-    line = contact_line(problem)
-    x, area = contact_place(problem)[line], problem.areas[line]
-    bound = [problem.law.bound_along(s.solution.reactions)[line] / area for s in path.states]
-    for own in bound:
-        own[np.isinf(own)] = 0.0  # glued contacts have none
-    shear = [-s.solution.reactions[line, 1] / area for s in path.states]
-    peak = float(np.max(bound))
-    (upper,) = left.plot(x, bound[0], "--", color=GREY, label=r"bound $\pm\mu p$")
-    (lower,) = left.plot(x, -bound[0], "--", color=GREY)
-    look = {"color": BLUE, "label": "traction on the lower body"}
-    (traction,) = left.plot(x, shear[0], "o-", **look)
-    where = ", $y$ = 0" if problem.dim == 3 else ""
-    left.set(xlabel=f"${scene.components[0]}$ [{scene.units[0]}]{where}")
-    left.set(ylabel=f"tangential traction [{scene.units[1]}]", ylim=(-1.15 * peak, 1.15 * peak))
-    add_legend(left)
-    across, force, labels = _loop(path)
-    right.plot(across, force, color=GREY, lw=0.8)
-    (past,) = right.plot([], [], color=BLUE)
-    (point,) = right.plot([], [], "o", color=ORANGE)
-    right.set(xlabel=labels[0], ylabel=labels[1])
-    figure.suptitle(f"{scene.name}, {symbols(scene.friction)}", fontsize=LETTERS)
-
-    def draw(state: int) -> tuple[Any, ...]:
-        upper.set_ydata(bound[state])
-        lower.set_ydata(-bound[state])
-        traction.set_ydata(shear[state])
-        past.set_data(across[: state + 1], force[: state + 1])
-        point.set_data(across[state : state + 1], force[state : state + 1])
-        return upper, lower, traction, past, point
-
-    film = FuncAnimation(figure, draw, frames=len(path.states))
-    with whole_file(file) as beside:
-        film.save(beside, writer=PillowWriter(fps=FRAMES), dpi=FILM)
 
 
 def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:

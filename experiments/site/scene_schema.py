@@ -1,31 +1,70 @@
-"""The JSON schema of scene files, for editors that complete and check them.
+"""Writes the JSON schema of scene files, for editors that complete and check them:
 
-It is made by the reader itself: scenes that have every table are read, and the reader notes what
-it asks each table for.
+    python -m experiments.site.scene_schema
+
+It is made by the reader itself: scenes that have every table are read, and the table notes what
+it is asked for. A test compares the file with what the reader asks now.
 """
 
 from __future__ import annotations
 
+import json
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from contactopt.checks import short
 from contactopt.cli.completion import NAMES
 from contactopt.coupling.coupling import COUPLINGS
 from contactopt.errors import InputError
-from contactopt.files.toml_table import Asked, Place, Table
+from contactopt.files.toml_table import Place, Table
 from contactopt.run_options import OPTIONS
 from contactopt.scenes.body_shapes import LENGTHS
 from contactopt.scenes.material_library import STRESSES, library
 from contactopt.scenes.scene import COMPONENTS
 from contactopt.scenes.scene_files import read_scenes
 
+ROOT = Path(__file__).parents[2]
 NAMED = ("bodies", "boundaries", "materials")  # tables whose keys are names that users choose
 TYPES: dict[type, str] = {
     str: "string", float: "number", int: "integer", bool: "boolean", dict: "object", list: "array",
 }  # fmt: skip
+
+
+class Asked(NamedTuple):
+    """What a reader asked a table for: an entry of a type."""
+
+    key: str
+    kind: type
+    needed: bool = False
+    default: Any = None
+    what: str = ""
+    among: tuple[str, ...] = ()
+    low: float = -np.inf
+
+
+class Noting(Table):
+    """A table that notes what it is asked for, below its place."""
+
+    def __init__(self, data: dict[str, Any], asked: dict[Place, list[Asked]]):
+        super().__init__("", {}, data)
+        self.asked = asked
+
+    def note(self, *more: Any) -> None:
+        self.asked.setdefault(self.place, []).append(Asked(*more))
+
+    def has(self, key: str, *kinds: type) -> bool:
+        for kind in kinds:
+            self.note(key, kind)
+        return super().has(key, *kinds)
+
+    def take(self, key, kind, default=None, needed=False, what="", among=(), **limits) -> Any:
+        low = limits.get("low", -np.inf)
+        self.note(key, kind, needed, default, what, tuple(among), low)
+        return super().take(key, kind, default, needed, what, among, **limits)
 
 
 def schema() -> dict[str, Any]:
@@ -34,7 +73,7 @@ def schema() -> dict[str, Any]:
     for kind in COMPONENTS:
         for scene in _scenes(kind):
             with suppress(InputError):  # files that are not there
-                read_scenes(partial(Table, "", {}, scene, (), asked), Path("scene.toml"))
+                read_scenes(partial(Noting, scene, asked), Path("scene.toml"))
     found: dict[tuple[str, ...], list[Asked]] = {}
     for place, entries in asked.items():
         found.setdefault(_general(place), []).extend(entries)
@@ -121,7 +160,7 @@ def _entry(
 ) -> dict[str, Any]:
     """The schema of an entry of a table, from all that was asked of it."""
     kinds = list(dict.fromkeys(one.kind for one in asked))
-    ways = []
+    ways: list[dict[str, Any]] = []
     for kind in kinds:
         way: dict[str, Any] = {"type": TYPES[kind]}
         if kind is dict:
@@ -140,9 +179,9 @@ def _entry(
                 else {"enum": names}
             )
         ways.append(way)
-    made = ways[0] if len(ways) == 1 else {"anyOf": ways} if ways else {}
+    made: dict[str, Any] = ways[0] if len(ways) == 1 else {"anyOf": ways} if ways else {}
     if place == ("solve",):
-        made["description"] = OPTIONS[key].metadata["what"]
+        made["description"] = OPTIONS[key].what
     usual = next((one.default for one in asked if one.default not in (None, "", [], "scene")), None)
     what = next((one.what for one in asked if one.what), "")
     made |= {"default": usual} if usual is not None else {}
@@ -163,3 +202,9 @@ def _names(place: tuple[str, ...], key: str, among: list[str]) -> list[str]:
     if place == ("solve",):
         known = {name: NAMES[name] for name in NAMES if name != "scene"}
     return list(dict.fromkeys([*among, *known.get(key, ())]))
+
+
+FILE = ROOT / "contactopt" / "scenes" / "scene_schema.json"
+
+if __name__ == "__main__":
+    FILE.write_text(json.dumps(schema(), indent=1) + "\n")
