@@ -52,21 +52,11 @@ TURNED = {(2, 3): [0, 2, 1], (2, 4): [0, 3, 2, 1], (3, 4): [0, 2, 1, 3],
 
 
 def deck(scene: Scene, factor: float = FACTOR) -> str:
-    """Write a scene as an input deck of CalculiX.
+    """A scene of elastic bodies with linear elements, under Coulomb's law with one number mu, as an
+    input deck that ccx runs unchanged; the contacts are as stiff as `factor`, in units of E / h.
 
-    Parameters
-    ----------
-    scene : The scene: elastic bodies with linear elements, Coulomb's law with one number mu.
-    factor : Penalty stiffness of the contacts, in units of E / h.
-
-    Returns
-    -------
-    The deck, which ccx runs unchanged. ccx prints the displacements of all nodes, U, and the forces
-    of supports, plates and loads on them, RF, into its .dat file.
-
-    Raises
-    ------
-    InputError : For what a deck cannot say.
+    ccx prints the displacements of all nodes, U, and the forces of supports, plates and loads on
+    them, RF, into its .dat file. InputError for what a deck cannot say.
     """
     _check(scene)
     check_number("the penalty factor of a deck of CalculiX", factor, low=0.0)

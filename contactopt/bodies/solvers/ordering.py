@@ -82,22 +82,14 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
 def elimination_work(
     graph: sp.csr_matrix, points: np.ndarray, kept: np.ndarray
 ) -> tuple[float, float]:
-    """Estimate what sparse factors take from the graph of the nodes alone.
+    """Estimate the entries of sparse factors and the multiplications that make them, of scalars,
+    from the graph (n, n) of nodes at points (dim, n) that share an element; those `kept` (m,) are
+    eliminated last.
 
     When the separator of a piece is eliminated, it fills a front with itself and with the nodes
     around the piece. With s and b nodes these are s^2 / 2 + s b entries and s^3 / 3 + s^2 b + s b^2
     operations. Pieces that are not cut any further are left out, for their work grows with the
     number of nodes alone. All pieces of one size are cut at once.
-
-    Parameters
-    ----------
-    graph : (n, n) pattern of the nodes that share an element.
-    points : (dim, n) their coordinates.
-    kept : (m,) nodes whose unknowns are eliminated last.
-
-    Returns
-    -------
-    The entries of the factors and the multiplications that make them, of scalars.
     """
     dim, n = points.shape
     rank = np.empty((dim, n), dtype=np.int32)  # places along each axis
