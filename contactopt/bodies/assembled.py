@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """The finite elements behind a contact surface, for couplings that integrate over it.
+    """The finite elements behind a contact surface with s nodes, for couplings that integrate over
+    it.
 
     kind       name of the reference element, a key of contactopt.bodies.elements.FACES;  degree  of
                the displacement, 1 or 2
@@ -28,9 +29,9 @@ class Mesh:
     outward    (dim, f) their mean outward normals
     measure    factor of all integrals (thickness, mirror images), and whether they also carry the
                radius r
-    locations  (dim, nodes) positions of the nodes [length];  unknowns (dim, nodes) their
-               displacement unknowns
-    held       (n,) mask of the unknowns that are not free
+    locations  (dim, s) positions of the nodes [length]
+    held       (dim, s) whether their displacement is not free
+    picked     for each component the sparse matrix (s, n) that takes the body's unknowns to it
     curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the
                mesh stands for; None: the facets are this surface
     """
@@ -41,8 +42,8 @@ class Mesh:
     outward: np.ndarray
     measure: tuple[float, bool]
     locations: np.ndarray
-    unknowns: np.ndarray
     held: np.ndarray
+    picked: tuple[sp.csr_matrix, ...]
     curve: Callable[[np.ndarray], np.ndarray] | None
 
 

@@ -234,7 +234,8 @@ class ElasticBody(Body):
         for name, unknowns in body.holders.items():
             own = np.zeros(len(F))
             own[unknowns] = F[unknowns]
-            found[name] = body.locations, own[table]
+            acting = np.flatnonzero(own[table].any(axis=0))
+            found[name] = body.locations[:, acting], own[table[:, acting]]
         return found
 
     def fields(self, U: np.ndarray) -> Fields:

@@ -167,7 +167,7 @@ class Body(ABC):
         return np.zeros(len(U)), np.zeros(len(U))
 
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
-        """The derivative of the elastic energy by a constant of the material at fixed U and forces."""
+        """The derivative of the elastic energy by a constant of the material at fixed U, force."""
         return 0.0
 
     def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
