@@ -42,12 +42,11 @@ class TooSmall(InputError):
     """All marked elements are so small that their halves would have no volume for rounding."""
 
 
-def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
+def boundary_curves(mesh: Any) -> dict[str, Curve | None]:
     """Find the line or surface that each boundary of a mesh stands for, by its name, '' for what
-    has none; None where it is flat. With `arcs`, only arcs, spheres and cylinders count as curved,
-    if the mesh has straight edges.
+    has none; None where it is flat.
     """
-    return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
+    return plane_curves(mesh) if len(mesh.p) == 2 else space_curves(mesh)
 
 
 def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
