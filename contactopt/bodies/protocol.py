@@ -17,25 +17,18 @@ where C (n, n) is its compliance: symmetric, positive semidefinite and never for
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.fields import Fields, Region, Validity
-from contactopt.linear.saddle_point import BodyTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
     from contactopt.linear.convolution import Kernel
     from contactopt.linear.operators import Product
-
-
-class Equilibrated(Protocol):
-    """The linear system of a body that is solved by iteration, wherever the body is."""
-
-    def term(self, T: sp.csr_matrix) -> BodyTerm:
-        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
+    from contactopt.linear.saddle_point import BodyTerm
 
 
 class Body(ABC):
@@ -53,7 +46,6 @@ class Body(ABC):
     complete    whether the entries of the compliance are cheap
     parallel    whether a product is expensive and leaves Python's lock, so that other bodies can
                 work at the same time
-    equilibrium its linear system where it is solved by iteration; None where products are direct
 
     Parameters of the methods
     -------------------------
@@ -85,11 +77,9 @@ class Body(ABC):
         def complete(self) -> bool: ...
         @property
         def parallel(self) -> bool: ...
-        @property
-        def equilibrium(self) -> Equilibrated | None: ...
 
     else:
-        iterative, complete, parallel, equilibrium = False, True, False, None
+        iterative, complete, parallel = False, True, False
 
     @abstractmethod
     def product(self, T: sp.csr_matrix) -> Product:
@@ -100,6 +90,10 @@ class Body(ABC):
 
     def convolution(self, T: sp.csr_matrix) -> Kernel | None:
         """T C T' as a convolution over a grid of the contacts; None if it is none."""
+        return None
+
+    def term(self, T: sp.csr_matrix) -> BodyTerm | None:
+        """The part of T C T' before condensation; None where products are direct."""
         return None
 
     @abstractmethod
@@ -117,8 +111,8 @@ class Body(ABC):
         """The displacement U (n,) under contact forces and multipliers (p,) of the free motions
         [length].
 
-        `free` are the unknowns of `equilibrium` under these forces, where they are known; they are
-        not solved for again then.
+        `free` are the unknowns of its `term` under these forces, where they are known; they are not
+        solved for again then.
         """
 
     @abstractmethod

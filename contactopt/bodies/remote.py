@@ -215,14 +215,6 @@ class RemoteTerm(Remote):
         return end
 
 
-class RemoteEquilibrium(Remote):
-    """The linear system of a body on another rank, which is solved by iteration there."""
-
-    def term(self, T: sp.csr_matrix) -> RemoteTerm:
-        rows = np.flatnonzero(np.diff(T.indptr))
-        return RemoteTerm(self.team, self._keep("term", T[rows]), rows, T.shape[0])
-
-
 class RemoteBody(Remote, Body):
     """A body on another rank."""
 
@@ -249,12 +241,12 @@ class RemoteBody(Remote, Body):
     displacement = _staying("displacement")
     external_forces = _staying("external_forces")
 
-    @cached_property
-    def equilibrium(self) -> RemoteEquilibrium | None:
-        own = self._keep("equilibrium") if self.iterative else None
+    def term(self, T: sp.csr_matrix) -> RemoteTerm | None:
+        rows = np.flatnonzero(np.diff(T.indptr))
+        own = self._keep("term", T[rows]) if self.iterative else None
         if own is None or self.team.ask(own.rank, operator.is_, own, None):
             return None
-        return RemoteEquilibrium(self.team, own)
+        return RemoteTerm(self.team, own, rows, T.shape[0])
 
     def convolution(self, T: sp.csr_matrix) -> None:
         return None  # an elastic body has none

@@ -142,9 +142,7 @@ class Reduction:
         if solution in self._known:
             return self._known[solution]
         given = [] if solution.displacements is None else list(solution.displacements.parts)
-        free = [
-            given.pop(0) if given and body.equilibrium is not None else None for body in self.bodies
-        ]
+        free = [given.pop(0) if given and body.iterative else None for body in self.bodies]
         parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
 
         def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray, Any]) -> np.ndarray:
