@@ -87,7 +87,7 @@ class Surface:
 class Guides(NamedTuple):
     """Where a body is, and which planes guide it.
 
-    extent  (dim, 2) least and largest coordinates [length]; (dim, 0) for a body without nodes
+    extent  (dim, 2) least and largest coordinates [length]
     planes  axis, place [length] and the side (1 or -1) on which the body lies, of each plane across
             a coordinate axis on which a support holds the displacement along this axis alone, at
             zero
@@ -168,14 +168,14 @@ class AssembledBody(ABC):
         """What its linear system takes."""
         return Work()
 
-    @abstractmethod
-    def guides(self) -> Guides:
+    def guides(self) -> Guides | None:
         """Find where the body is and which planes guide it.
 
         Returns
         -------
-        Its extent, and planes that may be planes of symmetry.
+        Its extent, and planes that may be planes of symmetry; None for a body without nodes.
         """
+        return None
 
     def iterates(self, solver: str) -> bool:
         """Say whether a solver of linear systems works by iteration on this body.

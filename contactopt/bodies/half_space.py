@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Surface
+from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.bodies.protocol import Body
 from contactopt.errors import InputError
@@ -145,9 +145,6 @@ class HalfSpaceBody(AssembledBody, Body):
             return np.stack([number[:-1], number[1:]])
         corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
         return np.stack([corner.ravel() for corner in corners])
-
-    def guides(self) -> Guides:
-        return Guides(np.zeros((len(self.components), 0)))
 
     def iterates(self, solver: str) -> bool:
         """Its products are so cheap that an array of its compliance never pays."""

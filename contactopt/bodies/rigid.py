@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Surface
+from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.bodies.protocol import Body
 from contactopt.checks import real_array
 from contactopt.errors import InputError
@@ -131,9 +131,6 @@ class RigidBody(AssembledBody, Body):
                 f"the gap of rigid body '{self.name}' must give one finite number per contact node."
             )
         return np.asarray(other.weights @ gap)
-
-    def guides(self) -> Guides:
-        return Guides(np.zeros((len(self.components), 0)))
 
     def prepare(self, solver: str, entries: bool) -> RigidBody:
         return self

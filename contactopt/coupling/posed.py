@@ -47,7 +47,8 @@ def posed(
     planes: tuple[SymmetryPlane, ...] = ()
     if scene.copies > 1:
         cutting = [plane for made in couplings for plane in made.planes]
-        planes = tuple(mirror_planes(scene, [body.guides() for body in assembled], cutting))
+        guides = [own for body in assembled if (own := body.guides()) is not None]
+        planes = tuple(mirror_planes(scene, guides, cutting))
     return Posed(assembled, couplings, maps, planes)
 
 
