@@ -33,10 +33,19 @@ def couple_nodes(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
 ) -> Coupling:
     """The coupling whose contacts are the contact nodes of the lower body, or of the upper one if
-    that alone has a mesh, numbered along the chart.
+    that alone has a mesh.
 
-    Frames and areas are those of the body that the contacts belong to. InputError if the contact
-    nodes of two bodies do not match.
+    Frames and areas are those of the body that the contacts belong to. The contacts are numbered
+    along the chart.
+
+    Parameters
+    ----------
+    scene, pair : The kind of the scene, and the pair of surfaces.
+    upper, lower : The two bodies, of which at least one has a mesh.
+
+    Returns
+    -------
+    One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
     names = pair.surfaces
     if upper.meshed and lower.meshed:

@@ -25,11 +25,20 @@ def couple_surfaces(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
 ) -> Coupling:
     """The mortar coupling of two bodies with meshes (contactopt.coupling.mortar), numbered along
-    the chart, with a contact for each node of the carrier that faces the other side.
+    the chart.
 
-    The carrier is the side that the pair names, otherwise that with more contacts where they face
-    each other. InputError if a body has no mesh on its contact surface, or if the surfaces face
-    each other nowhere.
+    The contacts are carried by the side that the pair names, otherwise by that with more contacts
+    where they face each other.
+
+    Parameters
+    ----------
+    scene, pair : The kind of the scene, and the pair of surfaces.
+    upper, lower : The two bodies.
+
+    Returns
+    -------
+    One contact for each node of the carrier that faces the other side. InputError if a body has no
+    mesh on its contact surface, or if the surfaces face each other nowhere.
     """
     bodies = upper, lower
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
