@@ -149,11 +149,6 @@ class Team:
         weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
         return kept
 
-    def cpu(self) -> list[float]:
-        """CPU time of every rank so far [s]."""
-        others = (self.ask(rank, time.process_time) for rank in range(1, self.size))
-        return [time.process_time(), *others]
-
     def dismiss(self) -> None:
         """End the loops of all other ranks."""
         for rank in range(1, self.size):
