@@ -36,8 +36,7 @@ from contactopt.coupling.compliance import compliance, filling, operator
 from contactopt.coupling.costs import FORM_OF, estimates, next_best
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
-from contactopt.coupling.posed import posed
-from contactopt.coupling.problem_of_bodies import problem_of
+from contactopt.coupling.posed import posed, problem_of
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
 from contactopt.linear.budget import fill
