@@ -27,21 +27,19 @@ def elimination_order(
     component: np.ndarray,
     points: np.ndarray,
     trailing: np.ndarray,
-    by_degree: bool | None = None,
 ) -> np.ndarray:
     """Permutation (n,) of the unknowns with few entries in the factors and `trailing` (m,) at the
-    end, in its own order. The unknowns of a node follow each other.
+    end, in its own order: by minimum degree in the plane, in space by nested dissection. The
+    unknowns of a node follow each other.
 
-    Of A only the pattern counts; node, component and points are as in
-    contactopt.bodies.solvers.system.System. by_degree says whether the order is by minimum degree
-    rather than nested dissection; None: in the plane.
+    Of A only the pattern counts; the arguments are as in contactopt.bodies.solvers.system.System.
     """
     present, own = np.unique(node, return_inverse=True)
     graph = _node_graph(A, own, len(present))
     kept = np.zeros(len(present), dtype=bool)  # nodes with an unknown in `trailing`
     kept[own[trailing]] = True
     rank = np.full(len(present), len(present))
-    if len(points) == 2 if by_degree is None else by_degree:
+    if len(points) == 2:
         rank[minimum_degree(graph + _clique(kept))] = np.arange(len(present))
     else:
         inside = np.flatnonzero(~kept)
