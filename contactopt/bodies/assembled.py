@@ -5,7 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -203,3 +204,39 @@ class AssembledBody(ABC):
         -------
         The body, which moves under contact forces.
         """
+
+
+class UndividedBody(AssembledBody, Body):
+    """A body without a linear system, so that it is both stages, which moves freely as a whole in
+    the components of its part that have a total force. In the others it is moved as given.
+    """
+
+    part: Any
+    components: tuple[str, ...]
+
+    @cached_property
+    def name(self) -> str:
+        return str(self.part.name)
+
+    @cached_property
+    def motion_names(self) -> tuple[str, ...]:
+        return tuple(f"translation along {name}" for name in self.part.force or {})
+
+    @cached_property
+    def resultants(self) -> np.ndarray:
+        return np.array(list((self.part.force or {}).values()), dtype=float)
+
+    @property
+    def given(self) -> np.ndarray:
+        """(dim,) displacement of the body as a whole [length]."""
+        values = self.part.displacement or {}
+        return np.array([float(values.get(name, 0.0)) for name in self.components])
+
+    @property
+    def shifts(self) -> np.ndarray:
+        """(dim, p) unit translations in the components with a force."""
+        columns = [self.components.index(name) for name in self.part.force or {}]
+        return np.eye(len(self.components))[:, columns]
+
+    def prepare(self, solver: str, entries: bool) -> Self:
+        return self
