@@ -5,7 +5,7 @@ saves.
     >>> print(found)                          # what was found, in sentences
     >>> result = contactopt.run(found.scene)  # all that is exact is applied
 
-Exact is one half across a plane of mirror symmetry (`halves`), where `proof` certifies the whole
+Exact is one half across a plane of mirror symmetry (`mirrors`), where `proof` certifies the whole
 from the smaller solution.
 """
 

@@ -1,35 +1,18 @@
-"""The search for planes across which a whole scene is its own mirror image, for the parts that they
-leave, and the proof that these stand for the whole. Planes of a scene that is cut already are found
-in contactopt.coupling.planes_of_symmetry.
-
-The plane lies in the middle between the outermost nodes, across an axis of space or across a
-principal axis of the nodes.
-"""
+"""The search for halves that stand for the whole, and their proof."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-
-import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import MOST, PROVED
-from contactopt.simplification.findings import PARTS, Simplification, Simplified
-from contactopt.simplification.halves import half_of, roller
-from contactopt.simplification.images import Images, Plane, images_under
+from contactopt.simplification.findings import Simplification, Simplified
+from contactopt.simplification.mirrors import mirrored
 from contactopt.simplification.proof import certificate_of_whole
-from contactopt.simplification.whole import Whole, has_meshes, whole_of
+from contactopt.simplification.whole import has_meshes, whole_of
 from contactopt.solving.solve_scene import Options, Solved
 from contactopt.solving.zone import solve_zone
-
-ACROSS = 1e-6  # cosine below which two normals are across each other
-UNIQUE = "Exact wherever the solution is unique."
-NONE = (
-    "No plane makes the meshes their own mirror images. To use a symmetry of the bodies, mesh one"
-    " half of them, hold it in the plane along its normal, and set copies = 2."
-)
 
 
 def simplify(scene: Scene, solve: bool = True) -> Simplified:
@@ -55,7 +38,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
         told = "Half-spaces have no mesh, and nothing that could be left out."
         return Simplified(scene, scene, (), (told,))
     if not solve:
-        found, notes = _halves(whole_of(scene))
+        found, notes = mirrored(whole_of(scene))
         return Simplified(scene, found[-1].scene if found else scene, tuple(found), tuple(notes))
     return proved_part(scene, Options())[0]
 
@@ -64,7 +47,7 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
     """What is left of a scene after all simplifications that are proved, and its solution on that
     scene's own mesh, or None. The note of the options is told what was found.
     """
-    found, told = _halves(whole_of(scene)) if has_meshes(scene) else ([], [])
+    found, told = mirrored(whole_of(scene)) if has_meshes(scene) else ([], [])
     chain, more, part = _proved(scene, found, options)
     notes = list(dict.fromkeys([*told, *more]))
     made = Simplified(scene, chain[-1].scene if chain else scene, tuple(chain), tuple(notes))
@@ -99,82 +82,3 @@ def _proved(
         notes.append(f"{last.what} This looked exact, but {why}; so it is left out.")
         chain = chain[:-1]
     return [], notes, None
-
-
-def _halves(whole: Whole) -> tuple[list[Simplification], list[str]]:
-    """One half after the other, across planes of symmetry, and what is in the way."""
-    planes, notes = _planes(whole)
-    components = whole.scene.components
-    uncut = whole.scene.copies == 1
-    if planes and uncut and (name := roller(whole)):
-        told = (
-            f"The scene is symmetric across the plane {planes[0].words(components)}, but is not"
-            f" cut: in a part of the bodies {name}, which holds a contact along one axis, would"
-            " count as a plane of symmetry, too."
-        )
-        return [], [*notes, told]
-    if not planes and not notes and uncut and whole.scene.kind != "axisymmetric":
-        notes.append(NONE)
-    found: list[Simplification] = []
-    for plane in planes:
-        images, where = images_under(whole, plane), plane.words(components)
-        if not isinstance(images, Images):
-            continue
-        told = f"The scene is symmetric across the plane {where}"
-        if np.count_nonzero(plane.normal) > 1:
-            if not found and uncut:
-                notes.append(f"{told}; turn it so that this is across an axis.")
-            continue
-        try:
-            scene, fold = half_of(whole, plane, images)
-            made = whole_of(scene)
-        except InputError as error:
-            notes.append(f"{told}, but is not cut: {error}")
-            continue
-        part = PARTS[2 ** (len(found) + 1)]
-        what = f"The {part} on one side of the plane {where} stands for the whole."
-        sizes = whole.sizes, made.sizes
-        found.append(Simplification("mirror symmetry", what, _why(images), *sizes, scene, fold))
-        whole = made
-    return found, notes
-
-
-def _why(images: Images) -> str:
-    """Why one half is enough, and what the numbers of the half stand for."""
-    text = (
-        f"Meshes, supports, loads, gaps and laws are their own mirror images. {UNIQUE} Forces and"
-        " areas stay those of the whole"
-    )
-    if any(name != image for name, image in images.pairs.items()):
-        return f"{text}; a contact that stands for itself and its image carries the forces of both."
-    return f"{text}."
-
-
-def _planes(whole: Whole) -> tuple[list[Plane], list[str]]:
-    """All planes of symmetry, and sentences about those that something else than meshes spoils."""
-    found: list[Plane] = []
-    spoilt: dict[str, Plane] = {}  # by the reason
-    for plane in _candidates(whole):
-        made = images_under(whole, plane)
-        if isinstance(made, Images):
-            found.append(plane)
-        elif made is not None:
-            spoilt.setdefault(made, plane)
-    words = whole.scene.components
-    return found, [
-        f"The bodies are symmetric across the plane {plane.words(words)}, but {reason}."
-        for reason, plane in spoilt.items()
-    ]
-
-
-def _candidates(whole: Whole) -> Iterator[Plane]:
-    """Planes that could be planes of symmetry; those across the axes of space come first."""
-    points, dim = whole.points, whole.scene.dim
-    axes = np.eye(dim)
-    known = [axes[1]] if whole.scene.kind == "axisymmetric" else [*axes]
-    if whole.scene.kind != "axisymmetric":
-        principal = np.linalg.eigh(np.cov(points))[1].T
-        known += [axis for axis in principal if np.all(np.abs(np.abs(axes @ axis) - 1) > ACROSS**2)]
-    for normal in known:
-        along = normal @ points
-        yield Plane(normal, float(along.min() + along.max()) / 2)
