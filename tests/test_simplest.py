@@ -327,8 +327,8 @@ def test_a_contact_in_the_plane_is_told():
     assert not found.found and any("lies in this plane itself" in note for note in found.notes)
 
 
-def prism(axis: int) -> Scene:
-    """The plane punch as a solid: its section is across the axis."""
+def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
+    """The plane punch as a solid: its section is across the axis, with rollers at both ends."""
     plane = punch(force={"x": 1.0, "y": -10.0})
     components = "xyz"
     across = [components[other] for other in range(3) if other != axis]
@@ -356,13 +356,66 @@ def prism(axis: int) -> Scene:
             for end, at in (("near", 0.0), ("far", 1.5))
         }
         made = made.with_boundaries({name: on(points) for name, points in sides.items()} | ends)
+        rollers = tuple(Support(end, {components[axis]: 0.0}) for end in ends) if held else ()
         loads = tuple(
             replace(load, force=dict(zip(across, load.force.values()))) for load in part.loads
         )
+        if push and loads:
+            loads = (*loads, Traction("x+", tuple(push * (other == axis) for other in range(3))))
         supports = tuple(replace(each, displacement=None) for each in part.supports)
-        return replace(part, mesh=made, supports=supports, loads=loads)
+        return replace(part, mesh=made, supports=(*supports, *rollers), loads=loads)
 
     return replace(plane, kind="solid", upper=solid(plane.upper), lower=solid(plane.lower))
+
+
+def test_a_solid_that_is_a_plate_between_rollers_is_in_plane_strain():
+    solid, plane = prism(), punch(force={"x": 1.0, "y": -10.0})
+    found = simplify(solid, solve=False)
+    assert [each.name for each in found.found] == [
+        "plane strain"
+    ] and found.scene.kind == "plane-strain"
+    whole, section = (solve_scene(scene, options=TIGHT) for scene in (solid, found.scene))
+    exact = solve_scene(replace(plane, thickness=1.5), options=TIGHT)
+    assert np.allclose(numbers(section), numbers(exact), rtol=1e-8)
+    assert np.allclose(numbers(whole), numbers(section), rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "scene, reason", [(prism(held=False), "the ends of body"), (prism(push=1.0), "along the axis")]
+)
+def test_a_prism_that_is_not_in_plane_strain(scene, reason):
+    found = simplify(scene, solve=False)
+    assert "plane strain" not in [each.name for each in found.found]
+    assert any(reason in note for note in found.notes), found.notes
+
+
+@pytest.mark.parametrize("way", ["gap", "friction", "curve"])
+def test_what_changes_along_a_prism_is_seen(way):
+    """A ridge, a slippery band or a crown over a part of a roller, where three stations along it
+    see nothing.
+    """
+
+    def band(x: np.ndarray) -> np.ndarray:
+        return np.abs(x[1] - 0.62) < 0.05
+
+    ticks = np.linspace(-2, 2, 9), np.linspace(0, 2, 5), np.linspace(-2, 0, 4)
+    mesh = rename(tensor_mesh(*ticks), contact="z+", bottom="z-", near="y-", far="y+")
+
+    def roller(spoilt: bool) -> Scene:
+        ridge, slip, crown = (spoilt and way == name for name in ("gap", "friction", "curve"))
+        curve = (lambda x: x + np.array([[0], [0], [1e-3]]) * np.sin(x[1])) if crown else None
+        held = (Support("bottom"), Support("near", {"y": 0.0}), Support("far", {"y": 0.0}))
+        upper = Rigid(
+            "roller", (0.0, 0.0, 1.0), lambda x: x[0] ** 2 / 20 - ridge * 0.1 * band(x), {"z": -1.0}
+        )
+        block = Part("block", mesh, SOFT, held, curve=curve)
+        return Scene(
+            "roller", upper, block, lambda x: 0.3 - slip * 0.2 * band(x) + 0 * x[0], kind="solid"
+        )
+
+    for spoilt in (False, True):
+        found = simplify(roller(spoilt))
+        assert ("plane strain" in [each.name for each in found.found if each.exact]) != spoilt
 
 
 def test_a_report_reads_well_and_names_are_known():
@@ -410,7 +463,7 @@ def test_rollers_at_a_contact_are_no_planes_of_symmetry():
     """A whole block between rollers: after a cut in x its walls would be taken for mirrors, and
     resultants halved.
     """
-    scene = prism(axis=1)
+    scene = prism(held=False, axis=1)
     walls = scene.with_parts(
         lambda part: replace(
             part, supports=(*part.supports, Support("near", {"y": 0.0})), loads=part.loads

@@ -5,8 +5,8 @@ saves.
     >>> print(found)                          # what was found, in sentences
     >>> result = contactopt.run(found.scene)  # all that is exact is applied
 
-Exact is one half across a plane of mirror symmetry (`mirrors`), where `proof` certifies the whole
-from the smaller solution.
+Exact are the third dimension of prisms between rollers (`sections`) and one half across planes of
+mirror symmetry (`mirrors`), where `proof` certifies the whole from the smaller solution.
 """
 
 from contactopt.simplification.findings import Simplification, Simplified

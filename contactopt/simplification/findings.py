@@ -17,7 +17,7 @@ PARTS = {2: "half", 4: "quarter", 8: "eighth"}
 class Simplification:
     """Something that may be left out of a scene.
 
-    name      'mirror symmetry'
+    name      'plane strain' or 'mirror symmetry'
     what      one sentence that says what is left out
     why       one or two sentences that say why
     before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and
@@ -118,6 +118,11 @@ class Simplified:
 
 
 def _model(given: Scene, scene: Scene) -> str:
-    """'one quarter of the bodies'."""
+    """'one quarter of the bodies', 'one half of a section in plane strain'."""
     whole = "what is modelled" if given.copies > 1 else "the bodies"
-    return f"one {PARTS[scene.copies // given.copies]} of {whole}"
+    whole = whole if scene.kind == given.kind else "a section in plane strain"
+    part = PARTS.get(scene.copies // given.copies)
+    return f"one {part} of {whole}" if part else whole
+
+
+Found = tuple[list[Simplification], list[str]]  # what was found, and sentences about what spoils it

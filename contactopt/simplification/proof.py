@@ -1,8 +1,8 @@
 """The proof that the part of a scene answers for the whole: one certificate of the whole.
 
-The part is solved. Its displacements and its contact tractions are mirrored to all nodes and
-contacts of the whole, which is assembled on its own meshes, with its own loads, gaps and friction.
-What is computed then contains nothing of the part but these numbers:
+The part is solved. Its displacements and its contact tractions are mirrored, turned or drawn out to
+all nodes and contacts of the whole, which is assembled on its own meshes, with its own loads, gaps
+and friction. What is computed then contains nothing of the part but these numbers:
 
     equilibrium   |A U - f - B' r| on unknowns that are free and the total forces of plates and
                   rigid bodies, over the largest force on a node or plate
@@ -34,7 +34,8 @@ from contactopt.solving.solve_scene import Solved
 
 Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
 # ("body" or "pair", name), points (dim, k) of the larger scene -> the same of the smaller one, and
-# matrices (k, dim, dim) that take vectors there back to vectors here
+# matrices (k, dim, dim')
+# that take vectors there back to vectors here
 Fold = Callable[[Key, np.ndarray], tuple[Key, np.ndarray, np.ndarray]]
 
 
@@ -122,7 +123,7 @@ class Spread:
         there, own = self.part.reduction.couplings[number], pairs[number].contacts
         contacts = _nearest(there.positions, x)
         force = np.einsum("kac,ka->kc", there.frames, self.part.solution.reactions[own])[contacts]
-        # A contact of the part may stand for several of the whole.
+        # A contact of the part stands for several of the whole, or for a slice of one.
         share = made.areas / np.where(there.areas > 0, there.areas, np.inf)[contacts]
         r = np.einsum("kca,kab,kb->kc", made.frames, turns, force) * share[:, None]
         largest = float(share.max(initial=0.0)) or 1.0

@@ -1,16 +1,18 @@
-"""The search for halves that stand for the whole, and their proof."""
+"""The search through the kinds of simplification, and the proof of what it finds."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import MOST, PROVED
-from contactopt.simplification.findings import Simplification, Simplified
+from contactopt.simplification.findings import Found, Simplification, Simplified
 from contactopt.simplification.mirrors import mirrored
 from contactopt.simplification.proof import certificate_of_whole
-from contactopt.simplification.whole import has_meshes, whole_of
+from contactopt.simplification.sections import section
+from contactopt.simplification.whole import Whole, has_meshes, whole_of
 from contactopt.solving.solve_scene import Options, Solved
 from contactopt.solving.zone import solve_zone
 
@@ -38,7 +40,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
         told = "Half-spaces have no mesh, and nothing that could be left out."
         return Simplified(scene, scene, (), (told,))
     if not solve:
-        found, notes = mirrored(whole_of(scene))
+        found, notes = next(_chains(whole_of(scene)))
         return Simplified(scene, found[-1].scene if found else scene, tuple(found), tuple(notes))
     return proved_part(scene, Options())[0]
 
@@ -47,13 +49,28 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
     """What is left of a scene after all simplifications that are proved, and its solution on that
     scene's own mesh, or None. The note of the options is told what was found.
     """
-    found, told = mirrored(whole_of(scene)) if has_meshes(scene) else ([], [])
-    chain, more, part = _proved(scene, found, options)
-    notes = list(dict.fromkeys([*told, *more]))
+    notes: list[str] = []
+    chain: list[Simplification] = []
+    part = None
+    for found, told in _chains(whole_of(scene)) if has_meshes(scene) else ():
+        chain, more, part = _proved(scene, found, options)
+        notes += [note for note in (*told, *more) if note not in notes]
+        if chain:
+            break
     made = Simplified(scene, chain[-1].scene if chain else scene, tuple(chain), tuple(notes))
     for text in (made.needs, *notes):
         options.note(text)
     return made, part
+
+
+def _chains(whole: Whole) -> Iterator[Found]:
+    """Simplifications that follow each other, at first those of a section, if there is one."""
+    found, notes = section(whole)
+    if found:
+        more, told = mirrored(whole_of(found[0].scene))
+        yield [*found, *more], [*notes, *told]
+    more, told = mirrored(whole)
+    yield more, [*notes, *told]
 
 
 def _proved(

@@ -180,11 +180,46 @@ def bridge(rng: np.random.Generator, spoil: float) -> Scene:
     return Scene("bridge", bodies=(floor, left, right, beam), contacts=tuple(pairs))
 
 
+def roller(rng: np.random.Generator, spoil: float) -> Scene:
+    """A rigid roller on a block: a ridge, a slippery band, a crown, or an end that is free."""
+    way, count = rng.integers(5) if spoil else -1, int(rng.integers(3, 6))
+    depth, place, wide = rng.uniform(1, 4), rng.uniform(0, 1), rng.uniform(0.03, 0.3)
+    ticks = (
+        np.linspace(-3, 3, 2 * count + 1),
+        np.linspace(0, depth, int(rng.integers(3, 7))),
+        np.linspace(-3, 0, count),
+    )
+    mesh = rename(tensor_mesh(*ticks), contact="z+", bottom="z-", near="y-", far="y+")
+
+    def band(p: np.ndarray) -> np.ndarray:
+        return np.abs(p[1] / depth - place) < wide
+
+    def gap(p: np.ndarray) -> np.ndarray:
+        crown = 0.1 * spoil * (p[1] / depth - 0.5) ** 2 if way == 2 else 0.0
+        return p[0] ** 2 / 20 - 0.3 * spoil * band(p) * (way == 0) + crown
+
+    def mu(p: np.ndarray) -> np.ndarray:
+        return 0.3 + spoil * band(p) * (way == 1) + 0.0 * p[0]
+
+    ends = [Support("near", {"y": 0.0}), Support("far", {"y": 0.0})]
+    curve = (
+        (lambda x: x + np.array([[0], [0], [1]]) * 0.01 * spoil * x[1] / depth)
+        if way == 4
+        else None
+    )
+    held = (Support("bottom"), *ends[: 1 if way == 3 else 2])
+    weight = 10 ** rng.uniform(-1, 0.7) * depth
+    force = {"x": rng.choice([0.0, 0.1]) * weight, "z": -weight}
+    block = Part("block", mesh, SOFT, held, curve=curve)
+    return Scene("roller", Rigid("roller", (0.0, 0.0, 1.0), gap, force), block, mu, kind="solid")
+
+
 KINDS: tuple[Callable[[np.random.Generator, float], Scene], ...] = (
     block,
     punch,
     tube,
     bridge,
+    roller,
 )
 
 
@@ -266,13 +301,16 @@ def prices() -> list[Row]:
     """Processor seconds of the whole, and of the part with its proof, the least of three."""
     made = []
     ticks = [np.linspace(-2, 2, 17), np.linspace(-2, 2, 17), np.linspace(0, 3, 13)]
-    mesh = rename(tensor_mesh(*ticks), contact="z-", top="z+")
+    mesh = rename(tensor_mesh(*ticks), contact="z-", top="z+", near="y-", far="y+")
     plate = Plate("top", {"x": 0.0, "y": 0.0, "z": -5.0})
     cube = Part("block", mesh, SOFT, loads=(plate,))
+    held = tuple(Support(name, {"y": 0.0}) for name in ("near", "far"))
+    layer = Part("block", mesh, SOFT, held, (Plate("top", {"x": 0.0, "z": -5.0}, glued=False),))
     named = {
         "arch, 16 elements across": scenes.arch(elements=16),
         "arch, 32 elements across": scenes.arch(elements=32),
         "cube": Scene("cube", cube, Rigid("floor"), 0.3, kind="solid"),
+        "cube between rollers": Scene("layer", layer, Rigid("floor"), 0.3, kind="solid"),
     }
     for name, scene in named.items():
         seconds = []
