@@ -418,6 +418,46 @@ def test_what_changes_along_a_prism_is_seen(way):
         assert ("plane strain" in [each.name for each in found.found if each.exact]) != spoilt
 
 
+def test_blocks_that_stick_are_tied_and_the_assumption_is_checked():
+    stack = scenes.stack(tilt=8.0, mu=0.3)
+    found = simplify(stack)
+    assert "tied contacts" in [each.name for each in found.found]
+    ties = found["tied contacts"]
+    assert ties.scene is not None and ties.check is not None and ties.after[1] < ties.before[1]
+    one, other = (solve_scene(scene, options=TIGHT) for scene in (stack, ties.scene))
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-6)
+    assert "as was assumed" in ties.check(other)
+    slippery = simplify(scenes.stack(tilt=8.0, mu=0.16)).found
+    assert not [each for each in slippery if each.name == "tied contacts"]
+
+
+def test_ties_that_would_slip_are_told():
+    steep = scenes.stack(tilt=8.0, mu=0.3)
+    ties = simplify(steep)["tied contacts"]
+    tilted = scenes.stack(tilt=20.0, mu=0.6)
+    loads = {part.name: part.loads for part in tilted.parts if isinstance(part, Part)}
+    other = ties.scene.with_parts(
+        lambda part: replace(part, loads=loads[part.name]) if isinstance(part, Part) else part
+    )
+    other = replace(
+        other,
+        contacts=tuple(
+            replace(pair, mu=0.6) if pair.law == "coulomb" else pair for pair in other.contacts
+        ),
+    )
+    assert "would slip" in ties.check(solve_scene(other))
+
+
+def test_friction_that_does_nothing_is_left_out():
+    found = simplify(scenes.press_fit(mu=0.4))
+    assert found["frictionless contacts"].error < 1e-6
+    assert "slide by at most" in found["frictionless contacts"].check(
+        solve_scene(found["frictionless contacts"].scene)
+    )
+    different = simplify(scenes.cylinder(mu=0.4, rigid="cylinder"))
+    assert "frictionless contacts" not in [each.name for each in different.found]
+
+
 def test_a_report_reads_well_and_names_are_known():
     found = simplify(punch())
     assert (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from contactopt.cards import card, count, line
@@ -9,23 +10,29 @@ from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import PROVED
 from contactopt.simplification.proof import Fold
+from contactopt.solving.solve_scene import Solved
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
+ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Simplification:
     """Something that may be left out of a scene.
 
-    name      'plane strain' or 'mirror symmetry'
+    name      'plane strain', 'mirror symmetry', 'tied contacts' or 'frictionless contacts'
     what      one sentence that says what is left out
-    why       one or two sentences that say why
+    why       one or two sentences that say why, and how the error is known
     before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and
                     of the simplified one, counted from their meshes
     scene     the simplified scene
-    fold      how the scene that it is applied to lies on the simplified one
+    folds     how the scene that it is applied to lies on the simplified one, where both have the
+              same answer; else empty
     proof     certificate of the whole with what the simplified scene says of it; None where it was
               not computed
+    error     relative error of a simplification that is not exact
+    check     function of the solved simplified scene that says in a sentence whether what was
+              assumed holds; None where nothing was assumed
     """
 
     name: str
@@ -34,8 +41,10 @@ class Simplification:
     before: tuple[int, int]
     after: tuple[int, int]
     scene: Scene = field(repr=False)
-    fold: Fold = field(repr=False)
+    folds: tuple[Fold, ...] = field(default=(), repr=False)
     proof: float | None = None
+    error: float = 0.0
+    check: Callable[[Solved], str] | None = field(default=None, repr=False)
 
     @property
     def exact(self) -> bool:
@@ -45,9 +54,16 @@ class Simplification:
     @property
     def price(self) -> str:
         """What it leaves, and what the error is, in words."""
-        error = "no error, but not proved"
         if self.exact:
             error = f"no error: the certificate of the whole is {self.proof:.0e}"
+        elif self.folds:
+            error = "no error, but not proved"
+        else:
+            error = (
+                f"error about {self.error:.1e}"
+                if self.error > ROUNDING
+                else "no error on the coarse mesh"
+            )
         (n, k), (m, c) = self.before, self.after
         return f"{n} -> {count(m, 'unknown')}, {k} -> {count(c, 'contact')}, {error}"
 
@@ -60,10 +76,11 @@ class Simplified:
     """What simplify() found.
 
     given    the scene that was asked about
-    scene    the scene after all simplifications, one after the other; the given one if there are
-             none
-    found    the simplifications, exact unless no proof was asked for; each begins with the scene
-             that the one before leaves
+    scene    the scene after all simplifications that are exact, one after the other; the given one
+             if there are none. Where no proof was asked for, these are the simplifications that
+             await it
+    found    the simplifications; the exact ones come first, and each begins with the scene that the
+             one before leaves. The others begin with `scene`
     notes    sentences about what nearly was a simplification, and what spoils it
     """
 
@@ -85,13 +102,14 @@ class Simplified:
     @property
     def needs(self) -> str:
         """One sentence: what is enough for this scene."""
-        if not self.found:
+        used = [each for each in self.found if each.folds]
+        if not used:
             return (
                 f"Scene '{self.given.name}' needs all of its"
                 " model: nothing can be left out exactly."
             )
-        (unknowns, contacts), first = self.found[-1].after, self.found[0].before
-        doubt = "" if self.found[-1].exact else ", if the proof holds, which takes its solution"
+        (unknowns, contacts), first = used[-1].after, used[0].before
+        doubt = "" if used[-1].exact else ", if the proof holds, which takes its solution"
         return (
             f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}{doubt}:"
             f" {count(unknowns, 'unknown')} instead of {first[0]}, {count(contacts, 'contact')}"

@@ -58,7 +58,7 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
         part = PARTS[2 ** (len(found) + 1)]
         what = f"The {part} on one side of the plane {where} stands for the whole."
         sizes = whole.sizes, made.sizes
-        found.append(Simplification("mirror symmetry", what, _why(images), *sizes, scene, fold))
+        found.append(Simplification("mirror symmetry", what, _why(images), *sizes, scene, (fold,)))
         whole = made
     return found, notes
 

@@ -1,4 +1,4 @@
-"""The search through the kinds of simplification, and the proof of what it finds."""
+"""The search through all kinds of simplification, the exact ones first."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import MOST, PROVED
 from contactopt.simplification.findings import Found, Simplification, Simplified
+from contactopt.simplification.joints import coarse, offered_joints
 from contactopt.simplification.mirrors import mirrored
 from contactopt.simplification.proof import certificate_of_whole
 from contactopt.simplification.sections import section
@@ -18,13 +19,16 @@ from contactopt.solving.zone import solve_zone
 
 
 def simplify(scene: Scene, solve: bool = True) -> Simplified:
-    """Say what may be left out of a scene before it is solved, and why.
+    """Say what may be left out of a scene before it is solved, why, and with which error.
 
     Parameters
     ----------
     scene : Of elastic and rigid bodies. Scenes of half-spaces are returned as they are.
     solve : Whether to solve the part that stands for the scene, which proves that it does
-        (contactopt.simplification.proof). Without it nothing is called exact.
+        (contactopt.simplification.proof), and to solve the scene once on a coarse mesh, which shows
+        contacts that neither open nor slip, and contacts whose friction hardly acts. Without it
+        only symmetries are looked for, and nothing is called exact. A mesh that is given is not
+        made coarser.
 
     Returns
     -------
@@ -42,7 +46,14 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
     if not solve:
         found, notes = next(_chains(whole_of(scene)))
         return Simplified(scene, found[-1].scene if found else scene, tuple(found), tuple(notes))
-    return proved_part(scene, Options())[0]
+    made, part = proved_part(scene, Options())
+    if part is None or not scene.given:
+        part = coarse(made.scene)
+    if not part.solution.solved:
+        why = part.solution.message
+        told = f"The scene was not solved on a coarse mesh ({why}); contacts were not looked at."
+        return replace(made, notes=(*made.notes, told))
+    return replace(made, found=(*made.found, *offered_joints(made.scene, part)))
 
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
@@ -91,7 +102,7 @@ def _proved(
         why = f"the part was not solved ({part.solution.message})"
         if part.solution.solved:
             zone = part.zones[-2] if part.zones else scene.zone
-            folds = [each.fold for each in chain]
+            folds = [fold for each in chain for fold in each.folds]
             value = certificate_of_whole(scene, last.scene.elements, zone, part, folds)
             if value <= PROVED:
                 return [replace(each, proof=value) for each in chain], notes, part

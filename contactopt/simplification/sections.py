@@ -138,7 +138,7 @@ def _simplification(prism: _Prism, component: str) -> Simplification:
         " changes or acts along it. Exact wherever the solution is unique."
     )
     sizes = prism.whole.sizes, whole_of(scene).sizes
-    return Simplification("plane strain", what, why, *sizes, scene, fold)
+    return Simplification("plane strain", what, why, *sizes, scene, (fold,))
 
 
 def _flattened(prism: _Prism) -> Scene:

@@ -255,7 +255,7 @@ def checked(number: int) -> Row:
             "said": " ".join(found.notes),
         }
     part, whole = solve_scene(found.scene, options=TIGHT), solve_scene(scene, options=TIGHT)
-    spread = Spread(part, [each.fold for each in exact])
+    spread = Spread(part, [fold for each in exact for fold in each.folds])
     made = reduce_bodies(scene)
     parts = [
         spread.reactions(pair, coupling) for pair, coupling in zip(scene.pairs, made.couplings)
