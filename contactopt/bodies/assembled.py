@@ -5,7 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """The finite elements behind a contact surface, for couplings that integrate over it.
+    """The finite elements behind a contact surface with s nodes, for couplings that integrate over
+    it.
 
     kind       name of the reference element, a key of contactopt.bodies.elements.FACES;  degree  of
                the displacement, 1 or 2
@@ -28,9 +30,9 @@ class Mesh:
     outward    (dim, f) their mean outward normals
     measure    factor of all integrals (thickness, mirror images), and whether they also carry the
                radius r
-    locations  (dim, nodes) positions of the nodes [length];  unknowns (dim, nodes) their
-               displacement unknowns
-    held       (n,) mask of the unknowns that are not free
+    locations  (dim, s) positions of the nodes [length]
+    held       (dim, s) whether their displacement is not free
+    picked     for each component the sparse matrix (s, n) that takes the body's unknowns to it
     curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the
                mesh stands for; None: the facets are this surface
     """
@@ -41,8 +43,8 @@ class Mesh:
     outward: np.ndarray
     measure: tuple[float, bool]
     locations: np.ndarray
-    unknowns: np.ndarray
     held: np.ndarray
+    picked: tuple[sp.csr_matrix, ...]
     curve: Callable[[np.ndarray], np.ndarray] | None
 
 
@@ -86,7 +88,7 @@ class Surface:
 class Guides(NamedTuple):
     """Where a body is, and which planes guide it.
 
-    extent  (dim, 2) least and largest coordinates [length]; (dim, 0) for a body without nodes
+    extent  (dim, 2) least and largest coordinates [length]
     planes  axis, place [length] and the side (1 or -1) on which the body lies, of each plane across
             a coordinate axis on which a support holds the displacement along this axis alone, at
             zero
@@ -167,14 +169,14 @@ class AssembledBody(ABC):
         """What its linear system takes."""
         return Work()
 
-    @abstractmethod
-    def guides(self) -> Guides:
+    def guides(self) -> Guides | None:
         """Find where the body is and which planes guide it.
 
         Returns
         -------
-        Its extent, and planes that may be planes of symmetry.
+        Its extent, and planes that may be planes of symmetry; None for a body without nodes.
         """
+        return None
 
     def iterates(self, solver: str) -> bool:
         """Say whether a solver of linear systems works by iteration on this body.
@@ -202,3 +204,39 @@ class AssembledBody(ABC):
         -------
         The body, which moves under contact forces.
         """
+
+
+class UndividedBody(AssembledBody, Body):
+    """A body without a linear system, so that it is both stages, which moves freely as a whole in
+    the components of its part that have a total force. In the others it is moved as given.
+    """
+
+    part: Any
+    components: tuple[str, ...]
+
+    @cached_property
+    def name(self) -> str:
+        return str(self.part.name)
+
+    @cached_property
+    def motion_names(self) -> tuple[str, ...]:
+        return tuple(f"translation along {name}" for name in self.part.force or {})
+
+    @cached_property
+    def resultants(self) -> np.ndarray:
+        return np.array(list((self.part.force or {}).values()), dtype=float)
+
+    @property
+    def given(self) -> np.ndarray:
+        """(dim,) displacement of the body as a whole [length]."""
+        values = self.part.displacement or {}
+        return np.array([float(values.get(name, 0.0)) for name in self.components])
+
+    @property
+    def shifts(self) -> np.ndarray:
+        """(dim, p) unit translations in the components with a force."""
+        columns = [self.components.index(name) for name in self.part.force or {}]
+        return np.eye(len(self.components))[:, columns]
+
+    def prepare(self, solver: str, entries: bool) -> Self:
+        return self

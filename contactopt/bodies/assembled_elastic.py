@@ -16,7 +16,7 @@ from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.errors import InputError
-from contactopt.meshes.given_curves import check_curve
+from contactopt.meshes.given_curves import Curve, check_curve
 from contactopt.scenes.scene import Part, Scene
 
 PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
@@ -80,10 +80,6 @@ class AssembledElastic(AssembledBody):
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
-        kind, facets = body.basis.mesh.refdom.__name__, np.asarray(body.basis.mesh.boundaries[name])
-        faces, outward = face_nodes(body.basis, body.degree, facets)
-        where = body.locations, unknowns, held
-        mesh = Mesh(kind, body.degree, faces, outward, body.weight, *where, curve)
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -94,8 +90,21 @@ class AssembledElastic(AssembledBody):
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            mesh,
+            self._mesh(name, held, curve),
         )
+
+    def _mesh(self, name: str, held: np.ndarray, curve: Curve | None) -> Mesh:
+        body, facets = self.body, np.asarray(self.body.basis.mesh.boundaries[name])
+        faces, outward = face_nodes(body.basis, body.degree, facets)
+        nodes, number = np.unique(faces, return_inverse=True)
+        unknowns, count = body.unknowns[:, nodes], np.arange(len(nodes) + 1)
+        picked = (
+            sp.csr_matrix((np.ones(len(nodes)), row, count), (len(nodes), len(held)))
+            for row in unknowns
+        )
+        kind, faces = body.basis.mesh.refdom.__name__, number.reshape(faces.shape)
+        places = body.locations[:, nodes], held[unknowns], tuple(picked)
+        return Mesh(kind, body.degree, faces, outward, body.weight, *places, curve)
 
     def guides(self) -> Guides:
         """Coordinate planes, the body on one side, that supports hold along the axis alone."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,6 @@ import skfem
 from contactopt.bodies.elements import Trace, Weight, node_unknowns
 from contactopt.bodies.motions import Motions
 from contactopt.bodies.stiffness import isotropic_stiffness
-from contactopt.linear.saddle_point import LocalTerm
 from contactopt.material import Material, lame_by_poisson
 
 
@@ -99,31 +98,3 @@ class Assembly:
     def contact_dofs(self) -> np.ndarray:
         """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """The linear system of a body that is solved by iteration, by what each iteration needs.
-
-    With E (n, j) the columns of the identity for the unknowns `free`, the compliance is C = E A^-1
-    E' + L R', whose second term is symmetric as well.
-
-    stiffness  x (j,) -> A x [force]
-    cycle      f (j,) -> B f, symmetric positive definite and close to A^-1 f [length]
-    diagonal   (j,) diagonal of A
-    free       (j,) numbers of the displacement unknowns that A has
-    low_rank   L and R (n, i): plates that supports resist, free motions of a body that floats
-    """
-
-    stiffness: Callable[[np.ndarray], np.ndarray]
-    cycle: Callable[[np.ndarray], np.ndarray]
-    diagonal: np.ndarray
-    free: np.ndarray
-    low_rank: tuple[np.ndarray, np.ndarray]
-
-    def term(self, T: sp.csr_matrix) -> LocalTerm:
-        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
-        left, right = self.low_rank
-        return LocalTerm(
-            T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right)
-        )

@@ -16,14 +16,22 @@ from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.elements import Weight, contact_trace, make_basis, node_unknowns, weight_at
-from contactopt.bodies.mirrored_nodes import mirrored_nodes
+from contactopt.bodies.elements import (
+    Weight,
+    contact_trace,
+    face_nodes,
+    make_basis,
+    node_unknowns,
+    weight_at,
+)
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError
 from contactopt.material import lame
 from contactopt.meshes.cells import SHAPES, straight
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
+
+FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
@@ -67,7 +75,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         rigid_motions,
         tuple(fixed.driven),
         fixed.holders,
-        mirrored_nodes(scene, part, basis, fixed.held),
+        _mirrored_nodes(scene, part, basis, fixed.held),
     )
 
 
@@ -85,7 +93,7 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
         load=_load(part, body.basis, body.weight),
         prescribed=fixed.prescribed,
         plate_forces=np.array(fixed.plate_forces, dtype=float),
-        mirrored=mirrored_nodes(scene, part, body.basis, fixed.held),
+        mirrored=_mirrored_nodes(scene, part, body.basis, fixed.held),
     )
 
 
@@ -142,6 +150,38 @@ def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
         where = basis.boundary(load.boundary) if isinstance(load, Traction) else basis
         total += form.assemble(where)
     return total
+
+
+def _mirrored_nodes(
+    scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray
+) -> np.ndarray:
+    """(dim, nodes) whether a node lies in a plane across that axis on which nothing else than the
+    displacement along it is held (n,), and no traction acts; none where the scene has no copies.
+
+    Beyond such a plane the mirror image of the body goes on. No shear acts there, whatever the
+    elements on the one side show.
+    """
+    mesh, unknowns = basis.mesh, node_unknowns(basis)
+    names = list(scene.surfaces_of(part))
+    names += [
+        load.boundary
+        for load in part.loads
+        if isinstance(load, Traction) and np.count_nonzero(load.value)
+    ]
+    loaded = [np.asarray(mesh.boundaries[name]) for name in names]
+    facets = np.setdiff1d(mesh.boundary_facets(), np.concatenate([np.zeros(0, dtype=int), *loaded]))
+    made, fixed = np.zeros(unknowns.shape, dtype=bool), held[unknowns]
+    facets = facets[np.any(np.all(fixed[:, mesh.facets[:, facets]], axis=1), axis=0)]
+    if scene.copies == 1 or not len(facets):
+        return made
+    nodes = face_nodes(basis, scene.degree, facets)[0].T  # (nodes of a facet, facets)
+    places, fixed = basis.doflocs[:, unknowns[0]][:, nodes], fixed[:, nodes]
+    size = float(np.ptp(mesh.p, axis=1).max())
+    for axis in range(len(unknowns)):
+        others = np.delete(fixed, axis, axis=0)
+        plane = np.all(fixed[axis], axis=0) & (np.ptp(places[axis], axis=0) < FLAT * size)
+        made[axis, np.unique(nodes[:, plane & ~np.any(np.all(others, axis=1), axis=0)])] = True
+    return made
 
 
 @dataclass

@@ -30,43 +30,22 @@ from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.assembly import Assembly
 from contactopt.checks import check_number
 from contactopt.errors import InputError
+from contactopt.meshes.cells import elements_of
+from contactopt.meshes.inp import FACES
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
 FACTOR = 100.0
 LEAST = 0.001  # increment of the load at which ccx gives up; the first is the whole load
 SMOOTH = 0.7  # cosine of the angle up to which a face beside the contact boundary goes on with it
-# corners of a cell -> those of its faces, in the order in which ccx numbers them
-FACES = {
-    (2, 3): ((0, 1), (1, 2), (2, 0)),
-    (2, 4): ((0, 1), (1, 2), (2, 3), (3, 0)),
-    (3, 4): ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    (3, 8): (
-        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
-    ),
-}  # fmt: skip
-BRICK = [0, 1, 4, 2, 3, 5, 7, 6]  # corners of scikit-fem's hexahedron, around two opposite faces
-# corners of a cell of the other orientation
-TURNED = {(2, 3): [0, 2, 1], (2, 4): [0, 3, 2, 1], (3, 4): [0, 2, 1, 3],
-          (3, 8): [0, 3, 2, 1, 4, 7, 6, 5]}  # fmt: skip
 
 
 def deck(scene: Scene, factor: float = FACTOR) -> str:
-    """Write a scene as an input deck of CalculiX.
+    """A scene of elastic bodies with linear elements, under Coulomb's law with one number mu, as an
+    input deck that ccx runs unchanged; the contacts are as stiff as `factor`, in units of E / h.
 
-    Parameters
-    ----------
-    scene : The scene: elastic bodies with linear elements, Coulomb's law with one number mu.
-    factor : Penalty stiffness of the contacts, in units of E / h.
-
-    Returns
-    -------
-    The deck, which ccx runs unchanged. ccx prints the displacements of all nodes, U, and the forces
-    of supports, plates and loads on them, RF, into its .dat file.
-
-    Raises
-    ------
-    InputError : For what a deck cannot say.
+    ccx prints the displacements of all nodes, U, and the forces of supports, plates and loads on
+    them, RF, into its .dat file. InputError for what a deck cannot say.
     """
     _check(scene)
     check_number("the penalty factor of a deck of CalculiX", factor, low=0.0)
@@ -122,13 +101,8 @@ class _Numbered:
         self.body, self.name, self.scene, self.mesh = body, body.name, scene, mesh
         self.first_node, self.first_element = before
         self.after = before[0] + mesh.p.shape[1], before[1] + mesh.t.shape[1]
-        cells = mesh.t[BRICK] if len(mesh.t) == 8 else mesh.t
-        self.shape = mesh.p.shape[0], len(cells)
-        # the edges that meet at the first corner span a positive volume
-        ends = {(2, 3): (1, 2), (2, 4): (1, 3), (3, 4): (1, 2, 3), (3, 8): (1, 3, 4)}[self.shape]
-        edges = mesh.p[:, cells[list(ends)]] - mesh.p[:, cells[:1]]
-        volumes = np.linalg.det(edges.transpose(2, 0, 1))
-        self.cells = np.where(volumes < 0, cells[TURNED[self.shape]], cells)
+        self.kind, cells = elements_of(mesh)
+        self.cells = cells.T
 
     def nodes(self) -> Iterator[str]:
         for number, x in enumerate(self.mesh.p.T, self.first_node + 1):
@@ -198,7 +172,7 @@ class _Numbered:
         yield f"*SURFACE, NAME={name}, TYPE=ELEMENT"
         elements = self.mesh.f2t[0, facets]
         ends = np.sort(self.mesh.facets[:, facets], axis=0)
-        for number, corners in enumerate(FACES[self.shape], 1):
+        for number, corners in enumerate(FACES[self.kind], 1):
             here = np.sort(self.cells[list(corners)][:, elements], axis=0)
             for element in elements[(here == ends).all(axis=0)]:
                 yield f"{self.first_element + element + 1}, S{number}"
@@ -207,7 +181,7 @@ class _Numbered:
         """Mean length of edges, or root of the mean area of faces, of some facets."""
         ends = self.mesh.p[:, self.mesh.facets[:, facets]]
         first, last = ends[:, 1] - ends[:, 0], ends[:, -1] - ends[:, 0]
-        if self.shape[0] == 2:
+        if self.scene.dim == 2:
             return float(np.linalg.norm(first, axis=0).mean())
         half = np.linalg.norm(np.cross(first.T, last.T), axis=1) / (1 if len(ends[0]) == 4 else 2)
         return float(np.sqrt(half.mean()))

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembly import Assembly, Equilibrium
+from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import reload_body
 from contactopt.bodies.element_stress import fields_of, limits_of, recovery_errors
 from contactopt.bodies.fields import Fields, Region, Validity
@@ -37,6 +37,7 @@ from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.bodies.stress_recovery import StressMap, stress_map
 from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.linear.operators import Product
+from contactopt.linear.saddle_point import LocalTerm
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
@@ -99,16 +100,6 @@ class ElasticBody(Body):
         return self.solver.releases_lock
 
     @cached_property
-    def equilibrium(self) -> Equilibrium | None:
-        iteration = self.solver.iteration if self.solver.iterative else None
-        if iteration is None:
-            return None
-        kept, everywhere = self.kept, sp.identity(len(self.body.load), format="csr")
-        return Equilibrium(
-            *iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere)
-        )
-
-    @cached_property
     def motions(self) -> np.ndarray:
         """(n, p + i) displacement fields of the free motions, those of plates first."""
         return np.concatenate(
@@ -149,6 +140,12 @@ class ElasticBody(Body):
 
         return product
 
+    def term(self, T: sp.csr_matrix) -> LocalTerm | None:
+        if not self.solver.iterative or self.solver.iteration is None:
+            return None
+        entries, low_rank = self.body.A.diagonal()[self.kept], self._low_rank(T)
+        return LocalTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
+
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         # T G T' from the block of G on the contact unknowns, and what is of low rank
         local, (left, right) = T[:, self.interface], self._low_rank(T)
@@ -163,10 +160,10 @@ class ElasticBody(Body):
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
     ) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
-        if free is not None and self.equilibrium is not None:
-            left, right = self.equilibrium.low_rank
+        if free is not None:
+            left, right = self._low_rank(sp.identity(len(force), format="csr"))
             U = self.at_rest + self.motions @ multipliers + left @ (right.T @ force)
-            U[self.equilibrium.free] += free
+            U[self.kept] += free
             return np.asarray(U)
         # One solve for loads and contact forces together: in a thin body each alone moves it far.
         return np.asarray(self._under(force) + self.motions @ multipliers)
@@ -234,7 +231,8 @@ class ElasticBody(Body):
         for name, unknowns in body.holders.items():
             own = np.zeros(len(F))
             own[unknowns] = F[unknowns]
-            found[name] = body.locations, own[table]
+            acting = np.flatnonzero(own[table].any(axis=0))
+            found[name] = body.locations[:, acting], own[table[:, acting]]
         return found
 
     def fields(self, U: np.ndarray) -> Fields:

@@ -54,7 +54,7 @@ FACES = {
 # behind
 TIED = {
     "RefTri": FACES["RefQuad"][3],
-    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
+    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]),
 }
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
 Rule: TypeAlias = tuple[np.ndarray, np.ndarray]  # places and weights of a quadrature

@@ -23,9 +23,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Surface
+from contactopt.bodies.assembled import Surface, UndividedBody
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
-from contactopt.bodies.protocol import Body
 from contactopt.errors import InputError
 from contactopt.linear.convolution import Convolution, Kernel, embedding
 from contactopt.linear.operators import Product
@@ -36,8 +35,8 @@ from contactopt.scenes.scene import HalfSpace, Scene
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSpaceBody(AssembledBody, Body):
-    """A half-space of a scene; it needs no preparation, so it is both stages.
+class HalfSpaceBody(UndividedBody):
+    """A half-space of a scene.
 
     part        as the scene gives it;  components  of displacements, the normal of the surface last
     ticks       places of the points along each axis of the grid [length]
@@ -50,10 +49,6 @@ class HalfSpaceBody(AssembledBody, Body):
     ticks: tuple[np.ndarray, ...]
     outward: float
     thickness: float
-
-    @cached_property
-    def name(self) -> str:
-        return self.part.name
 
     @property
     def grid(self) -> tuple[int, ...]:
@@ -79,31 +74,15 @@ class HalfSpaceBody(AssembledBody, Body):
         grid_kernel = make(self)
         return grid_kernel.scaled(1 / self.thickness) if len(self.grid) == 1 else grid_kernel
 
-    @property
-    def _given(self) -> np.ndarray:
-        values = self.part.displacement or {}
-        return np.array([float(values.get(name, 0.0)) for name in self.components])
-
     @cached_property
     def at_rest(self) -> np.ndarray:
         k = int(np.prod(self.grid))
-        return np.concatenate([np.tile(self._given, k), np.zeros(self.unknowns), self._given])
+        return np.concatenate([np.tile(self.given, k), np.zeros(self.unknowns), self.given])
 
     @cached_property
     def motions(self) -> np.ndarray:
-        k, dim = int(np.prod(self.grid)), len(self.components)
-        columns = [self.components.index(name) for name in self.part.force or {}]
-        shifts = np.eye(dim)[:, columns]
-        still = np.zeros((self.unknowns, len(columns)))
-        return np.concatenate([np.tile(shifts, (k, 1)), still, shifts])
-
-    @cached_property
-    def motion_names(self) -> tuple[str, ...]:
-        return tuple(f"translation along {name}" for name in self.part.force or {})
-
-    @cached_property
-    def resultants(self) -> np.ndarray:
-        return np.array(list((self.part.force or {}).values()), dtype=float)
+        k, still = int(np.prod(self.grid)), np.zeros((self.unknowns, self.shifts.shape[1]))
+        return np.concatenate([np.tile(self.shifts, (k, 1)), still, self.shifts])
 
     def surface(self, name: str | None = None) -> Surface:
         if name not in (None, "contact"):
@@ -146,15 +125,9 @@ class HalfSpaceBody(AssembledBody, Body):
         corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
         return np.stack([corner.ravel() for corner in corners])
 
-    def guides(self) -> Guides:
-        return Guides(np.zeros((len(self.components), 0)))
-
     def iterates(self, solver: str) -> bool:
         """Its products are so cheap that an array of its compliance never pays."""
         return True
-
-    def prepare(self, solver: str, entries: bool) -> HalfSpaceBody:
-        return self
 
     def convolution(self, T: sp.csr_matrix) -> Kernel | None:
         """For maps to displacements of all points in their order, in components +-n, +-t1, +-t2."""

@@ -16,6 +16,7 @@ from pathlib import Path
 from contactopt.cards import count
 from contactopt.checks import check_count
 from contactopt.errors import InputError
+from contactopt.linear.concurrency import cores
 from contactopt.scenes.scene import Scene
 
 OUTCOME = "CONTACTOPT_OUTCOME"  # environment variable: the file that takes the exit code of rank 0
@@ -101,19 +102,18 @@ def _watched(command: list[str], environment: dict[str, str]) -> int:
 def mpiexec(ranks: int) -> list[str]:
     """The beginning of a command on several ranks; InputError without MPI, or beyond PER_CORE."""
     check_count("the number of ranks", ranks)
-    affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
-    if ranks > PER_CORE * cores:
+    here = cores()
+    if ranks > PER_CORE * here:
         raise InputError(
-            f"{ranks} ranks are too many for {count(cores, 'core')}; take {PER_CORE * cores} at"
-            f" most, better {cores}."
+            f"{ranks} ranks are too many for {count(here, 'core')}; take {PER_CORE * here} at most,"
+            f" better {here}."
         )
     beside = shutil.which("mpiexec", path=str(Path(sys.executable).parent))
     program = beside or shutil.which("mpiexec")
     if program is None or find_spec("mpi4py") is None or find_spec("psutil") is None:
         raise InputError("ranks need mpi4py, psutil and mpiexec: pip install 'contactopt[mpi]'.")
     shared = ["--oversubscribe", "--bind-to", "none"]
-    placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else shared
+    placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= here else shared
     # whoever is root runs this as root
     root = ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
     return [program, *root, *placed, "-n", str(ranks)]

@@ -53,6 +53,20 @@ class _Reference:
 
 
 @dataclass(frozen=True)
+class Shipped:
+    """Anything on its way to another rank, where it arrives as itself: functions without a name
+    travel by their code.
+    """
+
+    item: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        import cloudpickle
+
+        return pickle.loads, (cloudpickle.dumps(self.item),)
+
+
+@dataclass(frozen=True)
 class Raised:
     """An exception on its way to rank 0, with the place where it was raised."""
 
@@ -134,11 +148,6 @@ class Team:
         self._order(rank, (None, function, arguments), kept.number)
         weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
         return kept
-
-    def cpu(self) -> list[float]:
-        """CPU time of every rank so far [s]."""
-        others = (self.ask(rank, time.process_time) for rank in range(1, self.size))
-        return [time.process_time(), *others]
 
     def dismiss(self) -> None:
         """End the loops of all other ranks."""
@@ -245,13 +254,6 @@ def _portable(error: Exception) -> Exception:
         return error if same else RuntimeError(str(error))
     except Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
-
-
-def shipped(message: Any) -> bytes:
-    """Pack anything as bytes; functions without a name travel by their code."""
-    import cloudpickle
-
-    return bytes(cloudpickle.dumps(message))
 
 
 def _receive(comm: Any, lock: threading.Lock, rank: int, tag: int) -> bytearray:

@@ -1,12 +1,11 @@
-"""A body on another rank, where it stays with its mesh, stiffness and solver. Here its unknowns are
-only those m of the nodes of its contact surfaces, in the order of the body. A displacement of the
-whole body is kept on its rank and stands here as a Field.
+"""A body on another rank, where it stays with its mesh, stiffness and solver. So does all that is
+as long as its unknowns: here it is a Field. Maps and forces of contacts travel; they have few
+entries.
 """
 
 from __future__ import annotations
 
 import operator
-import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,19 +14,20 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies import resident
-from contactopt.bodies.assembled import AssembledBody, Guides, Surface, Work
+from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.assembled_elastic import AssembledElastic, assemble_elastic
+from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.fields import Region
 from contactopt.bodies.protocol import Body
-from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
+from contactopt.bodies.ranks import Kept, RemotePart, Shipped, Team, values_of
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.linear.operators import Product
 from contactopt.linear.stacked import dot
 from contactopt.scenes.scene import Part, Scene
 
 
-def _sent(scene: Scene, part: Part) -> bytes:
-    """Scene and part as their rank needs them: without the meshes of the other bodies."""
+def _sent(scene: Scene, part: Part) -> Shipped:
+    """A scene as the rank of a part needs it: without the meshes of the other bodies."""
 
     def change(other: Any) -> Any:
         if not other.meshed:
@@ -35,7 +35,70 @@ def _sent(scene: Scene, part: Part) -> bytes:
         without = {} if other.name == part.name else {"mesh": None, "curve": None}
         return Part(**values_of(other) | without)
 
-    return shipped((replace(scene.with_parts(change), reference=None), Part(**values_of(part))))
+    return Shipped(replace(scene.with_parts(change), reference=None))
+
+
+# What a rank does, with an object that it keeps
+
+
+def call(owner: Any, member: str, *arguments: Any) -> Any:
+    """What the member of that name is or returns."""
+    found = getattr(owner, member)
+    return found(*arguments) if callable(found) else found
+
+
+def _shipped(owner: Any, member: str, *arguments: Any) -> Shipped:
+    return Shipped(call(owner, member, *arguments))
+
+
+def _in_scene(body: ElasticBody, member: str, scene: Scene, *arguments: Any) -> Any:
+    """What a member returns of a scene and its part that stands for the body."""
+    return getattr(body, member)(scene, scene.meshed[body.name], *arguments)
+
+
+def _assembled(scene: Scene, name: str, elements: int, zone: float | None) -> AssembledElastic:
+    return assemble_elastic(scene, scene.meshed[name], elements, zone)
+
+
+def _prepared(
+    body: AssembledElastic, solver: str, row: tuple[str, str, str] | None, entries: bool
+) -> ElasticBody:
+    """The body with its linear system made solvable; row is that of rank 0 in SOLVERS."""
+    if row is not None:
+        SOLVERS[solver] = row
+    return body.prepare(solver, entries)
+
+
+def _trace(term: Any, X: np.ndarray) -> np.ndarray:
+    return np.asarray(term.started_trace(X)())
+
+
+def _filled(size: int, places: np.ndarray, values: np.ndarray) -> np.ndarray:
+    made = np.zeros(size)
+    made[places] = values
+    return made
+
+
+@dataclass(frozen=True, eq=False)
+class _Few:
+    """A vector that travels by its few entries other than zero."""
+
+    vector: np.ndarray
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        places = np.flatnonzero(self.vector)
+        return _filled, (len(self.vector), places, self.vector[places])
+
+
+def _sendable(value: Any) -> Any:
+    """An argument as it travels: what is on the rank by its number, forces by their entries."""
+    if isinstance(value, Remote):
+        return value.kept
+    few = isinstance(value, np.ndarray) and value.ndim == 1
+    return _Few(value) if few and 2 * np.count_nonzero(value) < len(value) else value
+
+
+# What stands for it here
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,39 +110,48 @@ class Remote:
 
     def _ask(self, member: str, *arguments: Any) -> Any:
         """What a member of the object is or returns."""
-        return self.team.ask(self.kept.rank, resident.call, self.kept, member, *arguments)
+        return self.team.ask(self.kept.rank, call, self.kept, member, *map(_sendable, arguments))
 
     def _keep(self, member: str, *arguments: Any) -> Kept:
         """What stands for it, where it stays on its rank."""
-        return self.team.keep(self.kept.rank, resident.call, self.kept, member, *arguments)
+        return self.team.keep(self.kept.rank, call, self.kept, member, *map(_sendable, arguments))
+
+    def _field(self, member: str, *arguments: Any) -> Field:
+        """The same for a vector."""
+        return Field(self.team, self._keep(member, *arguments))
+
+
+def _fact(member: str) -> Any:
+    """A member that is asked for once."""
+    return cached_property(lambda self: self._ask(member))
+
+
+def _fetched(member: str) -> Callable[..., Any]:
+    """A member whose result comes here."""
+    return lambda self, *arguments: self._ask(member, *arguments)
+
+
+def _staying(member: str) -> Callable[..., Any]:
+    """A member whose result, a vector, stays on its rank."""
+    return lambda self, *arguments: self._field(member, *arguments)
 
 
 def _operator(function: Callable[..., Any]) -> Callable[..., Any]:
     """An operator of a Field whose result stays on its rank."""
-    return lambda self, other: self._make(function, other)
+
+    def act(self: Field, other: Any) -> Field:
+        kept = self.team.keep(self.kept.rank, function, self.kept, _sendable(other))
+        return Field(self.team, kept)
+
+    return act
 
 
 @dataclass(frozen=True, eq=False)
 class Field(Remote):
-    """A vector of the unknowns of a body, on its rank, with the operators of an array that the
-    callers of bodies use.
+    """An array of the unknowns of a body, on its rank, with the operators that callers use."""
 
-    body   the Resident whose n unknowns these are; None for vectors of an iteration, which no map
-           of contacts meets
-    known  its values on the contact unknowns (m,) where they are known here
-    """
-
-    body: Kept | None = None
-    known: np.ndarray | None = None
     elsewhere = True
     __array_ufunc__ = None  # NumPy's arrays leave the operators to this class
-
-    def _make(self, function: Any, other: Any) -> Field:
-        rank = self.kept.rank
-        if isinstance(other, np.ndarray) and self.body is not None:  # forces on the contacts
-            other = self.team.keep(rank, resident.Resident.force, self.body, other)
-        own = other.kept if isinstance(other, Field) else other
-        return Field(self.team, self.team.keep(rank, function, self.kept, own), self.body)
 
     __add__ = __radd__ = _operator(operator.add)
     __sub__ = _operator(operator.sub)
@@ -87,16 +159,11 @@ class Field(Remote):
     __truediv__ = _operator(operator.truediv)
     __pow__ = _operator(operator.pow)
     astype = _operator(np.ndarray.astype)
+    __matmul__ = _fetched("__matmul__")
 
-    def __matmul__(self, other: Field) -> float:
-        return float(self._ask("__matmul__", other.kept))
-
-    def __rmatmul__(self, T: sp.csr_matrix) -> np.ndarray:
-        """A map (rows, m) of the contact unknowns applied to the vector."""
-        known, contacts = self.known, resident.Resident.on_contacts
-        if known is None:
-            known = self.team.ask(self.kept.rank, contacts, self.body, self.kept)
-        return np.asarray(T @ known)
+    def __rmatmul__(self, T: Any) -> np.ndarray:
+        """A map (rows, n) applied to the vector."""
+        return np.asarray(self.team.ask(self.kept.rank, operator.matmul, _sendable(T), self.kept))
 
     def any(self, axis: None = None, out: None = None) -> bool:
         """Whether an entry is not zero, as numpy.any asks."""
@@ -120,27 +187,25 @@ class RemoteTerm(Remote):
 
     rows: np.ndarray
     length: int
-    size: int
-    low_rank: tuple[np.ndarray, np.ndarray]
+
     elsewhere = True
+    size = _fact("size")
+    diagonal = _staying("diagonal")
+    stiffness = _staying("stiffness")
+    cycle = _staying("cycle")
 
-    def _field(self, member: str, *arguments: Any) -> Field:
-        return Field(self.team, self._keep(member, *arguments))
-
-    def diagonal(self) -> Field:
-        return self._field("diagonal")
-
-    def stiffness(self, X: Field) -> Field:
-        return self._field("stiffness", X.kept)
-
-    def cycle(self, F: Field) -> Field:
-        return self._field("cycle", F.kept)
+    @cached_property
+    def low_rank(self) -> tuple[np.ndarray, np.ndarray]:
+        narrow = np.stack(self._ask("low_rank"))
+        wide = np.zeros((2, self.length, narrow.shape[2]))
+        wide[:, self.rows] = narrow
+        return wide[0], wide[1]
 
     def pulled(self, r: np.ndarray) -> Field:
         return self._field("pulled", r[self.rows])
 
     def started_trace(self, X: Field) -> Callable[[], np.ndarray]:
-        own = self.team.start(self.kept.rank, resident.trace, self.kept, X.kept)
+        own = self.team.start(self.kept.rank, _trace, self.kept, X.kept)
 
         def end() -> np.ndarray:
             u = np.zeros(self.length)
@@ -150,73 +215,38 @@ class RemoteTerm(Remote):
         return end
 
 
-@dataclass(frozen=True, eq=False)
-class RemoteEquilibrium:
-    """The linear system of a body on another rank, which is solved by iteration there."""
-
-    body: RemoteBody
-
-    def term(self, T: sp.csr_matrix) -> RemoteTerm:
-        rows = np.flatnonzero(np.diff(T.indptr))
-        made = Remote(self.body.team, self.body._keep("term", T[rows]))
-        narrow = np.stack(made._ask("low_rank"))
-        wide = np.zeros((2, T.shape[0], narrow.shape[2]))
-        wide[:, rows] = narrow
-        return RemoteTerm(made.team, made.kept, rows, T.shape[0], made._ask("size"), tuple(wide))
-
-
-def _sendable(value: Any) -> Any:
-    """An argument as its rank takes it: a vector there, forces on contacts, or the same."""
-    if isinstance(value, Field):
-        return value.kept
-    return resident.Forces(value) if isinstance(value, np.ndarray) else value
-
-
-def _forwarded(member: str) -> Callable[..., Any]:
-    """A member of a body whose result comes here."""
-
-    def act(self: RemoteBody, *arguments: Any) -> Any:
-        return self._ask("act", member, *map(_sendable, arguments))
-
-    return act
-
-
-@dataclass(frozen=True, eq=False)
 class RemoteBody(Remote, Body):
-    """A body on another rank; its n unknowns are the m of its contact surfaces.
+    """A body on another rank."""
 
-    resting       at_rest (m,), where it is known here
-    equilibrated  whether it is solved by iteration
-    """
-
-    name: str
-    unknowns: int
-    resting: np.ndarray
-    motions: np.ndarray
-    motion_names: tuple[str, ...]
-    resultants: np.ndarray
-    equilibrated: bool
-    iterative: bool
-    complete: bool
     parallel = True
+    name = _fact("name")
+    unknowns = _fact("unknowns")
+    motion_names = _fact("motion_names")
+    resultants = _fact("resultants")
+    iterative = _fact("iterative")
+    complete = _fact("complete")
+    at_rest = cached_property(_staying("at_rest"))
+    motions = cached_property(_staying("motions"))
 
-    @cached_property
-    def at_rest(self) -> Any:
-        return Field(self.team, self._keep("act", "at_rest"), self.kept, self.resting)
+    compliance = _fetched("compliance")
+    moved = _fetched("moved")
+    material_work = _fetched("material_work")
+    energy = _fetched("energy")
+    energy_change = _fetched("energy_change")
+    recovery_errors = _fetched("recovery_errors")
+    on_elements = _fetched("on_elements")
+    held_by = _fetched("held_by")
+    fields = _fetched("fields")
+    limits = _fetched("limits")
+    displacement = _staying("displacement")
+    external_forces = _staying("external_forces")
 
-    @cached_property
-    def equilibrium(self) -> RemoteEquilibrium | None:
-        return RemoteEquilibrium(self) if self.equilibrated else None
-
-    compliance = _forwarded("compliance")
-    moved = _forwarded("moved")
-    material_work = _forwarded("material_work")
-    energy = _forwarded("energy")
-    energy_change = _forwarded("energy_change")
-    recovery_errors = _forwarded("recovery_errors")
-    on_elements = _forwarded("on_elements")
-    fields = _forwarded("fields")
-    limits = _forwarded("limits")
+    def term(self, T: sp.csr_matrix) -> RemoteTerm | None:
+        rows = np.flatnonzero(np.diff(T.indptr))
+        own = self._keep("term", T[rows]) if self.iterative else None
+        if own is None or self.team.ask(own.rank, operator.is_, own, None):
+            return None
+        return RemoteTerm(self.team, own, rows, T.shape[0])
 
     def convolution(self, T: sp.csr_matrix) -> None:
         return None  # an elastic body has none
@@ -225,86 +255,51 @@ class RemoteBody(Remote, Body):
         made = Remote(self.team, self._keep("product", T))
         return lambda X, accuracy: made._ask("__call__", X, accuracy)
 
-    def _items(self, member: str, *arguments: Any) -> tuple[Field, Remote]:
-        """The first of the two vectors that a member returns, and both together."""
-        both = Remote(self.team, self._keep("act", member, *map(_sendable, arguments)))
-        return Field(self.team, both._keep("__getitem__", 0), self.kept), both
-
-    def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
-        known = None if free is None else free.kept
-        own = self._keep("act", "displacement", _sendable(force), multipliers, known)
-        return Field(self.team, own, self.kept)
-
-    def external_forces(self, U: Any) -> Any:
-        return Field(self.team, self._keep("act", "external_forces", U.kept), self.kept)
-
     def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
-        own, both = self._items("material_change", constant, U, force)
-        return own, both._ask("__getitem__", 1)
+        both = Remote(self.team, self._keep("material_change", constant, U, force))
+        return both._field("__getitem__", 0), both._ask("__getitem__", 1)
 
     def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
-        own, both = self._items("energy_gradient", U, force)
-        return own, Field(self.team, both._keep("__getitem__", 1), self.kept)
+        both = Remote(self.team, self._keep("energy_gradient", U, force))
+        return both._field("__getitem__", 0), both._field("__getitem__", 1)
 
-    def load_work(self, scene: Scene, part: Part, dual: Any, weights: np.ndarray, W: Any) -> float:
-        sent = _sent(scene, part)
-        return float(self._ask("load_work", sent, _sendable(dual), weights, W.kept))
+    def load_work(self, scene: Scene, part: Part, *weights: Any) -> float:
+        own = _sent(scene, part), *map(_sendable, weights)
+        return float(self.team.ask(self.kept.rank, _in_scene, self.kept, "load_work", *own))
 
-    def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask("held_by", U.kept, force)
-        return found
+    def loaded(self, scene: Scene, part: Part) -> RemoteBody:
+        own = self.kept, "loaded", _sent(scene, part)
+        return RemoteBody(self.team, self.team.keep(self.kept.rank, _in_scene, *own))
 
     def stress_map(self, region: Region, by_poisson: bool = False) -> Any:
-        made = Remote(self.team, self._keep("act", "stress_map", region, by_poisson))
-        return RemoteStressMap(
-            self.team, made.kept, self.kept, made._ask("places"), made._ask("sources")
-        )
+        return RemoteStressMap(self.team, self._keep("stress_map", region, by_poisson))
 
     def _changed(self, member: str, argument: Any) -> RemoteBody:
-        made = self._keep("changed", member, argument)
+        made = self._keep(member, argument)
         same = self.team.ask(made.rank, operator.is_, self.kept, made)
-        return self if same else _known(self.team, made)
+        return self if same else RemoteBody(self.team, made)
 
     def grounded(self, modulus: float) -> RemoteBody:
         return self._changed("grounded", modulus)
 
     def pulled(self, U: Any) -> RemoteBody:
-        return self._changed("pulled", U.kept)
-
-    def loaded(self, scene: Scene, part: Part) -> RemoteBody:
-        return _known(self.team, self._keep("loaded", _sent(scene, part)))
+        return self._changed("pulled", U)
 
 
-@dataclass(frozen=True, eq=False)
 class RemoteStressMap(Remote):
-    """A StressMap on the rank of its body, with its places and sources here."""
+    """A StressMap on the rank of its body."""
 
-    body: Kept
-    places: np.ndarray
-    sources: np.ndarray
+    places = _fact("places")
+    sources = _fact("sources")
+    stress = _fetched("stress")
+    deviation = _fetched("deviation")
+    elements = _fetched("elements")
+    size = _fetched("size")
+    transposed = _staying("transposed")
 
     @property
     def mesh(self) -> Any:
-        return pickle.loads(self.team.ask(self.kept.rank, resident.shipped_mesh, self.kept))
-
-    def stress(self, U: Field) -> np.ndarray:
-        return np.asarray(self._ask("stress", U.kept))
-
-    def deviation(self, U: Field, slopes: np.ndarray) -> np.ndarray:
-        return np.asarray(self._ask("deviation", U.kept, slopes))
-
-    def elements(self, places: np.ndarray) -> np.ndarray:
-        return np.asarray(self._ask("elements", places))
-
-    def size(self, number: int) -> float:
-        return float(self._ask("size", number))
-
-    def transposed(self, slopes: np.ndarray) -> Field:
-        return Field(self.team, self._keep("transposed", slopes), self.body)
-
-
-def _known(team: Team, kept: Kept) -> RemoteBody:
-    return RemoteBody(team, kept, **Remote(team, kept)._ask("facts"))
+        return self.team.ask(self.kept.rank, _shipped, self.kept, "mesh")
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,27 +308,17 @@ class AssembledRemote(Remote, AssembledBody):
 
     name: str
 
-    @cached_property
-    def unknowns(self) -> int:
-        return int(self._ask("unknowns"))
+    unknowns = _fact("unknowns")
+    work = _fact("work")
+    guides = _fetched("guides")
+    iterates = _fetched("iterates")
 
-    @cached_property
-    def work(self) -> Work:
-        return Work(*self._ask("work"))
-
-    def guides(self) -> Guides:
-        return Guides(*self._ask("guides"))
-
-    def iterates(self, solver: str) -> bool:
-        return bool(self._ask("iterates", solver))
-
-    def surface(self, name: str | None = None) -> Surface:
-        found: Surface = pickle.loads(self._ask("shipped_surface", name))
-        return found
+    def surface(self, name: str | None = None) -> Any:
+        return self.team.ask(self.kept.rank, _shipped, self.kept, "surface", name)
 
     def prepare(self, solver: str, entries: bool) -> RemoteBody:
-        made = self._keep("resident", solver, SOLVERS.get(solver), entries)
-        return _known(self.team, made)
+        order = _prepared, self.kept, solver, SOLVERS.get(solver), entries
+        return RemoteBody(self.team, self.team.keep(self.kept.rank, *order))
 
 
 def assemble_remote(
@@ -342,5 +327,5 @@ def assemble_remote(
     """What stands for a body that is assembled on its rank."""
     team = part.team
     assert team is not None
-    kept = team.keep(part.rank, resident.assembled, _sent(scene, part), elements, zone)
+    kept = team.keep(part.rank, _assembled, _sent(scene, part), part.name, elements, zone)
     return AssembledRemote(team, kept, part.name)

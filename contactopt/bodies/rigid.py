@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Surface
-from contactopt.bodies.protocol import Body
+from contactopt.bodies.assembled import Surface, UndividedBody
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.linear.operators import Product
@@ -28,8 +27,8 @@ FLAT = 1e-3  # normals of a surface that differ by less than this are one direct
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBody(AssembledBody, Body):
-    """A rigid body; it needs no preparation, so it is both stages."""
+class RigidBody(UndividedBody):
+    """A rigid body."""
 
     part: Rigid
     components: tuple[str, ...]
@@ -38,31 +37,12 @@ class RigidBody(AssembledBody, Body):
     meshed = False
 
     @cached_property
-    def name(self) -> str:
-        return self.part.name
-
-    @cached_property
     def at_rest(self) -> np.ndarray:
-        values = self.part.displacement or {}
-        given = [float(values.get(name, 0.0)) for name in self.components]
-        return np.array([*given, *(0.0 for _ in given)])
+        return np.concatenate([self.given, 0 * self.given])
 
     @cached_property
     def motions(self) -> np.ndarray:
-        columns = [self.components.index(name) for name in self._force]
-        return np.eye(2 * len(self.components))[:, columns]
-
-    @cached_property
-    def motion_names(self) -> tuple[str, ...]:
-        return tuple(f"translation along {component}" for component in self._force)
-
-    @cached_property
-    def resultants(self) -> np.ndarray:
-        return np.array(list(self._force.values()), dtype=float)
-
-    @cached_property
-    def _force(self) -> dict[str, float]:
-        return dict(self.part.force or {})
+        return np.concatenate([self.shifts, 0 * self.shifts])
 
     def surface(self, name: str | None = None) -> Surface:
         raise InputError(
@@ -83,7 +63,7 @@ class RigidBody(AssembledBody, Body):
                 self.name,
                 other.body,
             )
-        fixed = np.array([name not in self._force for name in self.components])
+        fixed = np.array([name not in (self.part.force or {}) for name in self.components])
         traces = tuple(
             sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim))
             for c in range(dim)
@@ -131,12 +111,6 @@ class RigidBody(AssembledBody, Body):
                 f"the gap of rigid body '{self.name}' must give one finite number per contact node."
             )
         return np.asarray(other.weights @ gap)
-
-    def guides(self) -> Guides:
-        return Guides(np.zeros((len(self.components), 0)))
-
-    def prepare(self, solver: str, entries: bool) -> RigidBody:
-        return self
 
     def product(self, T: sp.csr_matrix) -> Product:
         return lambda X, accuracy: np.zeros(X.shape)

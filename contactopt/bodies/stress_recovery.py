@@ -78,15 +78,8 @@ class StressMap:
         return self.body.basis.mesh
 
     def stress(self, U: np.ndarray) -> np.ndarray:
-        """Recover the stress.
-
-        Parameters
-        ----------
-        U : (n,) displacement of the body [length].
-
-        Returns
-        -------
-        (m, 4 or 6) at every place, components as in contactopt.bodies.fields.STRESSES.
+        """The recovered stress (m, 4 or 6) at every place under a displacement U (n,), components
+        as in contactopt.bodies.fields.STRESSES.
         """
         return (
             np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
@@ -94,19 +87,11 @@ class StressMap:
         )
 
     def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """Estimate how uncertain a function of the recovered stress is.
+        """Standard error (m,) at every place of a function of the recovered stress with the
+        derivatives `slopes` (m, 4 or 6) by it.
 
         The stresses of the elements around a place scatter about the fit, and what is fitted is as
         uncertain as that.
-
-        Parameters
-        ----------
-        U : (n,) displacement of the body [length].
-        slopes : (m, 4 or 6) derivatives of the function by the recovered stress.
-
-        Returns
-        -------
-        (m,) its standard error at every place.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(
@@ -114,44 +99,19 @@ class StressMap:
         )
 
     def elements(self, places: np.ndarray) -> np.ndarray:
-        """List the elements around some of the places.
-
-        Parameters
-        ----------
-        places : Their numbers.
-
-        Returns
-        -------
-        Numbers of elements.
-        """
+        """Numbers of the elements around some of the places, given by their numbers."""
         chosen = np.isin(self.fit.row, places)
         return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
 
     def transposed(self, slopes: np.ndarray) -> np.ndarray:
-        """Apply the transpose of the map.
-
-        Parameters
-        ----------
-        slopes : (m, 4 or 6) derivatives of a function by the recovered stress.
-
-        Returns
-        -------
-        (n,) its derivative by the displacement U.
+        """The derivative (n,) by the displacement of a function with the derivatives `slopes` (m, 4
+        or 6) by the recovered stress.
         """
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
 
     def size(self, number: int) -> float:
-        """Measure the elements in the patch of a place.
-
-        Parameters
-        ----------
-        number : Number of the place.
-
-        Returns
-        -------
-        Their mean size [length].
-        """
+        """Mean size of the elements in the patch of the place of a number [length]."""
         own = np.unique(self.weights[number].indices // len(self.basis.W))
         volume = np.asarray(self.basis.dx)[own].sum(axis=1)
         return float(np.mean(volume) ** (1 / len(self.places)))

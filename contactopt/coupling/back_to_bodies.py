@@ -11,15 +11,8 @@ __all__ = ["Fields", "recover"]
 
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
-    """Compute the displacement and stress of the elastic bodies of a solved scene.
-
-    Parameters
-    ----------
-    reduction, solution : The reduction of the scene, and a solution of its problem.
-
-    Returns
-    -------
-    The Fields of each body that has any, upper body first.
+    """The displacement and stress of each body that has any, upper body first, from a reduction and
+    a solution of its problem.
     """
     displaced = zip(reduction.bodies, reduction.displaced(solution))
     fields = each(lambda pair: pair[0].fields(pair[1]), displaced)

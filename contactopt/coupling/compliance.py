@@ -109,8 +109,9 @@ def _before_condensation(bodies: Sequence[Body], maps: Maps) -> CoupledForm:
     terms: list[BodyTerm] = []
     others = []
     for body, B in zip(bodies, maps):
-        if body.equilibrium is not None:
-            terms.append(body.equilibrium.term(B))
+        term = body.term(B)
+        if term is not None:
+            terms.append(term)
         elif body.moved(B).any():
             others.append(body.product(B))
     L, R = (np.concatenate([term.low_rank[side] for term in terms], axis=1) for side in (0, 1))

@@ -34,7 +34,8 @@ FORM_OF = {"dense": "explicit", "products": "implicit", "coupled": "implicit"}
 
 
 def terms(way: str, works: Sequence[Work], unknowns: int, dim: int) -> np.ndarray:
-    """What the cost of a way grows with, to which COSTS gives the seconds.
+    """What the cost of a way, a key of FORM_OF, grows with, to which COSTS gives the seconds; from
+    the works of the bodies and the number of all interface unknowns, in 2 or 3 dimensions.
 
     Every way has a fixed cost, and assembly grows with the entries of the stiffness. Factors take
     the operations of their elimination; those of a dense Q keep the contact unknowns to the end. A
@@ -43,17 +44,6 @@ def terms(way: str, works: Sequence[Work], unknowns: int, dim: int) -> np.ndarra
     the contact surface, which takes more for each unknown of a surface than for one of a line. The
     coupled way takes V-cycles, whose matrices have a share of the entries of the stiffness, and the
     same model.
-
-    Parameters
-    ----------
-    way : A key of FORM_OF.
-    works : Of each body.
-    unknowns : Number of all interface unknowns.
-    dim : Number of dimensions, 2 or 3.
-
-    Returns
-    -------
-    The terms, as many as COSTS has prices.
     """
     total = np.sum([[w.stiffness, *w.factors, *w.factors_contact_last] for w in works], axis=0)
     stiffness, entries, operations, _, ordered = total
@@ -70,18 +60,11 @@ def terms(way: str, works: Sequence[Work], unknowns: int, dim: int) -> np.ndarra
 def estimates(
     works: Sequence[Work], unknowns: int, dim: int, solvers: Sequence[str], Q: str, once: bool
 ) -> dict[tuple[str, str], float]:
-    """Estimated seconds of set-up and solution on one core, for each way that is open.
+    """(way, solver) -> seconds of set-up and solution on one core, for each way that is open to the
+    solvers and the form of Q (or 'auto') that are asked for; the first arguments are those of
+    `terms`.
 
-    Parameters
-    ----------
-    works, unknowns, dim : As for `terms`.
-    solvers : Solvers of the bodies that may be taken.
-    Q : The form of Q that is asked for, or 'auto'.
-    once : Whether one problem is solved by Newton's steps, and factors serve nothing else.
-
-    Returns
-    -------
-    (way, solver) -> seconds.
+    `once` says that one problem is solved by Newton's steps, and factors serve nothing else.
     """
     found = {}
     for (way, solver), prices in COSTS.items():
@@ -114,19 +97,11 @@ class NextBest:
 
 
 def next_best(costs: Mapping[tuple[str, str], float], unknowns: int, once: bool) -> NextBest | None:
-    """The best of the ways that can take the place of the cheapest one.
+    """The best of the ways that can take the place of the cheapest of `costs`, from `estimates`:
+    any way by factors that of the coupled one, and a dense Q that of products. `unknowns` counts
+    the displacements of all bodies, which each step goes over.
 
-    Any way by factors takes the place of the coupled one, and a dense Q that of products.
-
-    Parameters
-    ----------
-    costs, once : As from `estimates`.
-    unknowns : Number of displacement unknowns of all bodies, which each step goes over.
-
-    Returns
-    -------
-    The way, and when to take it. None where a dense Q is the cheapest, or where all others cost too
-    much to fall back on.
+    None where a dense Q is the cheapest, or where all others cost too much to fall back on.
     """
     taken = min(costs, key=lambda way: costs[way])
     surer = {"coupled": ("dense", "products"), "products": ("dense",), "dense": ()}[taken[0]]

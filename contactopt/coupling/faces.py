@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 import skfem
 
-from contactopt.bodies.elements import FACES
+from contactopt.bodies.elements import FACES, TIED
 
 # kind of the elements -> corners of a face, shape functions of the displacement by degree
 _SHAPES = {
@@ -24,8 +24,6 @@ _SHAPES = {
     "RefTet": (3, {1: skfem.ElementTriP1(), 2: skfem.ElementTriP2()}),
     "RefHex": (4, {1: skfem.ElementQuad1(), 2: skfem.ElementQuad2()}),
 }
-# of a triangle with nodes on its edges
-_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 STRAIGHT = 1e-9  # a node on an edge is at its middle within this fraction of the face
 NEWTON, STEPS = 1e-13, 30  # accuracy of a place on a face, in its own coordinates
 
@@ -218,7 +216,7 @@ def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
     nodes, and their linear cell (p,), over which they never reach where the side is `own`.
     """
     if surface.curved and surface.kind == "RefTet":
-        return _QUARTERS, np.zeros(4, dtype=int)
+        return TIED["RefTet"], np.zeros(4, dtype=int)
     if own or surface.curved:
         return surface.cells, np.arange(len(surface.cells))
     return np.arange(surface.corners)[None], np.zeros(1, dtype=int)

@@ -47,8 +47,8 @@ def couple_surfaces(
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
     # as well where a plane of symmetry of both cuts it.
-    own_held = mine.held[mine.unknowns[:, m.nodes]]
-    other_held = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
+    own_held = mine.held[:, m.nodes]
+    other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
     if carrier.mirror is not None:
         other_held |= carrier.mirror[:, m.nodes]
     number = np.full(carrier.points.shape[1], -1)
@@ -60,9 +60,8 @@ def couple_surfaces(
     _, frames, order = laid_out
     maps = []
     for i, mesh in enumerate(meshes):
-        unknowns = [_picked(row, len(mesh.held)) for row in mesh.unknowns]
         traces = [
-            sp.csr_matrix(sum(part @ picked for part, picked in zip(row, unknowns)))
+            sp.csr_matrix(sum(part @ picked for part, picked in zip(row, mesh.picked)))
             for row in m.components(i, own_held)
         ]
         maps.append(local_map(traces, order, frames))
@@ -83,12 +82,6 @@ def _mesh(surface: Surface) -> Mesh:
 
 def _faces(name: str, m: Mesh) -> Faces:
     return faces_of(name, m.kind, m.degree, m.faces, m.outward, m.measure, m.locations, m.curve)
-
-
-def _picked(unknowns: np.ndarray, n: int) -> sp.csr_matrix:
-    """The matrix (nodes, n) that picks one component of the displacement of the nodes."""
-    k = len(unknowns)
-    return sp.csr_matrix((np.ones(k), unknowns, np.arange(k + 1)), (k, n))
 
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
@@ -116,7 +109,7 @@ def _vertices(side: Faces, mesh: Mesh) -> ContactPoints:
     """All vertices of the linear cells of a surface, as candidates for contacts."""
     corners = side.cell_nodes()
     nodes, cells = np.unique(corners, return_inverse=True)
-    held, none = mesh.held[mesh.unknowns[:, nodes]], np.zeros(len(nodes))
+    held, none = mesh.held[:, nodes], np.zeros(len(nodes))
     normals = contact_normals(side)[0][:, nodes]
     cells = cells.reshape(corners.shape).T
     return ContactPoints(side.points[:, nodes], normals, none, cells, held, none)

@@ -1,20 +1,26 @@
-"""A scene with assembled bodies and coupled surfaces, before anything is factorised."""
+"""A scene with assembled bodies and coupled surfaces, before anything is factorised, and its
+interface problem once Q is known.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.protocol import Body
 from contactopt.checks import check_count, check_number
-from contactopt.coupling.coupling import Coupling, couple
+from contactopt.coupling.coupling import Coupling, couple, law_of
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
-from contactopt.coupling.problem_of_bodies import signed_map
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import each
-from contactopt.linear.operators import FORMS
+from contactopt.linear.operators import FORMS, Interface
+from contactopt.problem import InterfaceProblem, Pair
+from contactopt.problem.laws import join
 from contactopt.scenes.scene import MOST_ACROSS, Scene
 
 
@@ -43,11 +49,12 @@ def posed(
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     pairs = zip(scene.pairs, sides)
     couplings = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in pairs)
-    maps = tuple(signed_map(body, sides, couplings) for body in assembled)
+    maps = tuple(_signed_map(body, sides, couplings) for body in assembled)
     planes: tuple[SymmetryPlane, ...] = ()
     if scene.copies > 1:
         cutting = [plane for made in couplings for plane in made.planes]
-        planes = tuple(mirror_planes(scene, [body.guides() for body in assembled], cutting))
+        guides = [own for body in assembled if (own := body.guides()) is not None]
+        planes = tuple(mirror_planes(scene, guides, cutting))
     return Posed(assembled, couplings, maps, planes)
 
 
@@ -67,3 +74,46 @@ def _checked(
     if zone is not None:
         check_number("the contact zone's half-width", zone, low=0.0)
     return elements, zone
+
+
+def _signed_map(
+    body: AssembledBody,
+    sides: Sequence[tuple[AssembledBody, AssembledBody]],
+    couplings: Sequence[Coupling],
+) -> sp.csr_matrix:
+    """B (k dim, n) of a body: the maps of its pairs with their signs, else zeros."""
+    blocks = [
+        made.upper if body is upper else -made.lower if body is lower else None
+        for (upper, lower), made in zip(sides, couplings)
+    ]
+    n = next(block.shape[1] for block in blocks if block is not None)
+    none = [sp.csr_matrix((made.upper.shape[0], n)) for made in couplings]
+    return sp.csr_matrix(sp.vstack([b if a is None else a for a, b in zip(blocks, none)]))
+
+
+def problem_of(
+    scene: Scene,
+    Q: Interface,
+    bodies: Sequence[Body],
+    maps: Sequence[sp.csr_matrix],
+    couplings: Sequence[Coupling],
+) -> InterfaceProblem:
+    """The interface problem of a scene whose bodies and couplings are made and whose Q is known."""
+    gap = np.concatenate([made.gap for made in couplings])
+    q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
+    q[:, 0] = gap
+    for body, B in zip(bodies, maps):
+        q += (B @ body.at_rest).reshape(q.shape)
+    V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
+    s = np.concatenate([body.resultants for body in bodies])
+    areas = np.concatenate([made.areas for made in couplings])
+    points = np.concatenate([made.positions for made in couplings], axis=1)
+    ends = np.cumsum([0, *(len(made.gap) for made in couplings)]).tolist()
+    named = list(zip(scene.pairs, couplings, ends, ends[1:]))
+    pairs = tuple(Pair(pair.name, first, last, made.chart) for pair, made, first, last in named)
+    laws = [(law_of(pair, made), np.arange(first, last)) for pair, made, first, last in named]
+    law = laws[0][0] if len(laws) == 1 else join(laws)
+    chart = pairs[0].chart if len(pairs) == 1 else None
+    # what each multiplier is, for messages
+    names = tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motion_names)
+    return InterfaceProblem(Q, q, law, V, s, areas, points, chart, pairs, names)

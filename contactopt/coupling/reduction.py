@@ -36,8 +36,7 @@ from contactopt.coupling.compliance import compliance, filling, operator
 from contactopt.coupling.costs import FORM_OF, estimates, next_best
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
-from contactopt.coupling.posed import posed
-from contactopt.coupling.problem_of_bodies import problem_of
+from contactopt.coupling.posed import posed, problem_of
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
 from contactopt.linear.budget import fill
@@ -142,9 +141,7 @@ class Reduction:
         if solution in self._known:
             return self._known[solution]
         given = [] if solution.displacements is None else list(solution.displacements.parts)
-        free = [
-            given.pop(0) if given and body.equilibrium is not None else None for body in self.bodies
-        ]
+        free = [given.pop(0) if given and body.iterative else None for body in self.bodies]
         parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
 
         def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray, Any]) -> np.ndarray:

@@ -10,7 +10,8 @@ the unit of length.
 Sources: Yang, Laursen, Meng (2005), Two dimensional mortar contact methods for large deformation
 frictional sliding, Int. J. Numer. Meth. Engng 62, 1183-1225 (normal field); Puso, Laursen (2004), A
 mortar segment-to-segment contact method for large deformation solid mechanics, Comput. Methods
-Appl. Mech. Engrg 193, 601-629 (planes).
+Appl. Mech. Engrg 193, 601-629 (planes); Sutherland, Hodgman (1974), Reentrant polygon clipping,
+Commun. ACM 17, 32-42 (cut).
 """
 
 from __future__ import annotations
@@ -27,7 +28,6 @@ from skfem.refdom import RefLine, RefTri
 from contactopt.bodies.elements import weight_at
 from contactopt.coupling.faces import Faces, cross, face_normals, patches
 from contactopt.coupling.facing import Facets, facing_pairs
-from contactopt.coupling.polygons import areas, clip
 from contactopt.errors import InputError
 from contactopt.meshes.cells import area_vectors
 
@@ -270,18 +270,18 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     first, second = _facing(mine, theirs, np.zeros(len(mine.face)))
     axes = _axes(mine)
     frame = _in_plane(axes, mine.vertices - mine.centre[:, :, None])
-    area = areas(frame)
+    area = _areas(frame)
     frame = np.where((area < 0)[:, None, None], frame[:, ::-1], frame)  # counterclockwise
     size = np.sqrt(np.abs(area))
     subject = _in_plane(axes[first], theirs.vertices[:, second] - mine.centre[:, first, None])
     low, high = frame.min(axis=1)[first], frame.max(axis=1)[first]
     meets = np.all((subject.max(axis=1) > low) & (subject.min(axis=1) < high), axis=1)
     first, second = first[meets], second[meets]
-    polygon = clip(subject[meets], frame[first], size[first])
+    polygon = _clip(subject[meets], frame[first], size[first])
     # a fan of triangles around the first vertex
     hub = np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1)
     triangles = np.stack([hub, polygon[:, 1:-1], polygon[:, 2:]], 2)
-    content = np.abs(areas(triangles.reshape(-1, 3, 2))).reshape(triangles.shape[:2])
+    content = np.abs(_areas(triangles.reshape(-1, 3, 2))).reshape(triangles.shape[:2])
     full = np.bincount(mine.cell, np.abs(area), len(own.faces) * len(own.cells))
     part = content.sum(axis=1) / full[mine.cell[first]]
     middle = _in_space(mine, axes, first, polygon.mean(axis=1))
@@ -310,6 +310,42 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     stretch /= np.abs(np.linalg.det(np.einsum("gad,dcg->gac", E, tangents)))
     measure = content * stretch * weight_at(own.weight, place)
     return Overlap(cell, here, face, there, E, measure, window)
+
+
+def _areas(polygons: np.ndarray) -> np.ndarray:
+    """Signed areas (p,) of polygons (p, v, 2)."""
+    x, y = polygons[..., 0], polygons[..., 1]
+    return np.asarray(np.sum(x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1), axis=1) / 2)
+
+
+def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Parts (p, v', 2) of polygons (p, v, 2) in convex counterclockwise windows (p, w, 2) of `size`
+    (p,), padded by the last vertex; zero if empty.
+    """
+    count = np.full(len(polygon), polygon.shape[1])
+    for edge in range(window.shape[1]):
+        a, b = window[:, edge], window[:, (edge + 1) % window.shape[1]]
+        inward = np.stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]], axis=1)
+        inward /= np.linalg.norm(inward, axis=1)[:, None]
+        place = np.arange(polygon.shape[1])
+        used = place < count[:, None]
+        following = np.where(place == count[:, None] - 1, 0, np.minimum(place + 1, place[-1]))
+        inside = np.einsum("pva,pa->pv", polygon - a[:, None], inward)
+        inside = np.where(np.abs(inside) < 1e-13 * size[:, None], 0.0, inside)
+        then = np.take_along_axis(inside, following, 1)
+        ahead = np.take_along_axis(polygon, following[..., None], 1)
+        crossing = used & (inside * then < 0)
+        share = inside / np.where(crossing, inside - then, 1.0)
+        cut = polygon + share[..., None] * (ahead - polygon)
+        candidates = np.stack([polygon, cut], axis=2).reshape(len(polygon), -1, 2)
+        chosen = np.stack([used & (inside >= 0), crossing], axis=2).reshape(len(polygon), -1)
+        count = chosen.sum(axis=1)
+        order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(count.max(initial=0), 3)]
+        polygon = np.take_along_axis(candidates, order[..., None], 1)
+        last = np.take_along_axis(polygon, np.maximum(count - 1, 0)[:, None, None], 1)
+        polygon = np.where((np.arange(polygon.shape[1]) < count[:, None])[..., None], polygon, last)
+        polygon[count == 0] = 0.0
+    return polygon
 
 
 def _axes(mine: _Polygons) -> np.ndarray:

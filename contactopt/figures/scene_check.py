@@ -19,8 +19,7 @@ from contactopt.cards import count
 from contactopt.coupling.compliance import filling
 from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling
-from contactopt.coupling.posed import Posed, posed
-from contactopt.coupling.problem_of_bodies import problem_of
+from contactopt.coupling.posed import Posed, posed, problem_of
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem

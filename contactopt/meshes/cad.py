@@ -37,20 +37,13 @@ def mesh_part(
     names: Mapping[str, Sequence[str]] | None = None,
     order: int = 2,
 ) -> None:
-    """Mesh a part and write a file of Gmsh, lengths in millimetres unless the part has no unit.
+    """Mesh a part, a file that ends in one of ENDINGS, and write a file of Gmsh, lengths in
+    millimetres unless the part has no unit.
 
-    Parameters
-    ----------
-    path : file of the part, which ends in one of ENDINGS
-    out : file to write, ends in .msh
-    size : of the elements [length]; None: what gives SHARE of them along the smallest body
-    fine : boundary -> size of the elements on it
-    names : new name -> boundaries that are called by it
-    order : 1, straight elements, or 2, curved ones
-
-    Returns
-    -------
-    None. InputError without Gmsh, for a file that it cannot read, and for an unknown boundary.
+    Elements have a size, else what gives SHARE of them along the smallest body; `fine` is boundary
+    -> size on it [length]. `names` is new name -> boundaries that are called by it, and order 1
+    makes straight elements, 2 curved ones. InputError without Gmsh, for a file that it cannot read
+    or mesh, and for an unknown boundary.
     """
     for what, value in [("the size of elements", size), *(fine or {}).items()]:
         if value is not None:

@@ -62,9 +62,7 @@ def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
 
 def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
     """List the elements of a mesh of first or second order: their name, a value of CELLS, and their
-    nodes (e, v) in the order of VTK.
-
-    scikit-fem sorts the corners of simplices; here they are numbered so that volumes are positive.
+    nodes (e, v) in the order of VTK, numbered so that volumes are positive.
     """
     from skfem.io.meshio import HEX_MAPPING
 
@@ -72,10 +70,11 @@ def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
     names = CELLS[mesh.refdom.__name__]
     if names[0] == "hexahedron":
         nodes = nodes[HEX_MAPPING[: len(nodes)]]
-    elif names[0] != "quad":
-        sides = mesh.p[:, nodes[1 : len(mesh.p) + 1]] - mesh.p[:, nodes[:1]]
-        turned = np.linalg.det(sides.transpose(2, 1, 0)) < 0
-        nodes[:, turned] = mirrored(names[0], nodes[:, turned])
+    # the edges that meet at the first corner span a positive volume
+    ends = {"triangle": [1, 2], "quad": [1, 3], "tetra": [1, 2, 3], "hexahedron": [1, 3, 4]}
+    sides = mesh.p[:, nodes[ends[names[0]]]] - mesh.p[:, nodes[:1]]
+    turned = np.linalg.det(sides.transpose(2, 1, 0)) < 0
+    nodes[:, turned] = mirrored(names[0], nodes[:, turned])
     return names[is_curved(mesh)], nodes.T
 
 

@@ -44,16 +44,16 @@ DIGITS = range(6, 13)  # decimal digits that files write
 STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and its curve
 
 
-def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
+def plane_curves(mesh: Any) -> dict[str, Curve | None]:
     """By the name of each boundary of a plane mesh, '' for what has none, its curve, or None where
-    it is straight. With `arcs`, only arcs count as curved where the mesh is a polygon.
+    it is straight.
     """
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
     ends = np.zeros((2, edges.shape[1]))
     near = rounding(points[:, np.unique(edges)])
     for chain, numbers, forward in _chains(edges):
-        bends = _bends(points[:, chain], near, arcs and not known)
+        bends = _bends(points[:, chain], near)
         ends[:, numbers] = np.where(forward, bends, -bends[::-1])
     found: dict[str, Curve | None] = {}
     for name, label, mine in shares(mesh, owner):
@@ -130,7 +130,7 @@ def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]
     return chains
 
 
-def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
+def _bends(x: np.ndarray, near: float) -> np.ndarray:
     """Curvatures (2, n), positive to the left, at the ends of the edges of a chain (2, n + 1)."""
     closed = x.shape[1] > 3 and np.array_equal(x[:, 0], x[:, -1])
     turn, length = _turns(x, closed)
@@ -141,14 +141,14 @@ def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
         first = int(np.argmax(jump))
         if first:
             order = np.roll(np.arange(len(length)), -first)
-            bends = _bends(x[:, np.append(order, first)], near, arcs)
+            bends = _bends(x[:, np.append(order, first)], near)
             return np.asarray(np.roll(bends, first, axis=1))
     runs = np.full(len(length), np.nan)  # the curvature of the run that an edge belongs to
     cuts = np.unique([0, *np.flatnonzero(corner), len(length)])
     for first, last in pairwise(cuts.tolist()):
         for start, end, bend in _runs(x[:, first : last + 1], near):
             runs[first + start : first + end] = bend
-    return _ends(turn, length, corner, runs, closed, arcs)
+    return _ends(turn, length, corner, runs)
 
 
 def _turns(x: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -272,19 +272,10 @@ def fitted_sphere(places: np.ndarray) -> tuple[np.ndarray, float]:
     return middle + size * np.array(centre)[:, None], float(size * radius)
 
 
-def _ends(
-    turn: np.ndarray,
-    length: np.ndarray,
-    corner: np.ndarray,
-    runs: np.ndarray,
-    closed: bool,
-    arcs: bool,
-) -> np.ndarray:
+def _ends(turn: np.ndarray, length: np.ndarray, corner: np.ndarray, runs: np.ndarray) -> np.ndarray:
     """Curvatures (2, n) at both ends of edges, of their runs or of circles through three nodes."""
     n = len(length)
     free = np.isnan(runs)
-    if arcs:
-        return np.tile(np.where(free, 0.0, runs), (2, 1))
     edge = np.arange(n)
     found = np.empty((2, n))
     for side, node, beside in ((0, edge, edge - 1), (1, edge + 1, (edge + 1) % n)):

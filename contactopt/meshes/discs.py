@@ -9,18 +9,12 @@ from skfem import MeshHex
 
 
 def half_disc(radii: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray]:
-    """Make nodes and quadrilaterals of the half disc y >= 0. The innermost rings of nodes are
-    squares; those from number 2 sectors on are circles, with a gradual change between.
+    """Nodes (2, n) [length] and quadrilaterals (4, m) of the half disc y >= 0, with rings of nodes
+    at the ascending radii from 0 up and as many elements as `sectors` along an eighth of the
+    circle.
 
-    Parameters
-    ----------
-    radii : Radii of the rings of nodes, from 0 up [length]; at least 2 sectors + 1, the first so
-        many evenly spaced.
-    sectors : Number of elements along an eighth of the circle.
-
-    Returns
-    -------
-    The nodes (2, n) [length], and the numbers (4, m) of the nodes of each quadrilateral.
+    The innermost rings are squares; those from number 2 sectors on are circles, with a gradual
+    change between. The first 2 sectors + 1 radii are evenly spaced.
     """
     i, j = (np.indices((2 * sectors + 1, sectors + 1)) - [[[sectors]], [[0]]]).reshape(2, -1)
     ring = np.maximum(np.abs(i), j)

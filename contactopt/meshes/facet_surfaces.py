@@ -39,12 +39,11 @@ PREFER = 1e-6  # by how much less a curved triangle may be near than a flat one
 Shape = Callable[[np.ndarray], np.ndarray]
 
 
-def space_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
+def space_curves(mesh: Any) -> dict[str, Curve | None]:
     """By the name of each boundary of a solid's mesh, '' for what has none, its surface, or None
-    where it is flat. With `arcs`, only spheres and cylinders count as curved where the edges of the
-    mesh are straight.
+    where it is flat.
     """
-    skin, found = _Skin(mesh, arcs), dict[str, Curve | None]()
+    skin, found = _Skin(mesh), dict[str, Curve | None]()
     for name, label, mine in shares(mesh, skin.owner):
         found[name] = None
         if np.any(skin.region[mine] >= 0):
@@ -65,7 +64,7 @@ class _Skin:
     near     how far nodes may be off by rounding [length]
     """
 
-    def __init__(self, mesh: Any, arcs: bool) -> None:
+    def __init__(self, mesh: Any) -> None:
         self.nodes, self.owner, middles = _triangles(mesh)
         self.corners = mesh.p[:, self.nodes]
         self.middles = middles
@@ -88,9 +87,7 @@ class _Skin:
         self.region[~flat] = np.unique(self.region[~flat], return_inverse=True)[1]
         self.shapes = [self._shape(region) for region in range(self.region.max(initial=-1) + 1)]
         free = np.array([shape is None for shape in self.shapes] + [False])[self.region]
-        if not self.known and arcs:
-            self.region[free] = -1
-        elif not self.known:
+        if not self.known:
             self._guess(free, flat)
 
     def _flat(self, pairs: np.ndarray, sides: np.ndarray, smooth: np.ndarray) -> np.ndarray:

@@ -134,15 +134,14 @@ def _read(path: Path) -> Any:
             " (Abaqus, CalculiX), ..."
         )
     said = ""
-    for name, reader in _readers(path, formats, size):
+    for reader in _readers(path, formats, size):
         printed = io.StringIO()
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
                 return reader()
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
-            if name:
-                said = said or " ".join(text.split())[:200] or type(error).__name__
+            said = said or " ".join(text.split())[:200] or type(error).__name__
     advice = "; save Gmsh files as text in version 4.1 or 2.2" if "gmsh" in formats else ""
     raise InputError(
         f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of"
@@ -150,31 +149,29 @@ def _read(path: Path) -> Any:
     )
 
 
-def _readers(path: Path, formats: list[str], size: int) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Format and reader of each attempt. Of one without a format no failure is told."""
+def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[], Any]]:
+    """The reader of each attempt."""
     import meshio
 
     stated, binary = version(path) if "gmsh" in formats else (None, False)
-    if stated is not None and stated.partition(".")[0] not in ("2", "4"):
+    if stated is not None and stated != "4.1" and stated.partition(".")[0] != "2":
         raise InputError(
             f"mesh file '{path}' is of version {stated} of"
             " Gmsh's format; save it in version 4.1 or 2.2."
         )
-    if binary:  # meshio trusts the counts of damaged files
-        older = str(stated)[0] == "2"
-        reader = partial(_read_apart, path, "gmsh", size)
-        yield "gmsh", reader if older else partial(read_msh4, path, stated != "4.0")
+    if stated == "4.1":
+        yield partial(read_msh4, path)
         return
-    for newer in (False, True):  # "4" stands for either
-        if stated in (("4", "4.1") if newer else ("4", "4.0")):
-            yield "", partial(read_msh4, path, newer)
+    if binary:  # meshio trusts the counts of damaged files
+        yield partial(_read_apart, path, "gmsh", size)
+        return
     for name in sorted(formats, key=lambda name: name not in SAFE):
         if name in OWN:
-            yield name, partial(OWN[name], path)
+            yield partial(OWN[name], path)
         elif name in SAFE:
-            yield name, partial(meshio.read, path, file_format=name)
+            yield partial(meshio.read, path, file_format=name)
         else:
-            yield name, partial(_read_apart, path, name, size)
+            yield partial(_read_apart, path, name, size)
 
 
 def _read_apart(path: Path, name: str, size: int) -> Any:

@@ -42,26 +42,20 @@ class TooSmall(InputError):
     """All marked elements are so small that their halves would have no volume for rounding."""
 
 
-def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
+def boundary_curves(mesh: Any) -> dict[str, Curve | None]:
     """Find the line or surface that each boundary of a mesh stands for, by its name, '' for what
-    has none; None where it is flat. With `arcs`, only arcs, spheres and cylinders count as curved,
-    if the mesh has straight edges.
+    has none; None where it is flat.
     """
-    return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
+    return plane_curves(mesh) if len(mesh.p) == 2 else space_curves(mesh)
 
 
 def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
-    """Divide the marked elements of a mesh, and others as far as it takes to stay conforming.
+    """Divide the marked elements (by number) of a mesh of straight triangles or tetrahedra, and
+    others as far as it takes to stay conforming; named boundaries stay.
 
-    Elements that are as small as rounding allows stay whole; TooSmall if all marked ones are. A new
-    node stays on its edge where it would turn an element inside out on the curve.
-
-    Parameters
-    ----------
-    mesh : A mesh of straight triangles or tetrahedra, with named boundaries, which are kept.
-    marked : Numbers of the elements to divide.
-    curves : For the names of curved boundaries, and '' for what has no name, a function (dim, k) ->
-        (dim, k) that puts new nodes on the true surface.
+    `curves` puts new nodes on the true surface. Elements that are as small as rounding allows stay
+    whole; TooSmall if all marked ones are. A new node stays on its edge where it would turn an
+    element inside out on the curve.
     """
     marked = np.asarray(marked)
     corners = mesh.p[:, mesh.t[:, marked]]

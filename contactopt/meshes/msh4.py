@@ -1,12 +1,12 @@
-"""Gmsh's file formats 4.0 and 4.1.
+"""Gmsh's file format 4.1.
 
-meshio takes 4.0 for 4.1, and reads neither where some elements belong to no group, as in files
-that Gmsh writes with the option Mesh.SaveAll. From damaged binary files it takes counts as they are
-and asks for memory without bound; here no count reaches beyond its section. A file holds sections
+meshio does not read it where some elements belong to no group, as in files that Gmsh writes with
+the option Mesh.SaveAll. From damaged binary files it takes counts as they are and asks for memory
+without bound; here no count reaches beyond its section. A file holds sections
 `$Name ... $EndName`. Entities (points, curves, surfaces, volumes) list the physical groups that
 they belong to; nodes and elements come entity by entity.
 
-Source: Gmsh reference manual, versions 4.0 and 4.15, chapter "MSH file format".
+Source: Gmsh reference manual, version 4.15, chapter "MSH file format".
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy as np
 
 
 def version(path: Path) -> tuple[str | None, bool]:
-    """The version that a file states, such as '4.1', where '4' stands for 4.0 or 4.1, or None if it
-    is no file of Gmsh; and whether it is binary.
+    """The version that a file states, such as '4.1', or None if it is no file of Gmsh; and whether
+    it is binary.
     """
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
@@ -31,24 +31,24 @@ def version(path: Path) -> tuple[str | None, bool]:
     return None, False
 
 
-def read_msh4(path: Path, newer: bool) -> Any:
-    """The mesh of a file of version 4.0, or of 4.1 if `newer`, with the physical groups as sets of
-    elements by name. ValueError or KeyError where the file ends early or breaks the format.
+def read_msh4(path: Path) -> Any:
+    """The mesh of a file with the physical groups as sets of elements by name. ValueError or
+    KeyError where the file ends early or breaks the format.
     """
     sections = _sections(path)
     names = _names(sections)
-    groups = _groups(sections.get("Entities"), names, newer)
-    tags, points = _nodes(sections["Nodes"], newer)
+    groups = _groups(sections.get("Entities"), names)
+    tags, points = _nodes(sections["Nodes"])
     reader = sections["Elements"]
     blocks: list[tuple[int, np.ndarray]] = []
     members: list[list[str]] = []
-    for _ in range(reader.head(newer)):
-        first, second, kind = reader.take(3).tolist()
+    for _ in range(reader.head()):
+        dim, entity, kind = reader.take(3).tolist()
         count = reader.count()
         width = 1 + _nodes_of(kind)
-        rows = reader.take(count * width, "u8" if newer else "i4").reshape(count, width)
+        rows = reader.take(count * width, "u8").reshape(count, width)
         blocks.append((kind, rows[:, 1:]))
-        members.append(groups.get((first, second) if newer else (second, first), []))
+        members.append(groups.get((dim, entity), []))
     sets = {}
     for group in sorted({group for own in members for group in own}):
         sizes = (len(nodes) if group in own else 0 for (_, nodes), own in zip(blocks, members))
@@ -97,14 +97,9 @@ class _Numbers:
     def count(self) -> int:
         return int(self.take(1, "u8")[0])
 
-    def records(self, count: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-        """Of each of `count` records its integer and its `width` numbers."""
-        rows = self.take(count * (1 + width), "f8").reshape(count, 1 + width)
-        return rows[:, 0].astype(np.int64), rows[:, 1:]
-
-    def head(self, newer: bool) -> int:
+    def head(self) -> int:
         """The number of entities of a section; their total and range of tags are passed over."""
-        return int(self.take(4 if newer else 2, "u8")[0])
+        return int(self.take(4, "u8")[0])
 
 
 class _Bytes(_Numbers):
@@ -113,20 +108,13 @@ class _Bytes(_Numbers):
     def __init__(self, data: bytes, order: str) -> None:
         self.data, self.order, self.place = data, order, 0
 
-    def _read(self, count: int, dtype: np.dtype) -> np.ndarray:
+    def take(self, count: int, kind: str = "i4") -> np.ndarray:
+        dtype = np.dtype(self.order + kind)
         first, self.place = self.place, self.place + count * dtype.itemsize
         if count < 0 or self.place > len(self.data):
             raise ValueError("a section ends early")
-        return np.frombuffer(self.data, dtype, count, first)
-
-    def take(self, count: int, kind: str = "i4") -> np.ndarray:
-        values = self._read(count, np.dtype(self.order + kind))
+        values = np.frombuffer(self.data, dtype, count, first)
         return values.astype(float if kind == "f8" else np.int64)
-
-    def records(self, count: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-        dtype = np.dtype([("tag", self.order + "i4"), ("x", self.order + "f8", (width,))])
-        rows = self._read(count, dtype)
-        return rows["tag"].astype(np.int64), rows["x"].astype(float)
 
 
 def _sections(path: Path) -> dict[str, Any]:
@@ -158,14 +146,14 @@ def _names(sections: dict[str, Any]) -> dict[tuple[int, int], str]:
     return {(int(dim), int(tag)): name for dim, tag, name in rows}
 
 
-def _groups(reader: Any, names: dict, newer: bool) -> dict[tuple[int, int], list[str]]:
+def _groups(reader: Any, names: dict) -> dict[tuple[int, int], list[str]]:
     """(dimension, entity) -> names of its physical groups, or numbers of those without a name."""
     found = {}
     if reader is not None:
         for dim, count in enumerate(reader.take(4, "u8").tolist()):
             for _ in range(count):
                 entity = int(reader.take(1)[0])
-                reader.take(3 if newer and dim == 0 else 6, "f8")  # its place, or the box around it
+                reader.take(6 if dim else 3, "f8")  # its place, or the box around it
                 tags = np.abs(reader.take(reader.count()))
                 found[dim, entity] = [names.get((dim, int(tag)), str(tag)) for tag in tags]
                 if dim:
@@ -173,18 +161,13 @@ def _groups(reader: Any, names: dict, newer: bool) -> dict[tuple[int, int], list
     return found
 
 
-def _nodes(reader: Any, newer: bool) -> tuple[np.ndarray, np.ndarray]:
+def _nodes(reader: Any) -> tuple[np.ndarray, np.ndarray]:
     """Tags of the nodes (n,) and their places (n, 3)."""
     tags, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
-    for _ in range(reader.head(newer)):
-        first, second, parametric = reader.take(3).tolist()
-        width = 3 + ((first if newer else second) if parametric else 0)  # parameters on the entity
+    for _ in range(reader.head()):
+        dim, _, parametric = reader.take(3).tolist()
+        width = 3 + (dim if parametric else 0)  # parameters on the entity
         count = reader.count()
-        if newer:
-            own = reader.take(count, "u8")
-            rows = reader.take(count * width, "f8").reshape(count, width)
-        else:
-            own, rows = reader.records(count, width)
-        tags.append(own)
-        points.append(rows[:, :3])
+        tags.append(reader.take(count, "u8"))
+        points.append(reader.take(count * width, "f8").reshape(count, width)[:, :3])
     return np.concatenate(tags), np.concatenate(points)

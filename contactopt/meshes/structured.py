@@ -20,20 +20,11 @@ FINEST = 1e-8
 
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
-    """A grid whose spacing grows from one end to the other.
+    """A grid (n,) from 0 to a length whose cells grow from the first one on, neighbours by at most
+    the ratio `growth` [length].
 
-    The number of cells is the smallest that keeps the ratio of neighbours below its bound. The
-    ratio is then lowered so that the first cell is exactly as long as asked.
-
-    Parameters
-    ----------
-    length : Of the whole grid [length].
-    first : Length of the first cell [length].
-    growth : Largest ratio of neighbouring cells.
-
-    Returns
-    -------
-    array (n,) : Ascending from 0 to `length`.
+    The number of cells is the smallest that keeps the ratio below its bound. The ratio is then
+    lowered so that the first cell is exactly as long as asked.
     """
     if first >= length:
         return np.array([0.0, length])
@@ -51,18 +42,8 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
 
 
 def contact_grid(half_width: float, elements: int, length: float, growth: float) -> np.ndarray:
-    """A grid that is uniform in the contact zone and graded away from it.
-
-    Parameters
-    ----------
-    half_width : Of the zone [length].
-    elements : Number of cells in the zone.
-    length : Of the whole grid [length].
-    growth : Largest ratio of neighbouring cells beyond the zone.
-
-    Returns
-    -------
-    array (n,) : Ascending from 0 to `length`.
+    """A grid (n,) from 0 to a length: `elements` even cells in the zone up to half_width, beyond it
+    cells that grow by at most the ratio `growth` [length].
     """
     zone = np.linspace(0.0, half_width, elements + 1)
     if length <= half_width * (1 + 1e-12):
@@ -72,20 +53,12 @@ def contact_grid(half_width: float, elements: int, length: float, growth: float)
 
 
 def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
-    """Quadrilaterals or hexahedra on a tensor grid.
+    """Quadrilaterals or hexahedra on the tensor grid of two or three ascending arrays, the places
+    of the nodes along x, y and z [length]; the sides of the box are boundaries 'x-', 'x+', 'y-',
+    'y+', 'z-' and 'z+'.
 
-    Parameters
-    ----------
-    grids : Two or three ascending arrays, the places of the nodes along x, y and z [length].
-
-    Returns
-    -------
-    Its boundaries 'x-', 'x+', 'y-', 'y+' and in space 'z-', 'z+' are the sides of the box.
-
-    Raises
-    ------
-    InputError : If the mesh would have more than MOST_CELLS cells or need more memory than is free,
-        and if a cell would be shorter than FINEST of its grid.
+    InputError for more than MOST_CELLS cells, more memory than is free, or cells shorter than
+    FINEST of their grid.
     """
     cells = float(np.prod([float(len(grid) - 1) for grid in grids]))
     if cells > MOST_CELLS:
@@ -115,33 +88,20 @@ def _across(axis: int, value: float, near: float, x: np.ndarray) -> np.ndarray:
 
 
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
-    """The mesh with further names for some of its boundaries, as in rename(mesh, contact="y-").
-
-    Parameters
-    ----------
-    mesh, names : Any mesh with named boundaries, and new name = old name.
-
-    Returns
-    -------
-    With both names.
+    """The mesh with further names for some of its boundaries, new="old": rename(mesh,
+    contact="y-").
     """
     return mesh.with_boundaries({new: mesh.boundaries[old] for new, old in names.items()})
 
 
 def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad:
     """Meridian section of a half sphere that touches z = 0 at the origin: a quarter disc, whose
-    fourth corner is the middle of the arc.
+    fourth corner is the middle of the arc, with the boundaries 'axis', 'arc' and 'top', the flat
+    face at z = radius.
 
-    Parameters
-    ----------
-    radius : Of the sphere [length].
-    x : (n,) distances from the axis of the nodes on the lower part of the arc, from 0 to radius /
-        sqrt(2), its middle [length].
-    y : (m,) fractions from 0 to 1 of the way from the arc up, graded from the contact.
-
-    Returns
-    -------
-    With the boundaries 'axis', 'arc' and 'top', the flat face at z = radius.
+    x (n,) are the distances from the axis of the nodes on the lower part of the arc, from 0 to
+    radius / sqrt(2), its middle [length]; y (m,) fractions from 0 to 1 of the way from the arc up,
+    graded from the contact.
     """
     mesh = tensor_mesh(x / x[-1], y)
     s, t = mesh.p
@@ -171,17 +131,8 @@ def _arc(radius: float, angle: np.ndarray) -> np.ndarray:
 def patch(
     mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float]
 ) -> MeshQuad | MeshHex:
-    """The mesh with a part of one of its boundaries as a boundary of its own.
-
-    Parameters
-    ----------
-    mesh, boundary, name : A mesh, and the names of the whole and of the part.
-    limits : Facets whose midpoints are below limits[i] along each axis i belong to the part
-        [length].
-
-    Returns
-    -------
-    With the new boundary.
+    """The mesh with a part of one of its boundaries as a boundary of its own, `name`: the facets
+    whose midpoints are below limits[i] along each axis i [length].
     """
     facets = np.asarray(mesh.boundaries[boundary])
     middle = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
@@ -190,19 +141,11 @@ def patch(
 
 
 def simplices(mesh: Mesh, alike: bool = True) -> MeshTri | MeshTet:
-    """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra.
+    """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra, with
+    straight edges and the same boundaries; triangles and tetrahedra stay whole.
 
-    Edges become straight. All cells are cut in the same way, so that bodies match whose meshes had
-    the same cells on their contact faces.
-
-    Parameters
-    ----------
-    mesh : Of any elements; triangles and tetrahedra stay whole.
-    alike : Whether neighbours have to be cut alike; otherwise they may meet at crossed diagonals.
-
-    Returns
-    -------
-    Boundaries keep their names. InputError if neighbours have to be cut alike and are not.
+    All cells are cut in the same way, so that bodies match whose meshes had the same cells on their
+    contact faces. InputError where `alike` asks for that and neighbours meet at crossed diagonals.
     """
     mesh = straight(mesh)
     if isinstance(mesh, MeshTri | MeshTet):

@@ -71,28 +71,7 @@ PATHS: dict[str, tuple[Any, ...]] = {
 }
 _MODULES = {entry[1]: entry[0] for entry in (*SCENES.values(), *PATHS.values())}
 
-__all__ = [
-    "PATHS",
-    "SCENES",
-    "arch",
-    "cattaneo",
-    "cattaneo_half_space",
-    "cylinder",
-    "flat_punch",
-    "growing_indentation",
-    "hertz_half_space",
-    "indentation",
-    "make_path",
-    "make_scene",
-    "pin_in_bush",
-    "press_fit",
-    "rigid_punch",
-    "rough",
-    "rough_sliding",
-    "shear_cycle",
-    "sphere",
-    "stack",
-]
+__all__ = ["PATHS", "SCENES", "make_path", "make_scene", *sorted(_MODULES)]
 
 
 def __getattr__(name: str) -> Any:

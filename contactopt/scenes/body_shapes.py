@@ -93,25 +93,24 @@ def grid_of(table: Table, key: str, what: str) -> tuple[float, float]:
     return low, high
 
 
-def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
-    counts = table.numbers("elements", len(names), f"the numbers of elements [{', '.join(names)}]")
-    if (
-        not all(isinstance(count, int) and count >= 1 for count in counts)
-        or np.prod(counts, dtype=float) > MOST_ELEMENTS
-    ):
+def counts_of(
+    table: Table, key: str, names: tuple[str, ...], least: int = 1, most: int = MOST_ELEMENTS
+) -> tuple[int, ...]:
+    """Whole numbers, one for each name, which must be there."""
+    counts = table.numbers(key, len(names), f"the numbers of {key} [{', '.join(names)}]")
+    whole = all(isinstance(count, int) and count >= least for count in counts)
+    if not whole or np.prod(counts, dtype=float) > most:
         raise table.fail(
-            "'elements' must be whole numbers of at least"
-            f" 1, at most {MOST_ELEMENTS} elements in all.",
-            "elements",
+            f"{key!r} must be whole numbers of at least {least}, at most {most} {key} in all.", key
         )
-    return [int(count) for count in counts]
+    return tuple(int(count) for count in counts)
 
 
 def _block(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.meshes.structured import tensor_mesh
 
     sides = [grid_of(table, c, f"two coordinates, [least {c}, largest {c}]") for c in components]
-    counts = _counts(table, tuple(f"along {c}" for c in components))
+    counts = counts_of(table, "elements", tuple(f"along {c}" for c in components))
     mesh = tensor_mesh(*(np.linspace(*side, count + 1) for side, count in zip(sides, counts)))
     own = {f"{new}{sign}": f"{old}{sign}" for new, old in zip(components, "xyz") for sign in "-+"}
     boundaries = {new: mesh.boundaries[old] for new, old in own.items()}
@@ -129,7 +128,7 @@ def _ring(table: Table, components: tuple[str, ...]) -> Any:
         raise table.fail(
             "the inner radius must be positive, and the angles at most 360 degrees apart."
         )
-    across, around = _counts(table, ("across", "around"))
+    across, around = counts_of(table, "elements", ("across", "around"))
     if last - first == 360 and around < 3:
         raise table.fail("a whole ring needs at least 3 elements around.", "elements")
     return ring(np.linspace(*radii, across + 1), np.radians(np.linspace(first, last, around + 1)))
@@ -140,7 +139,7 @@ def _disc(table: Table, components: tuple[str, ...]) -> Any:
 
     radius = table.take("radius", float, needed=True, low=0.0)
     if isinstance(table.data.get("elements"), list):
-        (around,) = _counts(table, ("around",))
+        (around,) = counts_of(table, "elements", ("around",))
     else:
         around = table.take("elements", int, needed=True)
     if around < 8 or around % 8 or around > 10_000:

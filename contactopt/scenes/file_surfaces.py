@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.files.toml_table import Table
-from contactopt.scenes.body_shapes import grid_of, scale_of
+from contactopt.scenes.body_shapes import counts_of, grid_of, scale_of
 from contactopt.scenes.expressions import Expression
 from contactopt.scenes.rough_surfaces import self_affine
 
@@ -33,7 +33,8 @@ def half_space_shape(
     ]
     counts: tuple[int, ...] | None = None
     if table.has("points", list):
-        counts = _counts(table, axes)
+        along = tuple(f"along {axis}" for axis in axes)
+        counts = counts_of(table, "points", along, least=4, most=MOST_POINTS)
     height: Any = None
     if isinstance(table.data.get("height"), dict):
         surface = table.table("height")
@@ -59,18 +60,6 @@ def half_space_shape(
 def _centres(side: tuple[float, float], count: int) -> np.ndarray:
     low, high = side
     return low + (np.arange(count) + 0.5) * ((high - low) / count)
-
-
-def _counts(table: Table, axes: tuple[str, ...]) -> tuple[int, ...]:
-    what = (
-        f"the numbers of points along {' and '.join(axes)}, as in [{', '.join('64' for _ in axes)}]"
-    )
-    counts = table.numbers("points", len(axes), what)
-    if not all(isinstance(n, int) and n >= 4 for n in counts) or np.prod(counts) > MOST_POINTS:
-        raise table.fail(
-            f"'points' must be whole numbers of at least 4, at most {MOST_POINTS} in all.", "points"
-        )
-    return tuple(int(count) for count in counts)
 
 
 def _generated(
@@ -157,19 +146,14 @@ def _between(
     counts: tuple[int, ...],
 ) -> np.ndarray:
     """Heights at the points of the grid, linear between measured places (n, dim), height."""
-    from scipy.interpolate import LinearNDInterpolator
+    from scipy.interpolate import griddata
 
     ticks = [_centres(side, count) for side, count in zip(sides, counts)]
-    if len(sides) == 1:
-        order = np.argsort(values[:, 0])
-        x, z = values[order].T
-        made = np.interp(ticks[0], x, z, left=np.nan, right=np.nan)
-    else:
-        try:
-            linear = LinearNDInterpolator(values[:, :2], values[:, 2])
-        except (ValueError, RuntimeError) as error:
-            raise table.fail("the measured places lie on one line.", "file") from error
-        made = linear(*np.meshgrid(*ticks, indexing="ij"))
+    try:
+        grid = tuple(np.meshgrid(*ticks, indexing="ij"))
+        made = griddata(values[:, :-1], values[:, -1], grid)
+    except (ValueError, RuntimeError) as error:
+        raise table.fail("the measured places lie on one line.", "file") from error
     if np.any(np.isnan(made)):
         ranges = [f"{low:g} to {high:g}" for low, high in zip(values.min(0), values.max(0))]
         raise table.fail(

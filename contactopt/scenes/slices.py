@@ -18,24 +18,14 @@ PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
 def sliced(scene: Scene, name: str, count: int, axis: int = -1) -> Scene:
-    """The scene with one elastic body cut into slices of about as many elements, across a
-    coordinate axis.
+    """The scene with one elastic body, by its name, cut across a coordinate axis into `count`
+    slices of about as many elements.
 
     Neighbouring slices are bodies of their own, tied by a pair of surfaces with the law 'tied' and
     matching nodes. The answer is that of the whole body. The slices are called 'name-1', 'name-2',
-    ... along the axis.
-
-    Parameters
-    ----------
-    scene, name : a scene, and the name of the body. Its mesh must have layers of elements across
-        the axis, as structured meshes have
-    count : number of slices
-    axis : number of the coordinate, from 0; -1 is the last one. Every surface of the body that
-        contacts or plates use must lie in one slice
-
-    Raises
-    ------
-    InputError : for a body that is not there, not elastic, or cannot be cut like this
+    ... along the axis; axis -1 is the last one. The mesh must have layers of elements across the
+    axis, as structured meshes have, and every surface that contacts or plates use must lie in one
+    slice. InputError for a body that cannot be cut like this.
     """
     check_count("the number of slices", count)
     found: list[Any] = [part for part in scene.parts if part.name == name and part.meshed]

@@ -19,22 +19,10 @@ def solve_states(
     start: Solved | None = None,
 ) -> Solved:
     """Solve a scene on meshes fitted to its contact zone, or follow the load path of several states
-    on one mesh.
+    on one mesh; the last state then comes with the whole path.
 
-    Parameters
-    ----------
-    states : The scene, or the states of its load path.
-    elements : Across the contact half-width; the scene's own number by default.
-    options : How each state is solved.
-    start : The scene solved on another mesh, to start from; a path starts from the unloaded bodies.
-
-    Returns
-    -------
-    The scene, or the last state of the path with the whole path.
-
-    Raises
-    ------
-    InputError : As solve_zone() and follow().
+    `start` is the scene solved on another mesh; a path starts from the unloaded bodies. InputError
+    as from solve_zone() and follow().
     """
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)

@@ -99,16 +99,8 @@ def follow_path(
 def state_of(
     solved: Solved, before: State | None = None, last: Forces | None = None
 ) -> tuple[State, Forces]:
-    """Find what is kept of a state, given the one before it.
-
-    Parameters
-    ----------
-    solved : The state, reduced and solved.
-    before, last : What this function returned for the state before; none for the first one.
-
-    Returns
-    -------
-    The state, and for each body its displacements U and the external forces F on it.
+    """What is kept of a state, and for each body its displacements U and the external forces F on
+    it, given what this function returned for the state before; nothing for the first one.
     """
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions

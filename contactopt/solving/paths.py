@@ -154,8 +154,15 @@ class PathResult:
         return history
 
     def fields(self, step: int) -> tuple[Fields, ...]:
-        """Displacement and stress of the elastic bodies at a state; empty where the state keeps no
-        displacements.
+        """Compute displacement and stress of the elastic bodies at a state.
+
+        Parameters
+        ----------
+        step : The number of the state, from 0 on.
+
+        Returns
+        -------
+        Those of each elastic body; none where the state keeps no displacements.
         """
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
         return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)

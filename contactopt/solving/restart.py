@@ -222,19 +222,11 @@ def make_restart(
     path: bool,
     note: Callable[[str], None],
 ) -> Restart:
-    """Make what keeps the states of a run in its folder, with those that it goes on or starts from.
+    """What keeps the states of a run in its folder `out` (None: nowhere), with those of the run in
+    it that it resumes, or of the run in the folder `start`; `path` says whether the run has a load
+    path.
 
-    Parameters
-    ----------
-    out : the folder of the run; None: nothing is kept
-    resume, start : whether to go on with the run in this folder, or the folder of the run to start
-        from
-    path : whether the run has a load path
-    note : receives a sentence where there is nothing to resume
-
-    Returns
-    -------
-    Restart : for contactopt.solving.solve_scene.Options
+    The note is told where there is nothing to resume.
     """
     file = None if out is None else Path(out) / FILE
     if not resume:

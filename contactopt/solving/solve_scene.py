@@ -106,18 +106,13 @@ def solve_scene(
     start: Solved | None = None,
     once: bool = True,
 ) -> Solved:
-    """Reduce a scene on one mesh and solve it. The solution says itself whether it is certified.
+    """Reduce a scene on one mesh and solve it, by default with its own number of elements across
+    the contact half-width and its own zone [length]. The solution says itself whether it is
+    certified.
 
-    Parameters
-    ----------
-    scene : What to solve.
-    elements : Number across the contact half-width; the scene's own number by default.
-    zone : Half-width of contact that the mesh resolves [length]; by default the scene's.
-    options : How to solve it.
-    start : The same scene solved on another mesh, to start from. Without one, where Newton's steps
-        take products with Q, the scene is first solved on a coarser mesh, if its bodies can make
-        one.
-    once : Whether no further states follow on the same bodies, whose factors would serve them too.
+    `start` is the scene solved on another mesh. Without one, where Newton's steps take products
+    with Q, the scene is first solved on a coarser mesh, if its bodies can make one. `once` says
+    that no further states follow on the same bodies, whose factors would serve them too.
     """
     options = options or Options()
     if not isinstance(scene, Scene):

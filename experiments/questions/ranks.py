@@ -89,6 +89,11 @@ class TimedTeam(Team):
 
         return end
 
+    def cpu(self) -> list[float]:
+        """CPU time of every rank so far [s]."""
+        others = (self.ask(rank, time.process_time) for rank in range(1, self.size))
+        return [time.process_time(), *others]
+
     def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
         return super().keep(rank, clocked, function, CLOCK.read(), *arguments)
 
@@ -97,7 +102,7 @@ def solved(scene: Scene, options: dict[str, Any]) -> Solved:
     return solve_scene(scene, options=Options(tol=TOL, **options))
 
 
-def efficiency(team: Team, case: str) -> dict[str, Any]:
+def efficiency(team: TimedTeam, case: str) -> dict[str, Any]:
     """Two equal bodies in one process, and on two ranks."""
     dim, elements, options = EQUAL[case]
     scene = equal_bodies(dim, elements)

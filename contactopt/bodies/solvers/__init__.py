@@ -28,16 +28,10 @@ SOLVERS = {
 
 
 def make_solver(name: str, system: System) -> BodySolver:
-    """Make the solver of a body's linear system, with its factors or its multigrid levels.
+    """Make the solver of a body's linear system, with its factors or its multigrid levels: a key of
+    SOLVERS, or 'auto' for the cheapest one (see `choose`).
 
-    Parameters
-    ----------
-    name : A key of SOLVERS, or 'auto' for the cheapest one (see `choose`).
-    system : The linear system of the body.
-
-    Raises
-    ------
-    InputError : For a name that is not in the table, or a package that is not installed.
+    InputError for a name that is not in the table, or a package that is not installed.
     """
     n, dim = system.A.shape[0], len(system.points)
     kind = solver_type(name, n, dim)

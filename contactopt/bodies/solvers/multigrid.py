@@ -29,7 +29,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from contactopt.bodies.motions import rigid_fields
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL, USUAL
 from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
-from contactopt.bodies.solvers.system import Block, BodySolver, Iteration, System
+from contactopt.bodies.solvers.system import Act, Block, BodySolver, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.budget import expect, spend
@@ -60,8 +60,8 @@ class MultigridSolver(BodySolver):
         self.cycle = VCycle(*system[:4], crew)
 
     @property
-    def iteration(self) -> Iteration:
-        return Iteration(self.A.__matmul__, self.cycle.apply)
+    def iteration(self) -> tuple[Act, Act]:
+        return self.A.__matmul__, self.cycle.apply
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         rtol = RTOL if rtol is None else rtol

@@ -27,21 +27,19 @@ def elimination_order(
     component: np.ndarray,
     points: np.ndarray,
     trailing: np.ndarray,
-    by_degree: bool | None = None,
 ) -> np.ndarray:
     """Permutation (n,) of the unknowns with few entries in the factors and `trailing` (m,) at the
-    end, in its own order. The unknowns of a node follow each other.
+    end, in its own order: by minimum degree in the plane, in space by nested dissection. The
+    unknowns of a node follow each other.
 
-    Of A only the pattern counts; node, component and points are as in
-    contactopt.bodies.solvers.system.System. by_degree says whether the order is by minimum degree
-    rather than nested dissection; None: in the plane.
+    Of A only the pattern counts; the arguments are as in contactopt.bodies.solvers.system.System.
     """
     present, own = np.unique(node, return_inverse=True)
     graph = _node_graph(A, own, len(present))
     kept = np.zeros(len(present), dtype=bool)  # nodes with an unknown in `trailing`
     kept[own[trailing]] = True
     rank = np.full(len(present), len(present))
-    if len(points) == 2 if by_degree is None else by_degree:
+    if len(points) == 2:
         rank[minimum_degree(graph + _clique(kept))] = np.arange(len(present))
     else:
         inside = np.flatnonzero(~kept)
@@ -82,22 +80,14 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
 def elimination_work(
     graph: sp.csr_matrix, points: np.ndarray, kept: np.ndarray
 ) -> tuple[float, float]:
-    """Estimate what sparse factors take from the graph of the nodes alone.
+    """Estimate the entries of sparse factors and the multiplications that make them, of scalars,
+    from the graph (n, n) of nodes at points (dim, n) that share an element; those `kept` (m,) are
+    eliminated last.
 
     When the separator of a piece is eliminated, it fills a front with itself and with the nodes
     around the piece. With s and b nodes these are s^2 / 2 + s b entries and s^3 / 3 + s^2 b + s b^2
     operations. Pieces that are not cut any further are left out, for their work grows with the
     number of nodes alone. All pieces of one size are cut at once.
-
-    Parameters
-    ----------
-    graph : (n, n) pattern of the nodes that share an element.
-    points : (dim, n) their coordinates.
-    kept : (m,) nodes whose unknowns are eliminated last.
-
-    Returns
-    -------
-    The entries of the factors and the multiplications that make them, of scalars.
     """
     dim, n = points.shape
     rank = np.empty((dim, n), dtype=np.int32)  # places along each axis

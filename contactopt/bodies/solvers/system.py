@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from contactopt.errors import InputError
 from contactopt.linear.operators import Product
 
+Act = Callable[[np.ndarray], np.ndarray]
 COLUMNS = 64  # of the inverse that are made at a time, which bounds the memory beside it
 
 
@@ -57,17 +58,6 @@ class System(NamedTuple):
     component: np.ndarray
     points: np.ndarray
     trailing: np.ndarray | None = None
-
-
-class Iteration(NamedTuple):
-    """What an iterative solver repeats.
-
-    stiffness  x (n,) -> A x
-    cycle      f (n,) -> B f, symmetric positive definite and close to A^-1 f
-    """
-
-    stiffness: Callable[[np.ndarray], np.ndarray]
-    cycle: Callable[[np.ndarray], np.ndarray]
 
 
 def out_of_memory(n: int) -> MemoryError:
@@ -114,8 +104,10 @@ class BodySolver(ABC):
         """
 
     @property
-    def iteration(self) -> Iteration | None:
-        """What it repeats, for those who iterate on several bodies at once; None for factors."""
+    def iteration(self) -> tuple[Act, Act] | None:
+        """What it repeats, for those who iterate on several bodies at once: x (n,) -> A x, and
+        f (n,) -> B f, symmetric positive definite and close to A^-1 f; None for factors.
+        """
         return None
 
     @property
