@@ -394,6 +394,20 @@ def identity(contacts=2):
     assert (table["iterations"] >= 1).all() and table["label"].str.startswith("Mine(").all()
 
 
+def test_entry_points(tmp_path, monkeypatch):
+    (tmp_path / "theirs.py").write_text(
+        "def theirs(problem):\n    import contactopt\n    return contactopt.solve(problem)\n"
+    )
+    info = tmp_path / "theirs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[contactopt.methods]\ntheirs = theirs:theirs\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    table = run(tmp_path, SMALL.replace('["auto", "nsgs"]', '"theirs"'))
+    assert len(table) == 6 and set(table["status"]) == {"solved"}
+
+
 def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_path, monkeypatch):
     from contactopt import fclib
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contactopt
-from contactopt import HalfSpace, InputError, Material, Rigid, Scene, follow, scenes
+from contactopt import HalfSpace, InputError, Material, Rigid, Scene, follow, plots, scenes
 from contactopt.scenes.parameters import parameter
 
 LOADS = (0.0, 20.0, 42.0, 10.0, -20.0, -42.0, 0.0)
@@ -31,6 +31,8 @@ def test_clean_data_give_back_their_parameters(loop, shift):
     ] == pytest.approx(0.5, rel=1e-6)
     assert found.converged and all(found.identifiable.values()) and max(found.certificates) <= 1e-10
     assert "E = 5" in found.sentence
+    ax = plots.fit(found)
+    assert len(ax.lines) >= 1
 
 
 def test_a_start_where_contacts_stick_does_not_hide_friction(loop, shift):
@@ -121,6 +123,7 @@ def test_the_designed_profile_is_the_exact_one_of_uniform_pressure():
     )
     assert all(visit.certificate <= 1e-9 for visit in found.visits)
     assert found.visits[0].peak > 2 * found.peak
+    assert len(plots.design(found).lines) >= 1
 
 
 def test_bounds_and_convex_constraints_are_kept():

@@ -27,7 +27,7 @@ A method of your own is a function `mine(problem, tol, ...)` in `mine.py` that r
 with the decorator `method`; nothing in this package changes. Instead of a function it may be a
 dataclass with `iterate`, as in contactopt.methods: it then gets the driver's stopping rule and
 history. `problem` registers a function that makes an InterfaceProblem in the same way, for `family
-= NAME`.
+= NAME`. An installed package offers methods as entry points of the group "contactopt.methods".
 
 What a method claims is never believed: each answer gets the certificate of
 contactopt.natural_map_residual, in the process of the campaign and from the problem that it holds.

@@ -1,4 +1,4 @@
-"""Methods and problems of the user, decorated in a file.
+"""Methods and problems of the user: decorated in a file, or entry points of a package.
 
 The campaign's process runs the file, to know what it declares; the functions are called in workers
 only.
@@ -11,6 +11,7 @@ import inspect
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +21,7 @@ from contactopt.benchmark.peers import Peer
 from contactopt.errors import InputError
 from contactopt.methods import METHODS
 
+GROUP = "contactopt.methods"  # of entry points
 MARK = "_contactopt"  # attribute of what a file declares: table of the registry, name, entry
 # to a plug-in, if it has such an argument
 PASSED = ("tol", "time_limit", "max_iterations")
@@ -76,6 +78,17 @@ class Registry:
                     for table, name, declared in getattr(one, "__dict__", {}).get(MARK, ()):
                         getattr(self, table)[name] = declared
                 self.loaded.add(path)
+
+    def find(self, name: str) -> Plugin | None:
+        """The method of that name, from a loaded file or an entry point; None if there is none."""
+        if name not in self.methods:
+            for point in entry_points(group=GROUP, name=name):
+                try:
+                    self.methods[name] = Plugin(name, point.load())
+                except Exception as error:
+                    text = f"plug-in '{point.value}' failed: {type(error).__name__}: {error}"
+                    raise InputError(text) from error
+        return self.methods.get(name)
 
 
 def method(make: Any = None, *, name: str | None = None, peer: Peer | None = None) -> Any:

@@ -51,7 +51,7 @@ def method_spec(name: str, settings: Mapping[str, Any], registry: Registry) -> M
     peer = ""
     if name in METHODS:
         find_method(name, **settings)
-    elif (plugin := registry.methods.get(name)) is not None:
+    elif (plugin := registry.find(name)) is not None:
         plugin.check(settings)
         peer = plugin.version
     else:

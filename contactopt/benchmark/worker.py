@@ -146,7 +146,7 @@ def _word(error: BaseException) -> str:
 def _called(task: Task, problem: InterfaceProblem) -> Answer:
     """The answer of a method, in whatever form it gave it. Its own errors pass through."""
     spec, usual = task.run.method, task.run.setting == "default"
-    plugin = _kept.plugins.methods[spec.name] if spec.foreign else None
+    plugin = _kept.plugins.find(spec.name) if spec.foreign else None
     given: dict[str, Any] = {
         "tol": task.run.tolerance,
         "time_limit": task.time_limit,
