@@ -178,19 +178,15 @@ class Simplices:
         return (self.back @ both).transpose(0, 2, 1).reshape(len(self._ratio), -1)
 
     @cached_property
-    def by_moments(self) -> sp.csr_matrix:
+    def by_moments(self) -> sp.bsr_array:
         """(e inputs, facets dim dim) the data by the moments of facets."""
         d, count = self.dim, len(self.volume)
-        n = (d + 1) * d
-        column = (self.opposite[:, None] * d + self.slots).reshape(n, count).T[..., None]
-        column = (column * d + np.arange(d))[:, :, None]  # (e, n, 1, d)
+        n = (d + 1) * d  # vertices of facets; the last rows of an element are its body force's
+        column = (self.opposite[:, None] * d + self.slots).reshape(n, count).T
         value = np.repeat(self.sign.T, d, axis=1)[..., None, None] * self.back[:, None]
-        row = np.arange(count)[:, None, None] * (n + 1) * d + np.arange(n * d).reshape(n, d)
-        place = np.broadcast_to(row[..., None], value.shape).ravel()
-        return sp.csr_matrix(
-            (value.ravel(), (place, np.broadcast_to(column, value.shape).ravel())),
-            (count * (n + 1) * d, self.mesh.facets.shape[1] * d * d),
-        )
+        rows = np.append(0, np.cumsum(np.tile([*n * [1], 0], count)))
+        shape = (count * (n + 1) * d, self.mesh.facets.shape[1] * d * d)
+        return sp.bsr_array((value.reshape(-1, d, d), column.ravel(), rows), shape)
 
     def data_of(self, stress: np.ndarray) -> np.ndarray:
         """The same for a stress (e, dim + 1, dim, dim) that is linear on each element."""
@@ -231,10 +227,11 @@ class Simplices:
         """H (e, inputs, inputs): y' H y = int s : C^-1 : s for the composite stress s of data y, of
         some elements [per thickness].
         """
-        form, parts = self._form(material, chosen), reference_energy(self.dim)
-        size = parts.shape[-1]
-        flat = form.reshape(len(form), -1) @ parts.reshape(-1, size * size)
-        return np.asarray(flat.reshape(-1, size, size))
+        parts = reference_energy(self.dim)
+        i, j = np.triu_indices(len(parts))  # both factors are symmetric in their components
+        twice = parts[i, j] + np.where(i < j, 1.0, 0.0)[:, None, None] * parts[j, i]
+        flat = self._form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
+        return np.asarray(flat.reshape(-1, *parts.shape[2:]))
 
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(e,) y' H z of all elements."""
