@@ -52,9 +52,7 @@ def least_by_airy(
     number = np.where(free, np.cumsum(free) - 1, free.sum())
     K, slope = _energy(cells, material, missing, edges, number)
     K += sp.diags(TINY * K.diagonal(), format="csc")
-    solve = splu(
-        K, "MMD_AT_PLUS_A", panel_size=4, diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    ).solve
+    solve = splu(K, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve
     x = np.append(-solve(slope), 0.0)[number]
     ends = x[: 3 * mesh.nvertices].reshape(-1, 3)[mesh.facets.T].reshape(-1, 6, 1)
     made = edges.by_ends.reshape(-1, 4, 6) @ ends
