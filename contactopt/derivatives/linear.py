@@ -28,7 +28,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from contactopt.derivatives.constants import INNER, ROUND
+from contactopt.derivatives.constants import INNER, ROUND, WHOLE
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface, InterfaceOperator, asymmetry
 from contactopt.linear.saddle_point import CoupledForm
@@ -38,6 +38,7 @@ from contactopt.methods.kernels.bonded import LEAST_PIVOT
 from contactopt.methods.kernels.coupled_newton import Coupled, fitted
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
+from contactopt.methods.kernels.sparse_blocks import assembled
 from contactopt.problem import InterfaceProblem, dimensionless
 
 SINGULAR = 1e-13  # reciprocal condition of a matrix below which it counts as singular
@@ -152,7 +153,8 @@ def _times(blocks: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _dense_factors(tangent: Tangent, kept: np.ndarray, border: Border) -> Inverse:
-    """By Cholesky's factors of Q where components stick, and LU of what is left of the others.
+    """By Cholesky's factors of Q where components stick, and LU of what is left of the others; by
+    LU of all if they are few, or Q is not symmetric and definite.
 
     Rows of the unit matrix in D mean Q dr + V dlambda = error / rho; with x these dr and z all
     other unknowns the system is [[Q, B], [C, E]] (x, z) = (error / rho, rest), so that
@@ -160,27 +162,26 @@ def _dense_factors(tangent: Tangent, kept: np.ndarray, border: Border) -> Invers
         (E - C Q^-1 B) z = rest - C Q^-1 error / rho,   x = Q^-1 (error / rho - B z).
     """
     d, V = tangent.D.shape[1], border[1].T
-    stick = kept & np.all(np.eye(d) == tangent.D, axis=2).ravel()
-    factor = _cholesky(tangent.Q[stick][:, stick])
+    p, rest = V.shape[1], np.eye(d) - tangent.D
+    stick = kept & np.all(rest == 0, axis=2).ravel()
+    factor = None if kept.sum() <= WHOLE else _cholesky(tangent.Q[stick][:, stick])
     if factor is None:
-        stick = np.zeros_like(kept)
+        A = assembled(tangent.Q, tangent.scaled, rest, kept)
+        return _square(np.block([[A, border[0]], [border[1], np.zeros((p, p))]]), tangent.adjoint)
     loose, rho = np.flatnonzero(kept & ~stick), np.repeat(tangent.rho, d)[stick, None]
-    own, p = stick[kept], V.shape[1]
-    rows = tangent.rows(loose)
+    own, rows = stick[kept], tangent.rows(loose)
     C = np.concatenate([rows[:, stick], V[own].T])
     E = np.block([[rows[:, loose], border[0][~own]], [V[~own].T, np.zeros((p, p))]])
     B = np.concatenate([tangent.Q[np.ix_(stick, loose)], border[0][own] / rho], axis=1)
-    X = B if factor is None else la.cho_solve(factor, B, check_finite=False)
-    rest = _square(E - C @ X, tangent.adjoint)
-    first = np.append(own, np.zeros(p, bool))
+    X = la.cho_solve(factor, B, check_finite=False)
+    inverse, first = _square(E - C @ X, tangent.adjoint), np.append(own, np.zeros(p, bool))
 
     def solve(right: np.ndarray) -> np.ndarray:
-        x, sides = np.empty_like(right), right.reshape(len(right), -1)
-        y = sides[first] / rho
-        y = y if factor is None else la.cho_solve(factor, y, check_finite=False)
-        z = rest(sides[~first] - C @ y)
-        x.reshape(sides.shape)[first], x.reshape(sides.shape)[~first] = y - X @ z, z
-        return x
+        sides = right.reshape(len(right), -1)
+        x, y = np.empty(sides.shape), la.cho_solve(factor, sides[first] / rho, check_finite=False)
+        x[~first] = z = inverse(sides[~first] - C @ y)
+        x[first] = y - X @ z
+        return x.reshape(right.shape)
 
     return solve
 
