@@ -60,7 +60,7 @@ def test_transformations_compose():
 
 def test_systems_of_several_problems_are_told_apart():
     # a Jacobian has many right sides of one system, and vmap many systems
-    Q, q, mu, V, s = data()
+    Q, q, _, V, s = data()
     offsets, coefficients = jnp.array([0.0, 0.3, -0.2]), jnp.array([0.1, 0.8])
 
     def slopes(lift, friction):
