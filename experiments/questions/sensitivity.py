@@ -383,9 +383,9 @@ Components that are known at once leave the system. Cholesky's factors serve tho
 over the norms of the forces and of the weights. Times are medians of CPU milliseconds, compiled and
 warm. The acts of a row are timed in turn. The gradient by Q, q, mu and V takes one call of NumPy
 from JAX more than the value, and one factorisation. That is a fifth of a curved contact's solve,
-which takes eight to ten steps of Newton's method. A flat punch takes two steps, and problems without
-a plate are swept in a millisecond: there one factorisation and what JAX takes for a call are more
-than half of the solve.
+which takes eight to ten steps of Newton's method. A flat punch takes two steps, and problems
+without a plate are swept in one or two milliseconds: there one factorisation and what JAX takes for
+a call are more than half of the solve.
 
 {{jax}}
 
