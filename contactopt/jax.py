@@ -21,9 +21,8 @@ which the solver ended. contactopt.sensitivity has the one-sided ones.
 from __future__ import annotations
 
 import warnings
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -32,43 +31,25 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from contactopt.derivatives.gradient import Gradient, gradient
-from contactopt.derivatives.interface import Sensitivity, sensitivity
+from contactopt.derivatives.gradient import gradient
+from contactopt.derivatives.interface import Sensitivity, told_apart
+from contactopt.derivatives.linear import Tangent
+from contactopt.derivatives.states import chain_of
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
 from contactopt.methods.driver import solve as solve_problem
 from contactopt.problem import InterfaceProblem
+from contactopt.readings.quantities import seeds_of
 from contactopt.runner import run, scene_of
 from contactopt.scenes.parameters import parameters as parameters_of
 from contactopt.scenes.parameters import put_all
 from contactopt.scenes.scene import Scene
 
-KEPT = 32  # solutions whose derivative may still be asked for
 Arrays = tuple[np.ndarray, ...]
 
 
 class Kink(UserWarning):
     """A derivative was taken at a point that has one-sided derivatives only."""
-
-
-class Kept:
-    """The last answers of a function of arrays, by the number that each was given."""
-
-    def __init__(self, make: Callable[..., Any]):
-        self.make, self.count, self.last = make, 0, OrderedDict[int, Any]()
-
-    def new(self, arrays: Any) -> tuple[Any, np.ndarray]:
-        """The answer for some arrays, and its number."""
-        self.count += 1
-        self.last[self.count] = self.make(*(np.array(array, float) for array in arrays))
-        while len(self.last) > KEPT:
-            self.last.popitem(last=False)
-        return self.last[self.count], np.array(float(self.count))
-
-    def at(self, number: Any, arrays: Any) -> Any:
-        """The answer of that number, made again from its arrays if it is no longer kept."""
-        there = self.last.get(int(number))
-        return self.new(arrays)[0] if there is None else there
 
 
 def solve(
@@ -101,62 +82,90 @@ def solve(
     s = jnp.zeros(V.shape[1]) if s is None else jnp.asarray(s, float)
     mu = jnp.broadcast_to(jnp.asarray(mu, float), q.shape[:1])
 
-    def found(*data: np.ndarray) -> Sensitivity:
-        Q, q, mu, V, s = data
+    reactions, multipliers = _solver(tol, **settings)(jnp.asarray(Q, float), q, mu, V, s)
+    return reactions, multipliers
+
+
+@lru_cache
+def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
+    """The function of Q, q, mu, V and s, made once so that JAX traces it once."""
+
+    def found(data: Any) -> Sensitivity:
+        Q, q, mu, V, s = (np.asarray(array) for array in data)
         problem = InterfaceProblem(Q, q, mu=mu, V=V, s=s)
         solution = solve_problem(problem, tol=tol, **settings)
         if not solution.solved:
             raise InputError(f"no certified solution was found: {solution.status}.")
-        return sensitivity(problem, solution)
-
-    kept = Kept(found)
+        return Sensitivity(problem, solution, told_apart(solution.residual))
 
     def solved(*data: Any) -> Arrays:
-        made, number = kept.new(data)
-        return made.solution.reactions, made.solution.multipliers, number
+        at = found(data).solution
+        return at.reactions, at.multipliers
 
-    act = jax.custom_jvp(lambda *data: _outside(solved, (data[1], data[4], jnp.zeros(())), *data))
+    def linearised(*data: Any) -> Arrays:
+        at = _smooth(found(data))
+        tangent, by_mu = at.tangent, np.broadcast_to(at.by_parameter, at.problem.q.shape)
+        return at.solution.reactions, at.solution.multipliers, tangent.rho, tangent.D, by_mu
 
     def rule(data: Any, changes: Any) -> Any:
-        answer = act(*data)
-        return answer, (*_change(kept, data, changes, answer), jnp.zeros(()))
+        _, q, mu, _, s = data
+        like = q, s, mu, jnp.zeros((*q.shape, q.shape[1])), q
+        r, lam, *linear = _outside(linearised, like, "sequential", *data)
+        return (r, lam), _change(data, changes, r, lam, *linear)
 
+    act = jax.custom_jvp(lambda *data: _outside(solved, (data[1], data[4]), "sequential", *data))
     act.defjvp(rule)
-    reactions, multipliers, _ = act(jnp.asarray(Q, float), q, mu, V, s)
-    return reactions, multipliers
+    return jax.jit(act)
 
 
-def _change(kept: Kept, data: Any, changes: Any, answer: Any) -> tuple[jax.Array, jax.Array]:
+def _change(
+    data: Any, changes: Any, r: Any, lam: Any, rho: Any, D: Any, by_mu: Any
+) -> tuple[jax.Array, jax.Array]:
     """dr and dlambda of contactopt.derivatives for changes of Q, q, mu, V and s, linear in them."""
-    (Q, q, _, V, _), (dQ, dq, dmu, dV, ds), (r, lam, number) = data, changes, answer
-
-    def slopes(number: Any, data: Any) -> Arrays:
-        return _smooth(kept.at(number, data)).slopes
-
-    def step(name: str, number: Any, data: Any, right: Any) -> np.ndarray:
-        first, last = np.split(np.asarray(right), [q.size])
-        parts = getattr(kept.at(number, data), name)(first.reshape(q.shape), last)
-        return np.concatenate([part.ravel() for part in parts])
-
-    blocks = jnp.zeros((*q.shape, q.shape[1]))
-    D, D_rho, by_mu = _outside(slopes, (blocks, blocks, q), number, data)
+    (Q, q, _, V, _), (dQ, dq, dmu, dV, ds) = data, changes
     du = dq + (dQ @ r.ravel() + dV @ lam).reshape(q.shape)
-    error = by_mu * dmu[:, None] - jnp.einsum("kab,kb->ka", D_rho, du)
+    error = by_mu * dmu[:, None] - jnp.einsum("kab,k,kb->ka", D, rho, du)
     # One vector: JAX has no derivative of the step by some parts of the right side alone.
     right = jnp.concatenate([error.ravel(), -ds - dV.T @ r.ravel()])
 
     def M(change: jax.Array) -> jax.Array:
         dr, dlam = jnp.split(change, [q.size])
-        both = jnp.stack([dr, Q @ dr + V @ dlam]).reshape(2, *q.shape)
-        rows = both[0] - jnp.einsum("jkab,jkb->ka", jnp.stack([D, -D_rho]), both)
-        return jnp.concatenate([rows.ravel(), V.T @ dr])
+        moved = dr.reshape(q.shape) - rho[:, None] * (Q @ dr + V @ dlam).reshape(q.shape)
+        return jnp.concatenate([dr - jnp.einsum("kab,kb->ka", D, moved).ravel(), V.T @ dr])
 
-    def inverse(name: str) -> Callable[[Any, jax.Array], jax.Array]:
-        return lambda _, b: _outside(partial(step, name), right, number, data, b)
+    def inverse(act: Callable[..., Any]) -> Callable[[Any, jax.Array], jax.Array]:
+        return lambda _, b: _outside(partial(_each, act), b, "expand_dims", b, Q, V, rho, D)
 
-    change = lax.custom_linear_solve(M, right, inverse("step"), inverse("step_transposed"))
+    change = lax.custom_linear_solve(M, right, inverse(_step), inverse(_step_back))
     dr, dlam = jnp.split(change, [q.size])
     return dr.reshape(q.shape), dlam
+
+
+def _each(act: Callable[..., Any], right: Any, *data: Any) -> np.ndarray:
+    """Act on right sides (..., n): at once on those that share Q, V, rho and D of the system."""
+    right, data = np.asarray(right), tuple(np.asarray(array) for array in data)
+    own = [array.shape[:-size] for array, size in zip(data, (2, 2, 1, 3))]
+    lead = np.broadcast_shapes(*own)
+    right = np.broadcast_to(right, np.broadcast_shapes(lead, right.shape[:-1]) + right.shape[-1:])
+    found = np.empty(right.shape)
+    for place in np.ndindex(lead):
+        here = tuple(slice(None) if most == 1 else i for i, most in zip(place, lead))
+        given = (array[tuple(i % n for i, n in zip(place, all))] for array, all in zip(data, own))
+        columns = right[here].reshape(-1, right.shape[-1]).T
+        found[here] = act(Tangent(*given), columns).T.reshape(found[here].shape)
+    return found
+
+
+def _step(tangent: Tangent, right: np.ndarray) -> np.ndarray:
+    """M^-1 times columns (n, j)."""
+    return np.concatenate(tangent.solve(*np.split(right, [len(tangent.Q)])))
+
+
+def _step_back(tangent: Tangent, right: np.ndarray) -> np.ndarray:
+    """The transpose of M^-1 times columns (n, j)."""
+    by_r, by_multipliers = np.split(right, [len(tangent.Q)])
+    z, b = tangent.solve_transposed(by_r, by_multipliers)
+    return np.concatenate([tangent.multipliers(by_r, z, b), b])
 
 
 def quantity(
@@ -186,26 +195,22 @@ def quantity(
     for one in which:
         one.read(base)  # refuses what has no value to change
 
-    def found(values: np.ndarray) -> Gradient:
-        changed = put_all(base, dict(zip(which, values.tolist())))
-        return gradient(run(changed, **options), name, names)
+    def changed(values: Any) -> Any:
+        numbers = np.asarray(values).tolist()
+        return run(put_all(base, dict(zip(which, numbers))), **options)
 
-    kept = Kept(found)
+    def read(values: Any) -> np.ndarray:
+        return np.asarray(seeds_of(name, chain_of(changed(values)).steps[-1]).value, float)
 
-    def value(values: Any) -> Arrays:
-        made, number = kept.new((values,))
-        return np.asarray(made.value, float), number
+    def both(values: Any) -> Arrays:
+        at = _smooth(gradient(changed(values), name, names))
+        return np.asarray(at.value, float), np.array([float(at.by[one]) for one in names])
 
-    def slope(number: Any, values: Any) -> np.ndarray:
-        by = _smooth(kept.at(number, (values,))).by
-        return np.array([float(by[one]) for one in names])
-
-    act = jax.custom_jvp(lambda values: _outside(value, 2 * (jnp.zeros(()),), values))
+    act = jax.custom_jvp(lambda values: _outside(read, jnp.zeros(()), "sequential", values))
 
     def rule(values: Any, changes: Any) -> Any:
-        reading, number = act(*values)
-        by = _outside(slope, *values, number, *values)
-        return (reading, number), (by @ changes[0], jnp.zeros(()))
+        value, by = _outside(both, (jnp.zeros(()), *values), "sequential", *values)
+        return value, by @ changes[0]
 
     act.defjvp(rule)
 
@@ -216,15 +221,15 @@ def quantity(
                 f"the function of {', '.join(names)} needs {len(names)} numbers, shape"
                 f" ({len(names)},); got the shape {array.shape}."
             )
-        return act(array)[0]
+        return act(array)
 
     return function
 
 
-def _outside(act: Callable[..., Any], like: Any, *arrays: Any) -> Any:
+def _outside(act: Callable[..., Any], like: Any, vmap: str, *arrays: Any) -> Any:
     """Call a function of NumPy from JAX; its results have the shapes of `like`."""
     shapes = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape, np.float64), like)
-    return jax.pure_callback(act, shapes, *arrays, vmap_method="sequential")
+    return jax.pure_callback(act, shapes, *arrays, vmap_method=vmap)
 
 
 def _smooth(at: Any) -> Any:

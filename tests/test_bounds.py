@@ -100,6 +100,26 @@ def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
     assert np.allclose(cells.products(MATERIAL, data, data), exact)
 
 
+def test_the_nearest_stress_does_not_depend_on_the_numbering():
+    """On a strip that is held all around; its elements have stresses of their own."""
+    strip, energies = skfem.MeshTri.init_tensor(np.linspace(0, 1, 5), [0.0, 0.7]), []
+    stress = np.random.default_rng(1).standard_normal((strip.nelements, 1, 2, 2))
+    stress = np.repeat(stress + stress.swapaxes(2, 3), 3, axis=1)
+    for order in (
+        np.arange(strip.nvertices),
+        np.random.default_rng(2).permutation(strip.nvertices),
+    ):
+        place = np.argsort(order)
+        cells = Simplices(skfem.MeshTri(strip.p[:, order], place[strip.t], sort_t=False))
+        held = (cells.mesh.f2t[1] < 0)[:, None] & np.ones((1, 2), dtype=bool)
+        none = np.zeros((*held.shape, 2))
+        made, unbalanced = cells.equilibrated(MATERIAL, stress, np.zeros(2), held, none)
+        missing = made - cells.data_of(stress)
+        energies.append(cells.products(MATERIAL, missing, missing).sum())
+        assert unbalanced < 1e-12
+    assert energies[0] > 1e-6 and np.isclose(*energies, rtol=1e-10)
+
+
 @pytest.mark.parametrize(
     ("scene", "limit"),
     [

@@ -58,6 +58,22 @@ def test_transformations_compose():
     assert np.allclose(rows, columns, atol=1e-9)
 
 
+def test_systems_of_several_problems_are_told_apart():
+    # a Jacobian has many right sides of one system, and vmap many systems
+    Q, q, _, V, s = data()
+    offsets, coefficients = jnp.array([0.0, 0.3, -0.2]), jnp.array([0.1, 0.8])
+
+    def slopes(lift, friction):
+        return jax.jacrev(lambda x: solve(Q, x, friction, V, s)[0])(q + lift)
+
+    each = jax.vmap(lambda a: jax.vmap(lambda b: slopes(a, b))(coefficients))(offsets)
+    for i, lift in enumerate(offsets):
+        for j, friction in enumerate(coefficients):
+            one = jax.jacfwd(lambda x, mu=friction: solve(Q, x, mu, V, s)[0])(q + lift)
+            assert np.abs(one).max() > 0.1
+            assert np.allclose(each[i, j], one, atol=1e-10)
+
+
 def test_a_kink_is_reported():
     # the gap of the second contact is exactly zero without a force
     Q, q = np.eye(4), np.array([[-1.0, 0.0], [0.0, 0.0]])

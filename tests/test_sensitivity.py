@@ -19,6 +19,7 @@ from contactopt import (
     solve,
 )
 from contactopt.coupling.reduction import reduce_bodies
+from contactopt.derivatives import linear
 from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
@@ -128,6 +129,25 @@ def test_adjoint_is_the_transpose_of_forward(kind, dim):
         two = float(sum(parts)) + dual.along_Q(change["Q"])
         assert abs(one - two) < 1e-10 * (abs(one) + sum(abs(p) for p in parts))
         assert np.allclose(dual.along_Q(change["Q"]), np.sum(dual.Q * change["Q"]))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("unsymmetric", [False, True])
+def test_factors_of_sticking_components_give_what_lu_of_all_gives(dim, unsymmetric, monkeypatch):
+    made, states = [], set()
+    for most in (0, 10**9):  # unknowns up to which the system is factorised whole
+        monkeypatch.setattr(linear, "WHOLE", most)
+        for seed in range(6):
+            problem = random_problem(seed, dim, unsymmetric=unsymmetric, contacts=12)
+            ours = contactopt.sensitivity(problem, solve(problem, tol=1e-12))
+            change, weight = random_change(problem, seed), np.ones(problem.q.shape)
+            dual = ours.adjoint(reactions=weight, displacements=weight)
+            made.append([ours.forward(**change).reactions, dual.q, dual.mu, dual.s])
+            states.update(np.any(np.eye(dim) != ours.tangent.D, axis=(1, 2)).tolist())
+    assert states == {False, True}
+    for one, other in zip(made[:6], made[6:]):
+        for a, b in zip(one, other):
+            assert np.abs(a - b).max(initial=0.0) < 1e-10 * max(1.0, np.abs(a).max(initial=0.0))
 
 
 def test_several_laws_in_one_problem():

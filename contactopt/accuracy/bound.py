@@ -66,8 +66,7 @@ from contactopt.accuracy.estimate import Guarantee
 from contactopt.accuracy.facing_facets import facet_nodes
 from contactopt.accuracy.pressed_scene import PressedScene
 from contactopt.accuracy.uneven_traction import uneven_traction
-from contactopt.derivatives.interface import sensitivity
-from contactopt.derivatives.states import Duals
+from contactopt.derivatives.states import Duals, duals_of
 from contactopt.errors import InputError
 from contactopt.readings.quantities import Quantity
 from contactopt.readings.state import State
@@ -208,8 +207,7 @@ class Bound:
             )
         state = State(scene.reduction, scene.solution)
         seeds = quantity.slopes(state)
-        by = {"reactions": seeds.reactions, "multipliers": seeds.multipliers}
-        duals = Duals(state, sensitivity(problem, scene.solution).adjoint(**by), seeds.bodies)
+        duals = duals_of(state, seeds)
         omega, motions = np.zeros(len(problem.q)), np.zeros(len(problem.s))
         if seeds.multipliers is not None:
             motions += seeds.multipliers

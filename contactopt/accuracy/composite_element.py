@@ -11,6 +11,8 @@ from functools import cache
 
 import numpy as np
 
+WEIGHT = {2: 1 / 36, 3: 1 / 80}  # int l_a l_b = V (1 + delta) / ... on a part of the element
+
 
 def components(d: int) -> list[tuple[int, int]]:
     """The components of a symmetric matrix."""
@@ -18,10 +20,10 @@ def components(d: int) -> list[tuple[int, int]]:
 
 
 @cache
-def reference_energy(d: int) -> np.ndarray:
-    """The integrals (component, component, input, input) over the reference element of the products
-    of the components of its stress, which the inputs determine: moments of tractions, then a body
-    force.
+def reference_stress(d: int) -> np.ndarray:
+    """The stress (value, component, input) of the reference element, which the inputs determine:
+    moments of tractions, then a body force. The integral of a product of two stresses is WEIGHT
+    times the sum of the products of their values.
     """
     x = np.concatenate([np.zeros((1, d)), np.eye(d)])
     pairs, n = components(d), d + 1
@@ -55,6 +57,12 @@ def reference_energy(d: int) -> np.ndarray:
                 demand(np.einsum("ijk,j->ik", jump, slopes[s][t]))
     solved = np.linalg.pinv(np.concatenate(equations), rcond=1e-12) @ np.concatenate(data)
     found = solved.reshape(n, n, len(pairs), inputs)  # part, vertex of the part, component
-    both = (found, found.sum(axis=1, keepdims=True))  # int l_a l_b = V (1 + delta) / ...
-    parts = sum(np.einsum("svak,svbl->abkl", own, own) for own in both)
-    return np.asarray(parts / (n * n * (n + 1)))
+    # at the vertices of the parts, and their sums
+    return np.concatenate([found.reshape(n * n, *found.shape[2:]), found.sum(axis=1)])
+
+
+@cache
+def reference_energy(d: int) -> np.ndarray:
+    """Integrals (component, component, input, input) of products of components of its stress."""
+    stress = reference_stress(d)
+    return WEIGHT[d] * np.einsum("vak,vbl->abkl", stress, stress, optimize=True)

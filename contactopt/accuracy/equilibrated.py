@@ -37,21 +37,25 @@ Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
-from contactopt.accuracy.composite_element import components, reference_energy
+from contactopt.accuracy.airy import least_by_airy
+from contactopt.accuracy.composite_element import (
+    WEIGHT,
+    components,
+    reference_energy,
+    reference_stress,
+)
 from contactopt.accuracy.vertex_balance import Balance
 from contactopt.material import Material, lame
 
 BLOCK = 8192  # elements at a time
-ALONG = 1e-9  # of a unit vector: components below are zero
-TINY = 1e-13  # of the diagonal, added so that functions without stress do no harm
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +88,14 @@ class Simplices:
         return self._ratio / (2 if self.dim == 2 else 6)
 
     @cached_property
+    def back(self) -> np.ndarray:
+        """(e, dim, dim) the inverses of these matrices."""
+        return np.linalg.inv(self._map)
+
+    @cached_property
     def slopes(self) -> np.ndarray:
         """(e, dim + 1, dim) gradients of the hat functions."""
-        inner = np.linalg.inv(self._map)
-        return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+        return np.concatenate([-self.back.sum(axis=1, keepdims=True), self.back], axis=1)
 
     @cached_property
     def others(self) -> np.ndarray:
@@ -167,7 +175,18 @@ class Simplices:
         own = moments.reshape(-1, *moments.shape[2:])
         body = np.broadcast_to(self._ratio[:, None] * force, own.shape[1:])
         both = np.concatenate([own, body[None]]).transpose(1, 2, 0)  # in the axes of space
-        return np.linalg.solve(self._map, both).transpose(0, 2, 1).reshape(len(self._ratio), -1)
+        return (self.back @ both).transpose(0, 2, 1).reshape(len(self._ratio), -1)
+
+    @cached_property
+    def by_moments(self) -> sp.bsr_array:
+        """(e inputs, facets dim dim) the data by the moments of facets."""
+        d, count = self.dim, len(self.volume)
+        n = (d + 1) * d  # vertices of facets; the last rows of an element are its body force's
+        column = (self.opposite[:, None] * d + self.slots).reshape(n, count).T
+        value = np.repeat(self.sign.T, d, axis=1)[..., None, None] * self.back[:, None]
+        rows = np.append(0, np.cumsum(np.tile([*n * [1], 0], count)))
+        shape = (count * (n + 1) * d, self.mesh.facets.shape[1] * d * d)
+        return sp.bsr_array((value.reshape(-1, d, d), column.ravel(), rows), shape)
 
     def data_of(self, stress: np.ndarray) -> np.ndarray:
         """The same for a stress (e, dim + 1, dim, dim) that is linear on each element."""
@@ -182,12 +201,12 @@ class Simplices:
             found.append((t + t.sum(axis=0)) / (self.dim * (self.dim + 1)))
         return np.array(found)
 
-    def metric(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
-        """H (e, inputs, inputs): y' H y = int s : C^-1 : s for the composite stress s of data y, of
-        some elements [per thickness].
+    def _form(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
+        """(e, component, component) the energy of some elements by the integrals of the products of
+        the components of their stresses on the reference element.
         """
         d, (E, nu) = self.dim, (material.E, material.nu)
-        pairs, parts = components(d), reference_energy(d)
+        pairs = components(d)
         base = np.zeros((len(pairs), d, d))
         for number, (i, j) in enumerate(pairs):
             base[number, i, j] = base[number, j, i] = 1.0
@@ -202,21 +221,31 @@ class Simplices:
         form = (1 + nu) * rows @ columns.swapaxes(1, 2)
         form -= factor * traces[:, :, None] * traces[:, None]
         form *= (self.volume[chosen] / ratio**2 / E)[:, None, None]
-        size = parts.shape[-1]
-        flat = form.reshape(-1, len(pairs) ** 2) @ parts.reshape(-1, size * size)
-        return np.asarray(flat.reshape(-1, size, size))
+        return form
+
+    def metric(self, material: Material, chosen: slice) -> np.ndarray:
+        """H (e, inputs, inputs): y' H y = int s : C^-1 : s for the composite stress s of data y, of
+        some elements [per thickness].
+        """
+        parts = reference_energy(self.dim)
+        i, j = np.triu_indices(len(parts))  # both factors are symmetric in their components
+        twice = parts[i, j] + np.where(i < j, 1.0, 0.0)[:, None, None] * parts[j, i]
+        flat = self._form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
+        return np.asarray(flat.reshape(-1, *parts.shape[2:]))
 
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(e,) y' H z of all elements."""
-        out = np.zeros(len(one))
+        stress, out = reference_stress(self.dim), np.zeros(len(one))
+        by_inputs, shape = stress.reshape(-1, stress.shape[2]).T, (-1, *stress.shape[:2])
         there = np.flatnonzero(np.any(one != 0, axis=1) & np.any(other != 0, axis=1))
         for own in np.split(there, range(BLOCK, len(there), BLOCK)):
-            turned = self.metric(material, own) @ other[own, :, None]
-            out[own] = np.sum(one[own] * turned[..., 0], axis=1)
-        return out
+            a, b = ((y[own] @ by_inputs).reshape(shape) for y in (one, other))
+            out[own] = np.sum(self._form(material, own) * (a.swapaxes(1, 2) @ b), axis=(1, 2))
+        return out * WEIGHT[self.dim]
 
     @property
-    def _blocks(self) -> list[slice]:
+    def blocks(self) -> list[slice]:
+        """Some elements at a time."""
         return [slice(i, i + BLOCK) for i in range(0, len(self.volume), BLOCK)]
 
     def equilibrated(
@@ -249,10 +278,10 @@ class Simplices:
             stress, force, np.where(known[:, None], moments, np.nan), balance
         )
         missing = self.data(self.seen(m), force) - self.data_of(stress)
-        K, slope = self.facet_energy(material, missing)
-        m += (self._by_airy(K, slope, known) if self.dim == 2 else balance.least(K, slope)).reshape(
-            m.shape
-        )
+        if self.dim == 2:
+            m += least_by_airy(self, material, missing, known)
+        else:
+            m += balance.least(*self._energy(material, missing)).reshape(m.shape)
         return self.data(self.seen(m), force), unbalanced
 
     @cached_property
@@ -274,79 +303,22 @@ class Simplices:
         """Moments (facets, dim, dim) as the elements see them."""
         return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
 
-    def _by_airy(self, K: sp.csr_matrix, slope: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """What to add to the moments of plane tractions so that m' K m / 2 + slope' m is least.
-
-        A stress without body force derives from a function A of Airy, cubic on the three parts of
-        each triangle and smooth across all edges. With the gradients g at the vertices and the mean
-        h of the gradient along an edge, whose unit tangent t points from the first vertex to the
-        second, and R the turn by which the normal is R t up to sign, the moments on the edge are
-
-            R (h - g_1)  and  R (g_2 - h),     h = (A_2 - A_1) / |edge| t + k n.
-
-        Unknowns are A and g at the vertices and k on the edges; those that move a traction that is
-        known are zero.
-        """
-        mesh, count, facets = self.mesh, self.mesh.nvertices, self.mesh.facets
-        t = mesh.p[:, facets[1]] - mesh.p[:, facets[0]]
-        length = np.linalg.norm(t, axis=0)
-        t = t / length
-        n = np.array([t[1], -t[0]])
-        owner = mesh.p[:, mesh.t[:, mesh.f2t[0]]].mean(axis=1)
-        way = np.where(np.sum(n * (mesh.p[:, facets[0]] - owner), axis=0) > 0, 1.0, -1.0)
-        D = np.zeros((facets.shape[1], 2, 2, 7))  # moments by g_1, g_2, A_1, A_2, k
-        for i, turn in enumerate((1.0, -1.0)):  # R takes component 1 - i to i
-            D[:, 0, i, 1 - i] = -turn
-            D[:, 1, i, 3 - i] = turn
-            along = turn * t[1 - i] / length
-            D[:, 0, i, 4:] = np.stack([-along, along, turn * n[1 - i]], axis=1)
-            D[:, 1, i, 4:] = -D[:, 0, i, 4:]
-        D *= way[:, None, None, None]
-        v, w = facets
-        edge = np.arange(facets.shape[1])
-        unknown = np.stack(
-            [2 * v, 2 * v + 1, 2 * w, 2 * w + 1, 2 * count + v, 2 * count + w, 3 * count + edge]
-        )
-        size = 3 * count + facets.shape[1]
-        fixed = np.zeros(size, dtype=bool)
-        for c in range(2):
-            own = np.flatnonzero(known[:, c])
-            fixed[2 * facets[:, own] + 1 - c] = True
-            fixed[3 * count + own[np.abs(n[1 - c, own]) > ALONG]] = True
-            fixed[2 * count + facets[:, own[np.abs(t[1 - c, own]) > ALONG]]] = True
-        rows = (np.arange(4 * facets.shape[1])[:, None] + np.zeros(7, dtype=int)).ravel()
-        columns = np.repeat(unknown.T[:, None], 4, axis=1).ravel()
-        change = sp.csr_matrix((D.ravel(), (rows, columns)), (4 * facets.shape[1], size))
-        change = change[:, np.flatnonzero(~fixed)]
-        reduced = (change.T @ K @ change).tocsc()
-        reduced += sp.diags(TINY * reduced.diagonal(), format="csc")
-        solve = splu(
-            reduced, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-        return np.asarray(-(change @ solve.solve(change.T @ slope)))
-
-    def facet_energy(
+    def _energy(
         self, material: Material, missing: np.ndarray
-    ) -> tuple[sp.csr_matrix, np.ndarray]:
-        """Second and first derivatives of the energy of the stress by the moments of facets."""
-        d, count = self.dim, len(self.volume)
-        place = (self.opposite[:, None] * d + self.slots).reshape(-1, count)  # moment of each input
-        index = (place[..., None] * d + np.arange(d)).transpose(1, 0, 2).reshape(count, -1)
-        used, signs = index.shape[1], np.repeat(self.sign.T, d * d, axis=1)
-        size = self.mesh.facets.shape[1] * d * d
-        slope, K = np.zeros(size), sp.csr_matrix((size, size))
-        for own in self._blocks:
-            H, at, sign = self.metric(material, own), index[own], signs[own]
-            back = np.linalg.inv(self._map[own])
-            g = np.einsum("eij,ej->ei", H[:, :used], missing[own])
-            g = (g.reshape(len(g), -1, d) @ back).reshape(len(g), -1) * sign
-            slope += np.bincount(at.ravel(), g.ravel(), size)
-            H = H[:, :used, :used].reshape(len(H), used // d, d, used // d, d)
-            H = np.einsum("epiqj,eik,ejl->epkql", H, back, back, optimize=True)
-            H = H.reshape(-1, used, used) * sign[:, :, None] * sign[:, None]
-            place = np.repeat(at, used, axis=1).ravel(), np.tile(at, (1, used)).ravel()
-            K = K + sp.csr_matrix((H.ravel(), place), (size, size))
-        return K, slope
+    ) -> tuple[Callable[[np.ndarray], np.ndarray], np.ndarray]:
+        """Products with the second derivative of the energy by the moments of facets, and the first
+        derivative at `missing`.
+        """
+        metrics = [(own, self.metric(material, own)) for own in self.blocks]
+
+        def forces(data: np.ndarray) -> np.ndarray:
+            turned = [H @ data[own, :, None] for own, H in metrics]
+            return np.asarray(self.by_moments.T @ np.concatenate(turned).ravel())
+
+        def product(m: np.ndarray) -> np.ndarray:
+            return forces((self.by_moments @ m).reshape(missing.shape))
+
+        return product, forces(missing)
 
     def _tractions(
         self, stress: np.ndarray, force: np.ndarray, given: np.ndarray, balance: Balance

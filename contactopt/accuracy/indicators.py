@@ -11,8 +11,7 @@ import numpy as np
 from contactopt.accuracy.estimate import read
 from contactopt.accuracy.marking import spread
 from contactopt.coupling.reduction import Reduction
-from contactopt.derivatives.interface import sensitivity
-from contactopt.derivatives.states import Duals
+from contactopt.derivatives.states import duals_of
 from contactopt.errors import InputError
 from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
@@ -80,11 +79,7 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
         try:
             seeds = quantity.slopes(state)
-            by = {"reactions": seeds.reactions, "multipliers": seeds.multipliers}
-            dual = sensitivity(state.problem, state.solution).adjoint(
-                **by, displacements=seeds.slip
-            )
-            found = Duals(state, dual, seeds.bodies).fields
+            found = duals_of(state, seeds).fields
         except InputError as error:
             log.info("%s: no adjoint, %s", quantity.name, error)
     fields = displaced if found is None else found

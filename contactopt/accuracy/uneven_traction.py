@@ -91,7 +91,8 @@ def _least_energy(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray, materi
     place = mesh.facets[:, facets] == number[1]  # which of the facet's vertices is the second one
     for v in range(2):
         m[facets, v] = np.where(place[v][:, None], own[:, 1], own[:, 0])
-    K, _ = cells.facet_energy(material, cells.data(cells.seen(m), np.zeros(2)))
+    metric = cells.metric(material, slice(None))
+    K = (cells.by_moments.T @ sp.block_diag(metric, format="csr") @ cells.by_moments).tocsr()
     rows, columns, values = [], [], []
     for o, others in enumerate(cells.others):
         for a, slot in zip(others, cells.slots[o]):

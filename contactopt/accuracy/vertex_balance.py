@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 STEPS = 8  # of conjugate gradients: more make a stress in space no nearer
 
@@ -38,9 +38,9 @@ class Balance:
             out[chosen, c] = own.T @ solve(forces[:, c])
         return out
 
-    def least(self, K: sp.csr_matrix, slope: np.ndarray) -> np.ndarray:
-        """Moments m (facets dim dim,) that make no force, with m' K m / 2 + slope' m almost least:
-        a few steps of conjugate gradients.
+    def least(self, product: Callable[[np.ndarray], np.ndarray], slope: np.ndarray) -> np.ndarray:
+        """Moments m (facets dim dim,) that make no force, with m' K m / 2 + slope' m almost least,
+        from products with K: a few steps of conjugate gradients.
         """
 
         def kept(m: np.ndarray) -> np.ndarray:
@@ -52,7 +52,7 @@ class Balance:
         for _ in range(STEPS):
             if size == 0:
                 break
-            turned = kept(K @ way)
+            turned = kept(product(way))
             step = size / float(way @ turned)
             m, left = m + step * way, left - step * turned
             before, size = size, float(left @ left)
@@ -60,16 +60,37 @@ class Balance:
         return m
 
 
-def _inverse(balance: sp.csc_matrix) -> Any:
-    """The inverse of D D' for the balance D of elements by facets, where the equations of a vertex
-    that nothing holds have one that follows from the others.
+def _inverse(balance: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
+    """The inverse of D D' for the balance D of elements by facets, which is block diagonal, one
+    block for each vertex. The equations of a vertex that nothing holds have one that follows from
+    the others.
     """
-    D = (balance @ balance.T).tocsc()
+    D = (balance @ balance.T).tocoo()
     count, group = connected_components(D, directed=False)
     # where each facet at a vertex joins two elements, the sum of all equations is zero
     alone = np.abs(np.asarray(balance.sum(axis=0)).ravel())
     free = np.bincount(group, abs(balance) @ alone, count) == 0
-    first = np.unique(group, return_index=True)[1][free]
-    ground = np.zeros(D.shape[0])
-    ground[first] = 1.0
-    return splu(D + sp.diags(ground, format="csc"), permc_spec="MMD_AT_PLUS_A").solve
+    size, order = np.bincount(group), np.argsort(group, kind="stable")
+    first = np.cumsum(size) - size  # of each block in this order
+    slot = np.empty(len(group), dtype=int)
+    slot[order] = np.arange(len(group)) - first[group[order]]
+    blocks = []
+    for n in np.unique(size):
+        own = np.flatnonzero(size == n)
+        rows, number = order[first[own][:, None] + np.arange(n)], np.full(count, -1)
+        number[own] = np.arange(len(own))
+        entries = np.flatnonzero(size[group[D.row]] == n)
+        block = np.zeros((len(own), n, n))
+        block[number[group[D.row[entries]]], slot[D.row[entries]], slot[D.col[entries]]] = D.data[
+            entries
+        ]
+        block[free[own], 0, 0] += 1.0
+        blocks.append((rows, np.linalg.inv(block)))
+
+    def solve(forces: np.ndarray) -> np.ndarray:
+        out = np.empty(forces.shape)
+        for rows, inverse in blocks:
+            out[rows] = (inverse @ forces[rows][..., None])[..., 0]
+        return out
+
+    return solve

@@ -17,3 +17,7 @@ FIRST_RADIUS = 0.1
 # Linear systems solved by iteration (contactopt.derivatives.linear).
 # reduction of the residual by one round of GMRES, and by GMRES for the model of Q
 ROUND, INNER = 1e-4, 1e-6
+
+# unknowns up to which LU of all costs less than Cholesky's factors of those that stick, and what is
+# beside them
+WHOLE = 200

@@ -13,16 +13,13 @@ from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
 from contactopt.derivatives.linear import Tangent, transposed
 from contactopt.errors import InputError
-from contactopt.methods.kernels.alart_curnier import coulomb_equations
-from contactopt.methods.kernels.semismooth import Equations
 from contactopt.problem import (
     InterfaceProblem,
     Scales,
     Solution,
-    dimensionless,
     natural_map_residual,
 )
-from contactopt.problem.scaling import immovable
+from contactopt.problem.scaling import immovable, scales_of, without_rounding
 
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
 NEAR = 1e-6  # distance to a kink, over the largest force, within which a contact is weakly active
@@ -84,42 +81,32 @@ class Sensitivity:
     distance: float
 
     @cached_property
-    def _scaled(self) -> tuple[InterfaceProblem, Scales]:
-        return dimensionless(self.problem)
+    def _scales(self) -> Scales:
+        return scales_of(self.problem)
+
+    @cached_property
+    def _rho(self) -> np.ndarray:
+        """Steps (k,) of the natural map [force / length]."""
+        stiffest = self._scales.force / self._scales.length
+        return np.asarray(1 / np.maximum(self.problem.compliances, 1e-3 / stiffest))
 
     @cached_property
     def _point(self) -> np.ndarray:
         """y = r - rho u (k, dim) [force]."""
-        problem, r = self.problem, self.solution.reactions
-        u = problem.displacements(r, self.solution.multipliers)
+        r = self.solution.reactions
+        u = self.problem.displacements(r, self.solution.multipliers)
         return np.asarray(r - self._rho[:, None] * u)
 
     @cached_property
-    def _equations(self) -> Equations:
-        """Dimensionless."""
-        return coulomb_equations(self._scaled[0])
-
-    @property
-    def slopes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """D and D rho [force / length], (k, dim, dim), and P_mu (k, dim) [force]."""
-        D = self.tangent.D
-        by_parameter = np.broadcast_to(self._by_parameter, self._point.shape)
-        return D, D * (self._rho[:, None] * self._moves)[:, None, :], by_parameter
-
-    @property
-    def _rho(self) -> np.ndarray:
-        """(k,) [force / length]."""
-        scales = self._scaled[1]
-        return self._equations.rho * scales.force / scales.length
-
-    @cached_property
     def tangent(self) -> Tangent:
-        """The matrix M, dimensionless."""
-        D = self.problem.law.project(self._point)[1].copy()
-        D[~self.problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
+        """The matrix M."""
+        problem = self.problem
+        D = problem.law.project(self._point)[1].copy()
+        D[~problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
-        D = self._moves[:, :, None] * D
-        return Tangent(self._scaled[0], self._equations, D)
+        moves = ~immovable(problem).reshape(problem.q.shape)
+        D *= moves[:, :, None] & moves[:, None, :]
+        return Tangent(problem.Q, without_rounding(problem.V), self._rho, D, problem)
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:
@@ -135,7 +122,7 @@ class Sensitivity:
     def force(self) -> float:
         """The largest force, with which distances to kinks are compared."""
         sizes = np.linalg.norm(self.solution.reactions, axis=1)
-        return float(sizes.max(initial=0.0)) or self._scaled[1].force
+        return float(sizes.max(initial=0.0)) or self._scales.force
 
     @property
     def sentence(self) -> str:
@@ -145,12 +132,8 @@ class Sensitivity:
         return of_kinks("solution", names, near)
 
     @cached_property
-    def _moves(self) -> np.ndarray:
-        """1 where a component can move, else 0 (k, dim): there is no datum."""
-        return np.where(immovable(self.problem), 0.0, 1.0).reshape(self.problem.q.shape)
-
-    @cached_property
-    def _by_parameter(self) -> np.ndarray:
+    def by_parameter(self) -> np.ndarray:
+        """P_mu (k, dim) [force]."""
         return self.problem.law.project_by_parameter(self._point)
 
     def forward(
@@ -174,7 +157,10 @@ class Sensitivity:
             turned = _given("V", V, problem.V.shape)
             du += (turned @ lam).reshape(r.shape)
             ds += turned.T @ r.ravel()
-        dr, dlam = self._solve(du, dmu, ds)
+        error = -self.tangent.slope(du.ravel()).reshape(r.shape)
+        if dmu is not None:
+            error += self.by_parameter * dmu[:, None]
+        dr, dlam = self._step(error, -ds)
         if self.weak:
             direction = np.zeros(problem.contacts) if dmu is None else dmu
             extra = self.onesided.step(self._moved(dr, dlam, du), direction)
@@ -187,12 +173,10 @@ class Sensitivity:
         contacts = np.array([weak.contact for weak in self.weak], dtype=int)
 
         def response(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            dr, dlam = self._unscaled(
-                *self.tangent.solve(error.ravel() / self._scaled[1].force, 0 * self.problem.s)
-            )
+            dr, dlam = self._step(error, 0 * self.problem.s)
             return dr, dlam, self._moved(dr, dlam, 0 * dr)
 
-        by_parameter = self._by_parameter if np.any(self.problem.law.rough) else 0 * self._point
+        by_parameter = self.by_parameter if np.any(self.problem.law.rough) else 0 * self._point
         place = self.problem.law, self._point, contacts, self.tangent.D, by_parameter
         return Onesided(*place, self.distance * self.force, self.force, response)
 
@@ -207,55 +191,26 @@ class Sensitivity:
         `reactions` (k, dim) are df/dr, `multipliers` (p,) df/dlambda, and `displacements` (k, dim)
         df/du of u = Q r + V lambda + q. InputError as forward().
         """
-        problem, (_, scales) = self.problem, self._scaled
+        problem = self.problem
         by_r = _given("reactions", reactions, problem.q.shape)
         by_lam = _given("multipliers", multipliers, problem.s.shape)
         by_u = _given("displacements", displacements, problem.q.shape)
         if np.any(by_u):
             by_r = by_r + np.asarray(transposed(problem.Q) @ by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
-        scaled = (scales.force * by_r).ravel(), scales.multipliers * by_lam
-        z, b = self.tangent.solve_transposed(*scaled)
-        by_q = by_u - self._moves * z.reshape(by_u.shape) / scales.length
-        by_s = -b * scales.multipliers / (scales.force * scales.length)
+        z, b = self.tangent.solve_transposed(by_r.ravel(), by_lam)
 
         def by_parameter() -> np.ndarray:
-            a, P_mu = self.tangent.multipliers(scaled[0], z, b), self._by_parameter
-            return np.asarray(np.sum(P_mu * a.reshape(P_mu.shape), axis=1) / scales.force)
+            a = self.tangent.multipliers(by_r.ravel(), z, b).reshape(by_r.shape)
+            return np.asarray(np.sum(self.by_parameter * a, axis=1))
 
-        return Dual(by_q, by_s, self.solution.reactions, self.solution.multipliers, by_parameter)
+        r, lam = self.solution.reactions, self.solution.multipliers
+        return Dual(by_u - z.reshape(by_u.shape), -b, r, lam, by_parameter)
 
-    def _solve(
-        self, du: np.ndarray, dmu: np.ndarray | None, ds: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """dr and dlambda on the piece of P at which the solver ended."""
-        _, scales = self._scaled
-        slope = self.tangent.slope((self._moves * du).ravel() / scales.length)
-        error = -scales.force * slope.reshape(du.shape)
-        if dmu is not None:
-            error += self._by_parameter * dmu[:, None]
-        return self.step(error, -ds)
-
-    def step(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dr (k, dim), dlambda (p,) of M (dr, dlambda) = (error, balance), given in force."""
-        _, scales = self._scaled
-        right = balance * scales.multipliers / (scales.force * scales.length)
-        return self._unscaled(*self.tangent.solve(error.ravel() / scales.force, right))
-
-    def step_transposed(
-        self, by_reactions: np.ndarray, by_multipliers: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """a (k, dim) and b (p,) of M' (a, b) = (by_reactions, by_multipliers)."""
-        _, scales = self._scaled
-        right = (scales.force * by_reactions).ravel(), scales.multipliers * by_multipliers
-        z, b = self.tangent.solve_transposed(*right)
-        a = self.tangent.multipliers(right[0], z, b) / scales.force
-        return a.reshape(by_reactions.shape), b * scales.multipliers / (
-            scales.force * scales.length
-        )
-
-    def _unscaled(self, dr: np.ndarray, dlam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self._scaled[1].to_physical(dr.reshape(self.problem.q.shape), dlam)
+    def _step(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dr (k, dim), dlambda (p,) on the piece of P at which the solver ended."""
+        dr, dlam = self.tangent.solve(error.ravel(), balance)
+        return dr.reshape(error.shape), dlam
 
     def _moved(self, dr: np.ndarray, dlam: np.ndarray, du: np.ndarray) -> np.ndarray:
         """dy = dr - rho (Q dr + V dlambda + du), (k, dim) [force]."""
@@ -300,10 +255,14 @@ def sensitivity(
             f"only a certified solution has a derivative; this one is '{solution.status}' with the"
             f" residual {residual:.1e} on this problem: solve it with a smaller tol first."
         )
-    if distance is None:
-        distance = max(NEAR, ROUNDING * residual)
+    distance = told_apart(residual) if distance is None else distance
     check_number("distance", distance, low=0.0)
     return Sensitivity(problem, solution, distance)
+
+
+def told_apart(residual: float) -> float:
+    """The distance to a kink, over the largest force, below which a certificate tells no side."""
+    return max(NEAR, ROUNDING * residual)
 
 
 def _given(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:

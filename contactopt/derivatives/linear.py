@@ -11,15 +11,15 @@ commutes with I - D':
                                                                           b.
 
 Every form of Q has a function that makes the solution of such a system, the one of Newton's method
-where it has one (contactopt.methods.kernels); factors are made once. Iterative solves are repeated
-on what is left of the right side until it is small enough.
+where it has one (contactopt.methods.kernels); factors are made once. Components whose row of D is
+zero have dr = error and leave the system before. Iterative solves are repeated on what is left of
+the right side until it is small enough.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,30 +28,33 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from contactopt.derivatives.constants import INNER, ROUND
+from contactopt.derivatives.constants import INNER, ROUND, WHOLE
 from contactopt.errors import InputError
-from contactopt.linear.operators import Interface, InterfaceOperator
+from contactopt.linear.operators import Interface, InterfaceOperator, asymmetry
 from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, norm
-from contactopt.methods.constants import LOOSE
-from contactopt.methods.kernels.bonded import Bonded
+from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.bonded import LEAST_PIVOT
 from contactopt.methods.kernels.coupled_newton import Coupled, fitted
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
-from contactopt.methods.kernels.semismooth import Equations
-from contactopt.problem import InterfaceProblem
+from contactopt.methods.kernels.sparse_blocks import assembled
+from contactopt.problem import InterfaceProblem, dimensionless
 
 SINGULAR = 1e-13  # reciprocal condition of a matrix below which it counts as singular
 UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
 ACCURACY = 1e-11  # relative residual of an iterative solve
 ROUNDS = 12  # of GMRES, which gain four digits each
+SYMMETRIC = 1e-12  # |Q - Q'| / |Q| up to which Q counts as symmetric
 UNIQUE = (
     "the solution has no derivative, because its linear system is singular: forces or motions are"
     " not unique there; remove redundant contacts, or hold the bodies."
 )
 
-# error (k d,), balance (p,) -> dr (k d,), dlambda (p,)
+# error (k d,) or (k d, j), balance (p,) or (p, j) -> dr and dlambda of these shapes
 Solve = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+Inverse = Callable[[np.ndarray], np.ndarray]
+Border = tuple[np.ndarray, np.ndarray]  # columns (m, p) and rows (p, m) of the multipliers
 
 
 def transposed(Q: Interface) -> Interface:
@@ -61,30 +64,45 @@ def transposed(Q: Interface) -> Interface:
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """M at a solution of a dimensionless problem.
+    """M at a solution, in the units of its problem.
 
-    equations  of that problem, with the steps rho (k,) of the natural map; in the transposed system
-               with Q'
-    D          (k, d, d) derivative of the map P
-    adjoint    whether the right sides are those of an adjoint: then a singular system counts as
-               solved where they do not see what is undetermined
+    Q, V     of the problem; in the transposed system Q'
+    rho      (k,) steps of the natural map [force / length]
+    D        (k, d, d) derivative of the map P
+    problem  needed where Q is known by its products
+    adjoint  whether the right sides are those of an adjoint: then a singular system counts as
+             solved where they do not see what is undetermined
     """
 
-    problem: InterfaceProblem
-    equations: Equations
+    Q: Interface
+    V: np.ndarray
+    rho: np.ndarray
     D: np.ndarray
+    problem: InterfaceProblem | None = None
     adjoint: bool = False
 
+    @cached_property
+    def scaled(self) -> np.ndarray:
+        """D rho (k, d, d)."""
+        return np.asarray(self.rho[:, None, None] * self.D)
+
     def slope(self, moved: np.ndarray) -> np.ndarray:
-        """D rho moved, (k d,)."""
-        blocks = moved.reshape(self.D.shape[:2])
-        return np.asarray(np.einsum("kab,k,kb->ka", self.D, self.equations.rho, blocks).ravel())
+        """D rho moved, (k d,) or (k d, j)."""
+        return _times(self.scaled, moved)
+
+    def rows(self, unknowns: np.ndarray) -> np.ndarray:
+        """Rows (m, k d) of I - D + D rho Q with an array Q."""
+        (k, d), n = self.D.shape[:2], self.D.shape[0] * self.D.shape[1]
+        own, place = np.unique(unknowns // d, return_inverse=True)
+        blocks = self.scaled[own] @ self.Q.reshape(k, d, n)[own]
+        blocks.reshape(-1, d, k, d)[np.arange(len(own)), :, own] += np.eye(d) - self.D[own]
+        return blocks[place, unknowns % d]
 
     @cached_property
     def transposed(self) -> Tangent:
         """The system for z and b of this module's head."""
-        equations = replace(self.equations, Q=transposed(self.equations.Q))
-        return Tangent(self.problem, equations, self.D.transpose(0, 2, 1), True)
+        D = self.D.transpose(0, 2, 1)
+        return replace(self, Q=transposed(self.Q), D=D, adjoint=True)
 
     def solve_transposed(
         self, by_r: np.ndarray, by_multipliers: np.ndarray
@@ -94,81 +112,102 @@ class Tangent:
 
     def multipliers(self, by_r: np.ndarray, z: np.ndarray, b: np.ndarray) -> np.ndarray:
         """a (k d,), for what solve_transposed returned; one product with Q'."""
-        given, rho = self.equations, np.repeat(self.equations.rho, self.D.shape[1])
-        return np.asarray(z / rho + by_r - transposed(given.Q) @ z - given.V @ b)
-
-    @cached_property
-    def closed(self) -> np.ndarray:
-        """Numbers of the unknowns of contacts that are not open."""
-        return np.flatnonzero(np.repeat(np.any(self.D != 0, axis=(1, 2)), self.D.shape[1]))
+        rho = np.repeat(self.rho, self.D.shape[1]).reshape(-1, *(1,) * (z.ndim - 1))
+        return np.asarray(z / rho + by_r - transposed(self.Q) @ z - self.V @ b)
 
     @cached_property
     def solve(self) -> Solve:
         """The solver of M (dr, dlambda) = (error, balance); InputError where M is singular."""
-        Q = self.equations.Q
-        if not len(self.closed) + self.equations.V.shape[1]:
+        if not np.any(self.D) and not self.V.shape[1]:
             return lambda error, balance: (error, balance)
-        if isinstance(Q, InterfaceOperator):
-            return _by_products(self) if Q.coupled is None else _with_bodies(self, Q.coupled)
-        if sp.issparse(Q):
-            return _closed_alone(self, _sparse_factors)
-        loose = np.any(np.eye(self.D.shape[1]) != self.D, axis=(1, 2))
-        if loose.sum() <= LOOSE * len(loose):
-            with suppress(la.LinAlgError):  # a Q that is not symmetric or not definite
-                return _stuck(self)
-        return _closed_alone(self, _dense_factors)
+        return _by_iteration(self) if isinstance(self.Q, InterfaceOperator) else _by_factors(self)
 
 
-def _stuck(tangent: Tangent) -> Solve:
-    """By the bonded system, one Cholesky factorisation, where most contacts stick."""
-    rho, shape = tangent.equations.rho, tangent.equations.q.shape
-    bonded = Bonded(tangent.equations.Q, tangent.equations.V)
+def _by_factors(tangent: Tangent) -> Solve:
+    """By factors of the rows of D that are not zero."""
+    Q, D, rho = tangent.Q, tangent.D, float(tangent.rho.mean())
+    kept = np.any(D != 0, axis=2).ravel()
+    rows, size = np.flatnonzero(kept), np.linalg.norm(tangent.V, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    V = tangent.V / size  # the multipliers then are forces, like all other unknowns
+    border = tangent.slope(V)[rows] / rho, V[rows].T
+    inverse = (_sparse_factors if sp.issparse(Q) else _dense_factors)(tangent, kept, border)
 
     def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        dr, multipliers = bonded.step(rho, error.reshape(shape), -balance, tangent.D)
-        return dr.ravel(), multipliers
-
-    return solve
-
-
-def _closed_alone(
-    tangent: Tangent, factors: Callable[[Tangent], Callable[[np.ndarray], np.ndarray]]
-) -> Solve:
-    """By factors of the system without open contacts, whose rows are those of 1."""
-    Q, V, closed, n = tangent.equations.Q, tangent.equations.V, tangent.closed, len(tangent.closed)
-    inverse = factors(tangent)
-
-    def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        dr = error.copy()
-        dr[closed] = 0.0
-        right = np.concatenate([error[closed], balance - V.T @ dr])
+        dr, scale = error.copy(), size.reshape(-1, *(1,) * (error.ndim - 1))
+        dr[rows] = 0.0
+        right = error[rows], balance / scale
         if np.any(dr):
-            right[:n] -= tangent.slope(Q @ dr)[closed]
-        x = inverse(right)
-        dr[closed] = x[:n]
-        return dr, x[n:]
+            moved = tangent.slope(Q @ dr) - _times(D, dr)
+            right = right[0] - moved[rows], right[1] - V.T @ dr
+        x = inverse(np.concatenate(right))
+        dr[rows] = x[: len(rows)]
+        return dr, x[len(rows) :] / (rho * scale)
 
     return solve
 
 
-def _dense_factors(tangent: Tangent) -> Callable[[np.ndarray], np.ndarray]:
-    closed, d, V = tangent.closed, tangent.D.shape[1], tangent.equations.V
-    n, p = len(closed), V.shape[1]
-    Q, D = tangent.equations.Q, tangent.D[closed[::d] // d]
-    Q = Q if n == len(Q) else Q[np.ix_(closed, closed)]
-    scaled = tangent.equations.rho[closed[::d] // d, None, None] * D
-    K = np.zeros((n + p, n + p))
-    K[:n, :n] = (scaled @ Q.reshape(n // d, d, n)).reshape(n, n)
-    K[:n, n:] = (scaled @ V[closed].reshape(n // d, d, p)).reshape(n, p)
-    K[n:, :n] = V[closed].T
-    i = np.arange(n // d)
-    K[:n, :n].reshape(len(i), d, len(i), d)[i, :, i, :] += np.eye(d) - D
+def _times(blocks: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The product of diagonal blocks (k, d, d) with x, (k d,) or (k d, j)."""
+    return np.asarray((blocks @ x.reshape(*blocks.shape[:2], -1)).reshape(x.shape))
+
+
+def _dense_factors(tangent: Tangent, kept: np.ndarray, border: Border) -> Inverse:
+    """By Cholesky's factors of Q where components stick, and LU of what is left of the others; by
+    LU of all if they are few, or Q is not symmetric and definite.
+
+    Rows of the unit matrix in D mean Q dr + V dlambda = error / rho; with x these dr and z all
+    other unknowns the system is [[Q, B], [C, E]] (x, z) = (error / rho, rest), so that
+
+        (E - C Q^-1 B) z = rest - C Q^-1 error / rho,   x = Q^-1 (error / rho - B z).
+    """
+    d, V = tangent.D.shape[1], border[1].T
+    p, rest = V.shape[1], np.eye(d) - tangent.D
+    stick = kept & np.all(rest == 0, axis=2).ravel()
+    factor = None if kept.sum() <= WHOLE else _cholesky(tangent.Q[stick][:, stick])
+    if factor is None:
+        A = assembled(tangent.Q, tangent.scaled, rest, kept)
+        return _square(np.block([[A, border[0]], [border[1], np.zeros((p, p))]]), tangent.adjoint)
+    loose, rho = np.flatnonzero(kept & ~stick), np.repeat(tangent.rho, d)[stick, None]
+    own, rows = stick[kept], tangent.rows(loose)
+    C = np.concatenate([rows[:, stick], V[own].T])
+    E = np.block([[rows[:, loose], border[0][~own]], [V[~own].T, np.zeros((p, p))]])
+    B = np.concatenate([tangent.Q[np.ix_(stick, loose)], border[0][own] / rho], axis=1)
+    X = la.cho_solve(factor, B, check_finite=False)
+    inverse, first = _square(E - C @ X, tangent.adjoint), np.append(own, np.zeros(p, bool))
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        sides = right.reshape(len(right), -1)
+        x, y = np.empty(sides.shape), la.cho_solve(factor, sides[first] / rho, check_finite=False)
+        x[~first] = z = inverse(sides[~first] - C @ y)
+        x[first] = y - X @ z
+        return x.reshape(right.shape)
+
+    return solve
+
+
+def _cholesky(Q: np.ndarray) -> tuple[np.ndarray, bool] | None:
+    """The factors of Q; None if it is not symmetric and safely positive definite."""
+    if not len(Q) or asymmetry(Q) > SYMMETRIC:
+        return None
+    try:
+        factor = la.cho_factor(Q, lower=True, overwrite_a=True, check_finite=False)
+    except la.LinAlgError:
+        return None
+    pivots = factor[0].diagonal()
+    return factor if pivots.min() > LEAST_PIVOT * pivots.max() else None
+
+
+def _square(K: np.ndarray, adjoint: bool) -> Inverse:
+    """The inverse of a matrix by LU; of a singular one, for an adjoint that does not see it."""
+    if not len(K):
+        return lambda right: right
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", la.LinAlgWarning)
         factors = la.lu_factor(K.T, check_finite=False)
     if la.lapack.dgecon(factors[0], np.linalg.norm(K, np.inf))[0] > SINGULAR:
         return lambda right: np.asarray(la.lu_solve(factors, right, trans=1, check_finite=False))
-    if not tangent.adjoint:
+    if not adjoint:
         # forces have no derivative, whatever one that an adjoint asks for may have
         raise InputError(UNIQUE)
 
@@ -181,15 +220,14 @@ def _dense_factors(tangent: Tangent) -> Callable[[np.ndarray], np.ndarray]:
     return consistent
 
 
-def _sparse_factors(tangent: Tangent) -> Callable[[np.ndarray], np.ndarray]:
+def _sparse_factors(tangent: Tangent, kept: np.ndarray, border: Border) -> Inverse:
     """Many bodies of which each touches few others."""
-    equations, closed, (k, d) = tangent.equations, tangent.closed, tangent.D.shape[:2]
-    V, p = sp.csr_array(equations.V), equations.V.shape[1]
-    places = np.arange(k), np.arange(k + 1)
-    scaled = sp.bsr_array((equations.rho[:, None, None] * tangent.D, *places)).tocsr()
+    k, d = tangent.D.shape[:2]
+    places, p = (np.arange(k), np.arange(k + 1)), len(border[1])
+    scaled = sp.bsr_array((tangent.scaled, *places)).tocsr()
     rest = sp.bsr_array((np.eye(d) - tangent.D, *places)).tocsr()
-    rows = (scaled @ equations.Q + rest)[closed][:, closed]
-    border = (scaled @ V)[closed], V[closed].T
+    rows = (scaled @ tangent.Q + rest)[kept][:, kept]
+    border = sp.csr_array(border[0]), sp.csr_array(border[1])
     K = sp.block_array([[rows, border[0]], [border[1], sp.csr_array((p, p))]], format="csc")
     try:
         factors = splu(K)
@@ -201,11 +239,28 @@ def _sparse_factors(tangent: Tangent) -> Callable[[np.ndarray], np.ndarray]:
     return lambda right: np.asarray(factors.solve(right))
 
 
-def _by_products(tangent: Tangent) -> Solve:
+def _by_iteration(tangent: Tangent) -> Solve:
+    """In the dimensionless problem, where the methods know the sizes of things."""
+    if tangent.problem is None:
+        raise TypeError("a tangent whose Q is an operator needs its problem")
+    scaled, scales = dimensionless(tangent.problem)
+    rho, form = tangent.rho * scales.length / scales.force, scaled.Q.coupled
+    linearised = Linearised(replace(coulomb_equations(scaled), rho=rho), tangent.D)
+    inner = (
+        _by_products(scaled, linearised) if form is None else _with_bodies(scaled, linearised, form)
+    )
+
+    def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        unit = scales.multipliers / (scales.force * scales.length)
+        return scales.to_physical(*inner(error / scales.force, balance * unit))
+
+    return solve
+
+
+def _by_products(problem: InterfaceProblem, linearised: Linearised) -> Solve:
     """By products with Q: GMRES, preconditioned by the system with the model of Q."""
-    linearised = Linearised(tangent.equations, tangent.D)
-    inverse = linearised.inverse(model_of(tangent.problem), INNER)
-    Q, V = tangent.equations.Q, tangent.equations.V
+    inverse = linearised.inverse(model_of(problem), INNER)
+    Q, V = problem.Q, problem.V
 
     def product(x: Stacked) -> Stacked:
         dr, multipliers = x.parts
@@ -222,12 +277,10 @@ def _by_products(tangent: Tangent) -> Solve:
     return solve
 
 
-def _with_bodies(tangent: Tangent, form: CoupledForm) -> Solve:
+def _with_bodies(problem: InterfaceProblem, linearised: Linearised, form: CoupledForm) -> Solve:
     """With the equilibrium of the bodies beside the contacts, without products with Q."""
-    equations = tangent.equations
-    P = fitted(model_of(tangent.problem, deflate=False), form, equations.V)
-    coupled, linearised = Coupled(equations, form, P), Linearised(equations, tangent.D)
-    none = form.pulled(np.zeros(tangent.D.shape[0] * tangent.D.shape[1]))
+    P = fitted(model_of(problem, deflate=False), form, problem.V)
+    coupled, none = Coupled(linearised.equations, form, P), form.pulled(np.zeros(problem.q.size))
 
     def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         right = Stacked((*none.parts, error, balance))

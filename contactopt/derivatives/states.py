@@ -162,6 +162,13 @@ class Duals:
         return tuple(body.displacement(G, own) - body.at_rest for body, G, own in parts)
 
 
+def duals_of(state: State, seeds: Seeds) -> Duals:
+    """The adjoint of a function of one state whose slip does not change; InputError without one."""
+    by = {"reactions": seeds.reactions, "multipliers": seeds.multipliers}
+    at = sensitivity(state.problem, state.solution)
+    return Duals(state, at.adjoint(**by, displacements=seeds.slip), seeds.bodies)
+
+
 @dataclass(frozen=True, eq=False)
 class Chain:
     """The states of a load path in their order; a scene without a path is a chain of one."""

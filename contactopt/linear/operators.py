@@ -6,7 +6,7 @@ the entries, one product for each interface unknown, ask for `dense(Q)`.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from typing import Any, TypeAlias
 
@@ -207,9 +207,16 @@ def asymmetry(Q: Interface) -> float:
     """max |Q - Q'| / max |Q|, which is 0 for an operator by definition."""
     if isinstance(Q, InterfaceOperator):
         return 0.0
-    whole, skew = (Q.data, (Q - Q.T).data) if sp.issparse(Q) else (Q, Q - Q.T)
-    size = float(np.abs(whole).max(initial=0.0))
-    return float(np.abs(skew).max(initial=0.0)) / size if size > 0 else 0.0
+    skew: Iterable[np.ndarray]
+    if sp.issparse(Q):
+        whole, skew = [Q.data], [(Q - Q.T).data]
+    else:  # by strips, which stay in the processor's memory
+        strips = range(0, len(Q), COLUMNS)
+        whole = [Q[i : i + COLUMNS] for i in strips]
+        skew = (rows[:, i:] - Q[i:, i : i + COLUMNS].T for i, rows in zip(strips, whole))
+    size = max((float(np.abs(part).max(initial=0.0)) for part in whole), default=0.0)
+    worst = max((float(np.abs(part).max(initial=0.0)) for part in skew), default=0.0)
+    return worst / size if size > 0 else 0.0
 
 
 def held(Q: Interface) -> np.ndarray:

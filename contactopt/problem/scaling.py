@@ -113,19 +113,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     -------
     The dimensionless problem, and the Scales that take its reactions and multipliers back.
     """
-    d, V = diagonal(problem.Q), without_rounding(problem.V)
-    columns = np.linalg.norm(V, axis=0)
-    total = np.abs(V).sum(axis=0)
-    resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
-    balanced = float(resultant.max(initial=0.0))
-    if np.any(d > 0):
-        compliance = float(np.mean(d[d > 0]))
-    else:  # rigid bodies: only gaps have a length
-        compliance = (float(np.abs(problem.q).max(initial=0.0)) or 1.0) / (balanced or 1.0)
-    force = balanced or _closing(problem) / compliance or 1.0
-    length = force * compliance
-    columns = np.where(columns > 0, columns, 1.0)
-    held = immovable(problem)
+    scales, held = scales_of(problem), immovable(problem)
+    compliance, columns = scales.length / scales.force, scales.length / scales.multipliers
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, held.astype(float))
@@ -139,12 +128,28 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         Q[held, held] = 1.0
     scaled = problem.altered(
         Q=Q,
-        q=problem.q / length,
-        V=V / columns,
-        s=problem.s / (columns * force),
-        law=problem.law.scaled(force),
+        q=problem.q / scales.length,
+        V=without_rounding(problem.V) / columns,
+        s=problem.s / (columns * scales.force),
+        law=problem.law.scaled(scales.force),
     )
-    return scaled, Scales(force, length, length / columns)
+    return scaled, scales
+
+
+def scales_of(problem: InterfaceProblem) -> Scales:
+    """The units in which `dimensionless` writes a problem."""
+    d, V = diagonal(problem.Q), without_rounding(problem.V)
+    columns = np.linalg.norm(V, axis=0)
+    total = np.abs(V).sum(axis=0)
+    resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
+    balanced = float(resultant.max(initial=0.0))
+    if np.any(d > 0):
+        compliance = float(np.mean(d[d > 0]))
+    else:  # rigid bodies: only gaps have a length
+        compliance = (float(np.abs(problem.q).max(initial=0.0)) or 1.0) / (balanced or 1.0)
+    force = balanced or _closing(problem) / compliance or 1.0
+    length = force * compliance
+    return Scales(force, length, length / np.where(columns > 0, columns, 1.0))
 
 
 def without_rounding(V: np.ndarray) -> np.ndarray:

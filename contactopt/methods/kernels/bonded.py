@@ -16,6 +16,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
+from contactopt.linear.operators import asymmetry
+
 # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
 LEAST_PIVOT = 1e-7
 
@@ -26,7 +28,7 @@ class Bonded:
     def __init__(self, Q: np.ndarray, V: np.ndarray):
         """Raises LinAlgError if Q is not symmetric or not safely positive definite."""
         n = len(Q)
-        if np.abs(Q - Q.T).max(initial=0.0) > 1e-12 * np.abs(Q).max(initial=0.0):
+        if asymmetry(Q) > 1e-12:
             raise la.LinAlgError("Q is not symmetric")
         self.factor = la.cho_factor(Q, lower=True, check_finite=False)
         diagonal = np.diag(self.factor[0])

@@ -47,13 +47,13 @@ def assembled(
     used = kept.reshape(k, d).any(axis=1)
     if not used.all():  # only their contacts, then only their components
         rows = np.flatnonzero(np.repeat(used, d))
-        Q, added, kept = Q[np.ix_(rows, rows)], added[used], kept[rows]
+        Q, added, kept = Q[rows][:, rows], added[used], kept[rows]
         left, k = None if left is None else left[used], len(added)
     n = k * d
     A = Q.copy() if left is None else (left @ Q.reshape(k, d, n)).reshape(n, n)
     own = np.arange(k)
     A.reshape(k, d, k, d)[own, :, own, :] += added
-    return A if kept.all() else A[np.ix_(kept, kept)]
+    return A if kept.all() else A[kept][:, kept]
 
 
 def factorised(A: np.ndarray) -> Solver | None:
