@@ -2,8 +2,8 @@
 whose edge is rounded by a fillet of 10 mm, on an aluminium block of diameter 200 mm and height
 200 mm, under 100 MPa on its top (Konter 2006, Advanced Finite Element Contact Benchmarks, NAFEMS).
 
-Here it is without friction, and rests on a base without friction. Contact ends a little beyond the flat, and
-the pressure is largest next to there: the lengths of elements grow from there on.
+Here it is without friction, and rests on a base without friction. Contact ends a little beyond the
+flat, and the pressure is largest next to there: the lengths of elements grow from there on.
 """
 
 from __future__ import annotations

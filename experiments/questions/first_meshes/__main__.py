@@ -1,9 +1,10 @@
 """Does the answer depend on the first mesh, and is its claimed error true? Five parts by Gmsh, six
 first meshes each.
 
-    python -m experiments.questions.first_meshes [quick] [PART ...]
+    python -m experiments.questions.first_meshes [PART ...]
 
-The meshes know neither where the parts touch nor their shape: curved boundaries are chords, or
+With the names of parts, these are measured alone, and the report keeps the rows of the others. The
+meshes know neither where the parts touch nor their shape: curved boundaries are chords, or
 edges of second order, without a `curve`. References are made in another way: Lame's formulas, a
 half-plane without a mesh, or a mesh that Gmsh makes fine.
 """
@@ -33,11 +34,12 @@ from experiments.questions.first_meshes.parts import (
     press_fit,
     punch,
 )
-from experiments.report import write
+from experiments.report import merged, save, stored, write
 
 TARGET, SECONDS = 0.02, 60.0  # accuracy asked for, and time for one search
 SURE = 1e-3  # least relative error of a reference
-EFFECTIVE = 0.5, 3.0
+EFFECTIVE = 0.5, 4.0
+NAME, TABLE, KEYS = "first_meshes", "searches", ("part", "quantity", "first mesh", "refined")
 
 
 MESHES = [
@@ -91,14 +93,14 @@ CASES = {
 }
 
 
-def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dict[str, Any]]:
+def rows_of(name: str) -> list[dict[str, Any]]:
     """All searches of one part."""
     case, rows = CASES[name], []
     truth, slacks = case.reference()
-    for first in meshes:
+    for first in MESHES:
         for quantity in case.quantities:
             slack = slacks[quantity]
-            for adaptive in modes:
+            for adaptive in (True, False):
                 begin = time.process_time()
                 row = {"part": name, "quantity": quantity, "first mesh": first.name,
                        "refined": "locally" if adaptive else "everywhere"}  # fmt: skip
@@ -137,14 +139,15 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
     return rows
 
 
-def main(arguments: list[str]) -> None:
-    quick = "quick" in arguments
-    chosen = [name for name in arguments if name in CASES] or list(CASES)
-    meshes = MESHES[::3] if quick else MESHES
-    rows = [
-        row for name in chosen for row in rows_of(name, meshes, (True,) if quick else (True, False))
-    ]
-    done = [row for row in rows if "value" in row]
+def main(chosen: list[str]) -> None:
+    for name in chosen:
+        save(NAME, TABLE, merged(NAME, TABLE, rows_of(name), KEYS))
+    report(stored(NAME, TABLE))
+
+
+def report(rows: list[dict[str, Any]]) -> None:
+    rows = [row | {key: row[key] == "True" for key in ("reached", "within")} for row in rows]
+    done = [row for row in rows if row["value"] != ""]
     reached = [row for row in done if row["reached"]]
     # smaller errors are luck, or the reference's
     sized = [row for row in reached if row["true error"] > TARGET / 20]
@@ -177,22 +180,14 @@ smaller than about u. Searches that go so far say that no mesh bounds it. Their 
 infinite, and counts as agreeing. The reference of the dovetail, whose elements are about as large
 as u there, does not show this.
 
-Each search asked for {TARGET:g} within {SECONDS:g}
-s{", of two first meshes (`quick`)" if quick else ""}. The meshes know neither where the parts touch
+Each search asked for {TARGET:g} within {SECONDS:g} s. The meshes know neither where the parts touch
 nor their shape. A reference is Lame's formula, a half-plane of 8,192 points, or a mesh that Gmsh
 makes fine; its error is then its difference from one that is twice as coarse.
 
 {{searches}}
 """
-    head = list(max(rows, key=len))
-    write(
-        "first_meshes",
-        "First meshes",
-        text,
-        {"searches": [{key: row.get(key, "") for key in head} for row in rows]},
-        {},
-    )
+    write(NAME, "First meshes", text, {TABLE: rows}, {})
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main(sys.argv[1:] or list(CASES))
