@@ -154,6 +154,10 @@ def main(names: list[str]) -> None:
     report(stored(NAME, TABLE))
 
 
+def told(row: dict[str, Any]) -> str:
+    return f"{row['part']}, {row['quantity']}, {row['first mesh']}, {row['refined']}"
+
+
 def report(rows: list[dict[str, Any]]) -> None:
     rows = [row | {key: row[key] == "True" for key in ("reached", "within")} for row in rows]
     done = [row for row in rows if row["value"] != ""]
@@ -162,26 +166,29 @@ def report(rows: list[dict[str, Any]]) -> None:
     sized = [
         row for row in reached if row["true error"] > max(TARGET / 20, row["of the reference"])
     ]
-    good = sum(EFFECTIVE[0] <= row["effectivity"] <= EFFECTIVE[1] for row in sized)
-    missed = [
-        f"{row['part']}, {row['quantity']}, {row['first mesh']}"
-        for row in done
-        if not row["within"]
-    ]
-    refused = [
-        f"{row['part']}, {row['quantity']}, {row['first mesh']}: {row['said']}"
-        for row in rows
-        if row["said"]
-    ]
+    small = [row for row in sized if row["effectivity"] < EFFECTIVE[0]]
+    large = [row for row in sized if row["effectivity"] > EFFECTIVE[1]]
+    good = len(sized) - len(small) - len(large)
+    missed = [told(row) for row in done if not row["within"]]
+    refused = [f"{told(row)}: {row['said']}" for row in rows if row["said"]]
     text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that
 agrees with the reference within their claimed error. {len(reached)} of them reached the
 target, {sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed
 error over the true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)}
 searches that reached the target with a true error above {TARGET / 20:g} and above that of the
 reference. Smaller true errors are luck, or those of the reference.
+Less is claimed of {"; ".join(map(told, small)) or "none"}. More is claimed of
+{"; ".join(map(told, large)) or "none"}.
 
 Outside their claims are: {"; ".join(missed) or "none"}. No answer came from:
 {"; ".join(refused) or "none"}.
+
+Energies are claimed too small where few meshes show an order that they do not keep. In the lug
+three of them fall with order 3 and pass the limit. The energy of the pin in the bush falls with an
+order below 1 on even meshes, and a search that refines locally ends after two of them, because the
+target is far above what it claims. Claims are too large where they hold what the value changed on
+the last mesh, or the scatter of its reading. The largest stress of the lug is at the edge of
+contact, where its reading is uncertain on every mesh, also on that of the reference.
 
 The pressure of the dovetail has no limit in the linearised model. Where the flank meets the
 rounding, the curvature of the surface jumps. The normals there turn, and a blade that slides by u
