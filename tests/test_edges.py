@@ -38,6 +38,22 @@ def test_edges_of_exact_tractions_in_a_line(c):
     assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=1e-9)
 
 
+@pytest.mark.parametrize("c", [0.613, 0.8])
+def test_forces_on_a_graded_line_act_beside_its_nodes(c):
+    """Each is the integral of the traction times a hat, whose centroid is not at the node."""
+    x = np.concatenate([[0.0], np.cumsum(0.02 * 1.06 ** np.arange(26.0))])
+    x = np.concatenate([-x[:0:-1], x])
+    fine = np.linspace(x[0], x[-1], 400_001)
+    hats = np.array([np.interp(fine, x, unit) for unit in np.eye(len(x))])
+    step = fine[1] - fine[0]
+    areas = hats.sum(axis=1) * step
+    scene, problem = contact(x[None], "plane-strain", areas)
+    forces = np.array(cattaneo(np.abs(fine), 1.0, c)) @ hats.T * step
+    r = np.stack([forces[0], -forces[1]], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(1.0, rel=5e-3)  # .06 elements
+    assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=2e-3)
+
+
 @pytest.mark.parametrize("a", [0.987, 1.0, 1.013])
 @pytest.mark.parametrize(
     "pressure, off",

@@ -11,6 +11,10 @@ nodes next to it. The values an element further hardly do. The lines therefore l
 nodes out: what they read then falls smoothly with the element size, as the estimate of an error
 needs it.
 
+The force of a node is a mean of the traction around it, weighted by the shape function of the node.
+Divided by the nodal area, it is the traction where that function has its centroid. In a graded mesh
+of linear elements this is beside the node, by a share of the element size.
+
 A zone is read at each of its ends (contactopt.readings.patches), wherever it lies on the contact
 surface. Its half-width is that of the strip, or the radius of the disc, with the same area. Where
 an end cannot be read, the nodal areas are counted.
@@ -90,6 +94,7 @@ def contact_zone(
     pressure = reactions[:, 0] / problem.areas
 
     def read(end: End) -> Read | None:
+        end = _at_centroids(end, scene)
         line = end.inner(pressure, SMOOTH)
         line = None if line is None else end.clip(line)
         if problem.dim == 2 and end.free:
@@ -134,6 +139,7 @@ def stick_edge(
 
     def read(end: End) -> Read | None:
         if status.open[end.contact].any():  # contact ends by itself beyond the stick zone
+            end = _at_centroids(end, scene)
             edge = end.inner(slack / problem.areas, SMOOTH)
             if edge is None:
                 return None
@@ -187,6 +193,20 @@ def _half_width(
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
+
+
+def _at_centroids(end: End, scene: Scene) -> End:
+    """The end with every contact on a line where the shape function of its node has its centroid.
+
+    That of a linear function between elements of lengths l and m is (m - l) / 3 beyond the node.
+    Quadratic functions have theirs at the nodes.
+    """
+    if scene.degree != 1 or scene.dim == 3:
+        return end
+    order = np.argsort(end.distance)
+    steps, centroids = np.diff(end.distance[order]), end.distance.copy()
+    centroids[order[1:-1]] += np.diff(steps) / 3
+    return replace(end, distance=centroids)
 
 
 def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:

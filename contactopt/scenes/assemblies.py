@@ -24,6 +24,7 @@ from contactopt.scenes.scene import BodyForce, Part, Rigid, Scene, Support
 STEEL = Material(E=210e3, nu=0.3)  # MPa
 STONE = Material(E=30e3, nu=0.2)
 LARGE = 30.0  # infinite plate: its outer radius over that of the hole
+FLAT = 0.75  # height of the elements of a press fit over their length: it varies along the radius
 # thickness over mean radius below which a half circle of stones cannot bear its own weight
 THINNEST = 0.1075
 
@@ -103,7 +104,7 @@ def press_fit(
     shaft: Material = STEEL,
     hub: Material = STEEL,
     mu: float = 0.15,
-    elements: int = 16,
+    elements: int = 14,
 ) -> Scene:
     """A hollow shaft pressed into a hub whose hole is too narrow.
 
@@ -158,17 +159,19 @@ def _layer(
     """A quarter of a ring, or with a height the section of a hollow cylinder."""
     inner, outer = radii
     if height is None:
-        return rename(_sector(inner, outer, np.pi / 2, elements), contact=touching)
+        return rename(_sector(inner, outer, np.pi / 2, elements, FLAT), contact=touching)
     count = max(1, round((outer - inner) * elements / height))
     grids = np.linspace(inner, outer, count + 1), np.linspace(0, height, elements + 1)
     side = "x+" if touching == "outer" else "x-"
     return rename(tensor_mesh(*grids), start="y-", end="y+", contact=side)
 
 
-def _sector(inner: float, outer: float, sweep: float, parts: int) -> Any:
-    """A sector of a ring that ends upright, of about square elements, `parts` of them around."""
+def _sector(inner: float, outer: float, sweep: float, parts: int, height: float = 1.0) -> Any:
+    """A sector of a ring that ends upright, `parts` elements around, of a height over their length
+    of about `height`.
+    """
     angles = np.linspace(np.pi / 2 - sweep, np.pi / 2, parts + 1)
-    return ring(even(inner, outer, round(parts * np.pi / sweep)), angles)
+    return ring(even(inner, outer, round(parts * np.pi / sweep / height)), angles)
 
 
 @explained

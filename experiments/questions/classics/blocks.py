@@ -8,6 +8,7 @@ module differ between the two ways in the growth of their elements away from con
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from contactopt.material import Material
 from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part, Rigid, Scene, Support, Traction
 
 UNIT = Material(1.0, 0.3)
@@ -48,6 +50,32 @@ def indented(
 
     indenter = Rigid(name, (0.0, 1.0), lambda x: profile(x[0]), {_up(kind): -force})
     return _on_base(name, kind, indenter, mesh, 0.0, zone)
+
+
+def bonded(scene: Scene) -> Scene:
+    """The scene of a block whose base is clamped."""
+    held = Support("axis", {"x": 0.0}), Support("bottom")
+    return scene.with_parts(lambda part: replace(part, supports=held) if part.meshed else part)
+
+
+def coated(scene: Scene, height: float, material: Material, growth: float) -> Scene:
+    """The plane scene of a block that is bonded to one of another material and a height below it,
+    which rests on the base in its place.
+    """
+    indenter, layer = scene.parts
+
+    def mesh(elements: int, zone: float | None) -> Any:
+        top = layer.build_mesh(elements, zone)
+        across, up = (np.unique(places) for places in top.p)
+        down = -graded(height, growth * (up[1] - up[0]), growth)[::-1]
+        return rename(tensor_mesh(across, up[0] + down), axis="x-", bottom="y-", contact="y+")
+
+    core = Part("core", mesh, material, layer.supports)
+    coat = replace(layer, supports=layer.supports[:1])
+    pressed = Contact(indenter.name, coat.name, 0.0, "frictionless")
+    tied = Contact(f"{coat.name}:bottom", core.name, 0.0, "tied")
+    bodies = indenter, coat, core
+    return Scene("coated", copies=2, zone=scene.zone, bodies=bodies, contacts=(pressed, tied))
 
 
 def _across(

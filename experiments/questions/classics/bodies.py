@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 
 from contactopt import scenes
+from contactopt.coupling.reduction import Reduction
 from contactopt.material import Material
-from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support
+from contactopt.problem import Solution
+from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 from experiments.questions.classics.blocks import UNIT
 
 STEEL, ALUMINIUM = Material(210e3, 0.3), Material(70e3, 0.3)
 FIT = 1e-5  # interference [mm]
+LARGE, FAR = 4e8, 60.0  # radius of stretched cylinders [mm], size over the half-width of contact
+SHIFT = 0.3  # of their zone of stick, over the half-width of contact
 
 
 def smooth(scene: Scene) -> Scene:
@@ -99,6 +103,36 @@ def lug(elements: int) -> Scene:
         return replace(body, loads=(weight,)) if body.loads else body
 
     return scene.with_parts(part)
+
+
+def stretched() -> Scene:
+    """Cattaneo's cylinders, so large that contact is as in half-planes. A bulk tension of the lower
+    one alone, parallel to the surface, moves the zone of stick by SHIFT of the half-width.
+
+    The plates are not glued and hold no level plane back. What pulls to the right is a plate on the
+    right of the upper body, and what holds against it a support on the left of the lower one: each
+    body is the other turned by half a circle, so that the shear of one stretches both surfaces
+    alike.
+    """
+    exact = scenes.cattaneo(2, radius=LARGE).reference
+    scene = scenes.cattaneo(2, radius=LARGE, size=FAR * exact.half_width)
+    tension = 4 * SHIFT * float(scene.pairs[0].mu) * exact.peak
+    held = Support("far", {"y": 0.0}), Support("x-", {"x": 0.0})
+
+    def part(body: Any) -> Any:
+        if body.supports:
+            return replace(body, supports=held, loads=(Traction("x+", (tension, 0.0)),))
+        force = body.loads[0].force
+        pressed = Plate("far", {"y": force["y"]}, glued=False)
+        return replace(body, loads=(pressed, Plate("x+", {"x": force["x"]}, glued=False)))
+
+    return scene.with_parts(part)
+
+
+def centre_of_friction(reduction: Reduction, solution: Solution) -> float:
+    """Where the resultant of friction acts, over the half-width of the scene's exact solution."""
+    friction, x = solution.reactions[:, 1], reduction.problem.coordinates[0]
+    return float(x @ friction / friction.sum() / reduction.scene.reference.half_width)
 
 
 def fit(kind: str, elements: int) -> Scene:

@@ -3,11 +3,11 @@ what the sequence converges to.
 
 From three values in a row, v0, v1 and v2, follows the order p of the error, 2^p = (v1 - v0) / (v2 -
 v1), and the limit v2 + (v2 - v1) / (2^p - 1). The bar of a limit is what it differs from the limit
-one mesh earlier, and at least a FLOOR of what it differs from the last value; the last step where
-there is no such limit. Where the order is not between SLOWEST and FASTEST there is no limit: the
-last value stands. Its bar is the last step, and at least LUCK times the step before: a small step
-can be luck, and an error of first order is still as large. Where contact ends by itself, the edge
-is put on a node of every mesh, so that the sequence sees one and the same error.
+one mesh earlier, the last step where there is none, and at least LUCK times what it differs from
+the last value: limits can agree by luck. Where the order is not between SLOWEST and FASTEST there
+is no limit: the last value stands. Its bar is the last step, and at least LUCK times the step
+before: an error of first order is still as large. Where contact ends by itself, the edge is put on
+a node of every mesh, so that the sequence sees one and the same error.
 """
 
 from __future__ import annotations
@@ -18,15 +18,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contactopt.problem import Status
 from contactopt.readings.quantities import value_of
 from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Scene
-from contactopt.solving.solve_scene import Options, solve_scene
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
 from contactopt.solving.zone import solve_zone
+from experiments.questions.classics.bodies import centre_of_friction
 
-SLOWEST, FASTEST, FLOOR, LUCK = 0.7, 5.0, 0.2, 0.5
+SLOWEST, FASTEST, LUCK = 0.7, 5.0, 0.5
 EXACT = 1e-10  # relative step below which a sequence stands still
-TIGHT = Options(tol=1e-12)
+TIGHT = Options(tol=1e-10)
+OWN = {"centre of friction": centre_of_friction}  # quantities that contactopt does not have
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def limit_of(values: Sequence[float]) -> Limit:
         return Limit(tuple(values), values[-1], bar, np.nan)
     before = found[-2][0] if len(found) > 1 else np.nan
     bar = abs(last - before) if np.isfinite(before) else step
-    return Limit(tuple(values), last, max(bar, FLOOR * abs(last - values[-1])), order)
+    return Limit(tuple(values), last, max(bar, LUCK * abs(last - values[-1])), order)
 
 
 def _extrapolated(v0: float, v1: float, v2: float) -> tuple[float, float]:
@@ -91,6 +94,15 @@ def follow_way(way: Way, quantities: Sequence[str]) -> tuple[dict[str, Limit], i
         solved = solve_scene(split_scene(scene, way.base, level), way.base, zone, TIGHT)
         unknowns = solved.reduction.dofs
         for quantity in quantities:
-            found[quantity].append(value_of(quantity, solved.reduction, solved.solution))
+            found[quantity].append(_value(quantity, solved))
     limits = {quantity: limit_of(values) for quantity, values in found.items()}
     return limits, unknowns, time.process_time() - start
+
+
+def _value(quantity: str, solved: Solved) -> float:
+    scene, status = solved.reduction.scene, solved.solution.status
+    if status is not Status.SOLVED:
+        raise RuntimeError(f"scene '{scene.name}' is not solved: {status}.")
+    if quantity in OWN:
+        return OWN[quantity](solved.reduction, solved.solution)
+    return value_of(quantity, solved.reduction, solved.solution)

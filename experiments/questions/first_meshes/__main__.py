@@ -1,8 +1,9 @@
 """Does the answer depend on the first mesh, and is its claimed error true? Five parts by Gmsh, six
 first meshes each.
 
-    python -m experiments.questions.first_meshes [quick] [PART ...]
+    python -m experiments.questions.first_meshes [PART ...] [QUANTITY ...]
 
+With names of parts and quantities, these are measured alone, and the report keeps the other rows.
 The meshes know neither where the parts touch nor their shape: curved boundaries are chords, or
 edges of second order, without a `curve`. References are made in another way: Lame's formulas, a
 half-plane without a mesh, or a mesh that Gmsh makes fine.
@@ -20,6 +21,7 @@ import numpy as np
 
 from contactopt import InputError, Scene
 from contactopt.accuracy import refine
+from contactopt.readings.peaks import Reading
 from contactopt.readings.quantities import find_quantity
 from contactopt.solving.limits import Limits
 from contactopt.solving.solve_scene import solve_scene
@@ -33,11 +35,12 @@ from experiments.questions.first_meshes.parts import (
     press_fit,
     punch,
 )
-from experiments.report import write
+from experiments.report import merged, save, stored, write
 
 TARGET, SECONDS = 0.02, 60.0  # accuracy asked for, and time for one search
 SURE = 1e-3  # least relative error of a reference
-EFFECTIVE = 0.5, 3.0
+EFFECTIVE = 0.5, 4.0
+NAME, TABLE, KEYS = "first_meshes", "searches", ("part", "quantity", "first mesh", "refined")
 
 
 MESHES = [
@@ -48,11 +51,11 @@ MESHES = [
 FINE = First(0.5, True, 2)
 
 
-def values(scene: Scene, quantities: tuple[str, ...]) -> dict[str, float]:
+def readings(scene: Scene, quantities: tuple[str, ...]) -> dict[str, Reading]:
     """Quantities of a scene on its own mesh."""
     solved = solve_scene(scene)
     return {
-        name: find_quantity(name, scene).read(solved.reduction, solved.solution).value
+        name: find_quantity(name, scene).read(solved.reduction, solved.solution)
         for name in quantities
     }
 
@@ -68,37 +71,44 @@ class Case:
     small: float
     exact: Callable[[], dict[str, float]] | None = None
 
-    def reference(self) -> tuple[dict[str, float], dict[str, float]]:
-        """The references, and their relative errors, from a mesh that is twice as coarse."""
+    def reference(self) -> dict[str, tuple[float, float]]:
+        """The references and their relative errors, from a mesh that is twice as coarse, and from
+        what the reading on the finer one says of itself.
+        """
         if self.exact is not None:
-            return self.exact(), dict.fromkeys(self.quantities, SURE)
+            return {name: (value, SURE) for name, value in self.exact().items()}
         coarse, fine = (
-            values(self.make(FINE, factor * self.small), self.quantities) for factor in (2, 1)
+            readings(self.make(FINE, factor * self.small), self.quantities) for factor in (2, 1)
         )
-        return fine, {
-            name: max(abs(coarse[name] / fine[name] - 1), SURE) for name in self.quantities
-        }
+        found = {}
+        for name, read in fine.items():
+            off = max(abs(coarse[name].value - read.value), read.uncertainty)
+            found[name] = read.value, max(off / abs(read.value), SURE)
+        return found
+
+
+def on_half_plane() -> dict[str, float]:
+    return {"pressure": readings(half_plane(), ("pressure",))["pressure"].value}
 
 
 CASES = {
     "dovetail": Case(dovetail, ("pressure", "energy"), 0.0005),
     "lug": Case(lug, ("pressure", "energy", "von_mises:lug:contact"), 0.24),
     "press fit": Case(press_fit, ("pressure", "von_mises:shaft:bore"), 0.5, lame),
-    "flat-and-rounded": Case(
-        punch, ("pressure",), 0.01, lambda: values(half_plane(), ("pressure",))
-    ),
+    "flat-and-rounded": Case(punch, ("pressure",), 0.01, on_half_plane),
     "pin in a bush": Case(pin_in_bush, ("pressure", "energy"), 0.4),
 }
 
 
-def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dict[str, Any]]:
-    """All searches of one part."""
+def rows_of(name: str, asked: list[str]) -> list[dict[str, Any]]:
+    """All searches of one part, of all of its quantities unless some are asked for."""
     case, rows = CASES[name], []
-    truth, slacks = case.reference()
-    for first in meshes:
-        for quantity in case.quantities:
-            slack = slacks[quantity]
-            for adaptive in modes:
+    references = case.reference()
+    for first in MESHES:
+        for quantity, (truth, slack) in references.items():
+            if asked and quantity not in asked:
+                continue
+            for adaptive in (True, False):
                 begin = time.process_time()
                 row = {"part": name, "quantity": quantity, "first mesh": first.name,
                        "refined": "locally" if adaptive else "everywhere"}  # fmt: skip
@@ -111,13 +121,13 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
                     rows.append(row | {"said": str(error)[:60]})
                     print(rows[-1], flush=True)
                     continue
-                true = abs(found.value / truth[quantity] - 1)
+                true = abs(found.value / truth - 1)
                 claim = np.inf if found.error is None else found.error
                 rows.append(
                     row
                     | {
                         "value": found.value,
-                        "reference": truth[quantity],
+                        "reference": truth,
                         "true error": true,
                         "of the reference": slack,
                         "claimed": claim,
@@ -137,37 +147,48 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
     return rows
 
 
-def main(arguments: list[str]) -> None:
-    quick = "quick" in arguments
-    chosen = [name for name in arguments if name in CASES] or list(CASES)
-    meshes = MESHES[::3] if quick else MESHES
-    rows = [
-        row for name in chosen for row in rows_of(name, meshes, (True,) if quick else (True, False))
-    ]
-    done = [row for row in rows if "value" in row]
+def main(names: list[str]) -> None:
+    asked = [name for name in names if name not in CASES]
+    for name in [name for name in names if name in CASES] or list(CASES):
+        save(NAME, TABLE, merged(NAME, TABLE, rows_of(name, asked), KEYS))
+    report(stored(NAME, TABLE))
+
+
+def told(row: dict[str, Any]) -> str:
+    return f"{row['part']}, {row['quantity']}, {row['first mesh']}, {row['refined']}"
+
+
+def report(rows: list[dict[str, Any]]) -> None:
+    rows = [row | {key: row[key] == "True" for key in ("reached", "within")} for row in rows]
+    done = [row for row in rows if row["value"] != ""]
     reached = [row for row in done if row["reached"]]
     # smaller errors are luck, or the reference's
-    sized = [row for row in reached if row["true error"] > TARGET / 20]
-    good = sum(EFFECTIVE[0] <= row["effectivity"] <= EFFECTIVE[1] for row in sized)
-    missed = [
-        f"{row['part']}, {row['quantity']}, {row['first mesh']}"
-        for row in done
-        if not row["within"]
+    sized = [
+        row for row in reached if row["true error"] > max(TARGET / 20, row["of the reference"])
     ]
-    refused = [
-        f"{row['part']}, {row['quantity']}, {row['first mesh']}: {row['said']}"
-        for row in rows
-        if row["said"]
-    ]
+    small = [row for row in sized if row["effectivity"] < EFFECTIVE[0]]
+    large = [row for row in sized if row["effectivity"] > EFFECTIVE[1]]
+    good = len(sized) - len(small) - len(large)
+    missed = [told(row) for row in done if not row["within"]]
+    refused = [f"{told(row)}: {row['said']}" for row in rows if row["said"]]
     text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that
 agrees with the reference within their claimed error. {len(reached)} of them reached the
 target, {sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed
 error over the true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)}
-searches that reached the target with a true error above {TARGET / 20:g}. Smaller true errors
-are luck, or those of the reference.
+searches that reached the target with a true error above {TARGET / 20:g} and above that of the
+reference. Smaller true errors are luck, or those of the reference.
+Less is claimed of {"; ".join(map(told, small)) or "none"}. More is claimed of
+{"; ".join(map(told, large)) or "none"}.
 
 Outside their claims are: {"; ".join(missed) or "none"}. No answer came from:
 {"; ".join(refused) or "none"}.
+
+Energies are claimed too small where few meshes show an order that they do not keep. In the lug
+three of them fall with order 3 and pass the limit. The energy of the pin in the bush falls with an
+order below 1 on even meshes, and a search that refines locally ends after two of them, because the
+target is far above what it claims. Claims are too large where they hold what the value changed on
+the last mesh, or the scatter of its reading. The largest stress of the lug is at the edge of
+contact, where its reading is uncertain on every mesh, also on that of the reference.
 
 The pressure of the dovetail has no limit in the linearised model. Where the flank meets the
 rounding, the curvature of the surface jumps. The normals there turn, and a blade that slides by u
@@ -177,21 +198,14 @@ smaller than about u. Searches that go so far say that no mesh bounds it. Their 
 infinite, and counts as agreeing. The reference of the dovetail, whose elements are about as large
 as u there, does not show this.
 
-Each search asked for {TARGET:g} within {SECONDS:g}
-s{", of two first meshes (`quick`)" if quick else ""}. The meshes know neither where the parts touch
+Each search asked for {TARGET:g} within {SECONDS:g} s. The meshes know neither where the parts touch
 nor their shape. A reference is Lame's formula, a half-plane of 8,192 points, or a mesh that Gmsh
-makes fine; its error is then its difference from one that is twice as coarse.
+makes fine; its error is then its difference from one that is twice as coarse, or what its reading
+says of itself if this is more.
 
 {{searches}}
 """
-    head = list(max(rows, key=len))
-    write(
-        "first_meshes",
-        "First meshes",
-        text,
-        {"searches": [{key: row.get(key, "") for key in head} for row in rows]},
-        {},
-    )
+    write(NAME, "First meshes", text, {TABLE: rows}, {})
 
 
 if __name__ == "__main__":
