@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Status,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.benchmark.families.packings import rigid_bodies
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import InterfaceOperator
@@ -241,3 +249,13 @@ def test_a_q_that_does_not_fit_into_memory_is_not_formed():
         solve(problem, "nsgs")
     solution = solve(problem)
     assert solution.solved and np.allclose(solution.reactions[:, 0], 1.0)
+
+
+def test_the_default_method_gives_the_best_point_that_it_met():
+    """Beyond rounding no digit can be gained, and looking for one loses those that are there."""
+    problem = reduce(scenes.flat_punch(2, mu=0.3))
+    found = solve(problem, tol=1e-30, time_limit=10)
+    assert not found.solved
+    assert found.residual == min(row["residual"] for row in found.history) < 1e-13
+    assert natural_map_residual(problem, found.reactions, found.multipliers) == found.residual
+    assert max(row["residual"] for row in found.history[-5:]) > found.residual

@@ -7,9 +7,11 @@ accuracy yields it as well, as a Moved, which saves the driver a product. The dr
 (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method that ends
 by itself has met its own criterion or cannot go on.
 
-Two statements are optional. `implicit = True` says that it takes a Q that is known by its products
-only. `solves(law)` says whether it solves problems of that law (contactopt.problem.laws); a method
-without it solves every law, because it needs nothing of a law but its projection.
+Three statements are optional. `implicit = True` says that it takes a Q that is known by its
+products only. `wanders = True` says that its iterates may leave a good point to look for a better
+one: its answer is then the best of them, else the last one. `solves(law)` says whether it solves
+problems of that law (contactopt.problem.laws); a method without it solves every law, because it
+needs nothing of a law but its projection.
 """
 
 from __future__ import annotations

@@ -87,6 +87,7 @@ class Auto(Method):
     implicit: ClassVar[bool] = True
     sparse: ClassVar[bool] = True
     unsymmetric: ClassVar[bool] = True
+    wanders: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         find_preconditioner(self.preconditioner)

@@ -64,7 +64,7 @@ def solve(
     most `tol`.
 
     A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend
-    that fails while solving gives a status, too, with the last iterate.
+    that fails while solving gives a status, too, with the last iterate (of `auto`: the best one).
 
     Parameters
     ----------
@@ -178,6 +178,8 @@ def _run(
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
     if not recorder.history:
         recorder.certify([])
+    if getattr(method, "wanders", False):
+        recorder.return_to_best()
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
@@ -300,6 +302,7 @@ class _Recorder:
         self.residual = np.inf
         self.history: list[dict[str, float]] = []
         self.recent: list[State] = [(np.zeros(problem.q.size + len(problem.s)), 0.0)]
+        self.best = self._now()
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
         self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
@@ -308,7 +311,15 @@ class _Recorder:
         """Judge the present iterate."""
         begin = time.perf_counter()
         self.residual = self._certificate(known)
+        self.best = min(self.best, self._now(), key=lambda point: point[0])
         self.certified += time.perf_counter() - begin
+
+    def _now(self) -> tuple[float, np.ndarray, np.ndarray, Stacked | None]:
+        return self.residual, self.reactions, self.multipliers, self.displacements
+
+    def return_to_best(self) -> None:
+        """Make the iterate with the least certificate the present one."""
+        self.residual, self.reactions, self.multipliers, self.displacements = self.best
 
     def _certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by the method's own Q r; where products cost iterations, to a

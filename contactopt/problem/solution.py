@@ -41,7 +41,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where a solve ended: always the last iterate, whatever the status.
+    """Where a solve ended, whatever the status: the last iterate, of `auto` the best one.
 
     reactions    (k, dim) nodal forces on the upper body, normal first [force]
     multipliers  (p,) displacements lambda of the plates [length]
