@@ -570,7 +570,15 @@ def test_a_half_space_goes_to_other_processes_by_its_kernel():
     assert np.array_equal(made.Q @ x, spec.build({}).Q @ x)
 
 
-def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch):
+@pytest.fixture
+def deadly_pipes():
+    """As gmsh leaves it: a broken pipe would end this process."""
+    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGPIPE, before)
+
+
+def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch, deadly_pipes):
     """A builder that dies between two problems costs no run, and one that is killed once while it
     builds costs none either.
     """
@@ -654,16 +662,11 @@ def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
     )
 
 
-def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal():
-    # as gmsh leaves it: a broken pipe would end this process
-    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    try:
-        process = subprocess.Popen(
-            [sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
-        process.stdin.write(b"word")  # stays in the buffer until the pipe is closed
-        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
-        child._stop(process)
-    finally:
-        signal.signal(signal.SIGPIPE, before)
+def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal(deadly_pipes):
+    process = subprocess.Popen(
+        [sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    process.stdin.write(b"word")  # stays in the buffer until the pipe is closed
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+    child._stop(process)
     assert process.stdin.closed

@@ -224,6 +224,8 @@ def run_locally(
                 rows.put(row)
         except BaseException as error:
             rows.put(error)
+        finally:  # Linux kills a process with the thread that started it: it is ended before, whole
+            worker.close()
 
     threads = [threading.Thread(target=serve, args=(worker,), daemon=True) for worker in workers]
     for thread in threads:

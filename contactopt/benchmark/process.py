@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from contactopt.errors import InputError
+from contactopt.files.writing import broken_pipe_is_an_error
 
 LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "RAYON")
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in LIBRARIES} | {"VECLIB_MAXIMUM_THREADS": "1"}
@@ -95,7 +96,8 @@ class Process:
             try:
                 if not self.ready:
                     self.ready = self._wait(START_LIMIT, START)
-                self.pipe.send((function, arguments))
+                with broken_pipe_is_an_error():
+                    self.pipe.send((function, arguments))
                 break
             except Ended as end:
                 last = end
@@ -146,13 +148,14 @@ class Process:
         """
         import psutil
 
-        if self.process is None:
+        process = self.process
+        if process is None:
             return
         with suppress(psutil.Error):  # what it started in sessions of their own
-            for child in psutil.Process(self.process.pid).children(recursive=True):
+            for child in psutil.Process(process.pid).children(recursive=True):
                 child.kill()
         with suppress(OSError):
-            os.killpg(self.process.pid, signal.SIGKILL)
+            os.killpg(process.pid, signal.SIGKILL)
 
     def kill(self) -> None:
         """End the process with all that it started."""
