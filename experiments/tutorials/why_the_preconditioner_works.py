@@ -485,8 +485,8 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 #
 # </details>
 
-# **4.** $Q$ is dense. How many numbers does it hold for a 3D interface of 100 x 100
-# nodes? How can a product $Q r$ be computed without forming $Q$?
+# **4.** $Q$ is dense. How many numbers does it hold for a 3D interface of
+# 100 x 100 nodes? How can a product $Q r$ be computed without forming $Q$?
 #
 # <details><summary>Solution</summary>
 #
