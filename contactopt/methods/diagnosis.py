@@ -60,7 +60,8 @@ import scipy.linalg as la
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.methods.cone import Relaxation
-from contactopt.methods.driver import MUCH, solve
+from contactopt.methods.driver import solve
+from contactopt.methods.notes import MUCH
 from contactopt.problem import (
     InterfaceProblem,
     Solution,

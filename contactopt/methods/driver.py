@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, 
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.method import Iterate, Known, Method, at_rest
-from contactopt.methods.notes import collected, note
+from contactopt.methods.notes import collected, remark
 from contactopt.problem import (
     Infeasible,
     InterfaceProblem,
@@ -30,15 +29,12 @@ from contactopt.problem import (
     isotropic,
     natural_map_residual,
 )
-from contactopt.problem.certificate import Moved, amplification
+from contactopt.problem.certificate import Moved
 from contactopt.problem.unbalanced_loads import escape, sentence
 
 TOL = 1e-8  # largest certificate of an answer that counts as solved, unless another is asked for
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
-# a remark is due if a small problem has so large a condition, and its forces so large an error
-FEW, WEDGED, MUCH = 50, 1e4, 1e-3
-EXACT = 1e-11  # certificate that leaves no doubt below a condition of 1e8
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
@@ -103,22 +99,8 @@ def solve(
     limits = _Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
         solution = _run(problem, chosen, limits, start)
-        _remark(problem, solution)
+        remark(problem, solution)
     return replace(solution, notes=tuple(notes))
-
-
-def _remark(problem: InterfaceProblem, solution: Solution) -> None:
-    """Say where the forces of a small problem may be far off although they are certified."""
-    at, loose = solution, solution.solved and solution.residual > EXACT
-    if loose and problem.contacts <= FEW and isinstance(problem.Q, np.ndarray):
-        condition = amplification(problem, at.reactions, at.multipliers)
-        if WEDGED < condition < np.inf and condition * at.residual > MUCH:
-            note(
-                logging.getLogger(__name__),
-                "The forces are certified, but they may be off by"
-                f" {min(condition * at.residual, 1.0):.0%} of the typical force, because the"
-                " solution is nearly not unique: see contactopt.diagnose.",
-            )
 
 
 def _method_for(

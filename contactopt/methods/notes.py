@@ -10,6 +10,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+import numpy as np
+
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.certificate import amplification
+
+# a remark is due if a small problem has so large a condition, and its forces so large an error
+FEW, WEDGED, MUCH = 50, 1e4, 1e-3
+EXACT = 1e-11  # certificate that leaves no doubt below a condition of 1e8
 _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs", default=None)
 
 
@@ -30,3 +38,17 @@ def collected() -> Iterator[list[str]]:
         yield notes
     finally:
         _notes.reset(token)
+
+
+def remark(problem: InterfaceProblem, solution: Solution) -> None:
+    """Say where the forces of a small problem may be far off although they are certified."""
+    at, loose = solution, solution.solved and solution.residual > EXACT
+    if loose and problem.contacts <= FEW and isinstance(problem.Q, np.ndarray):
+        condition = amplification(problem, at.reactions, at.multipliers)
+        if WEDGED < condition < np.inf and condition * at.residual > MUCH:
+            note(
+                logging.getLogger(__name__),
+                "The forces are certified, but they may be off by"
+                f" {min(condition * at.residual, 1.0):.0%} of the typical force, because the"
+                " solution is nearly not unique: see contactopt.diagnose.",
+            )
