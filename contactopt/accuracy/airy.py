@@ -93,7 +93,6 @@ def _energy(
     corners = (3 * cells.mesh.t.T[..., None] + np.arange(3)).reshape(-1, 9)
     at = number[np.hstack([corners, 3 * cells.mesh.nvertices + cells.opposite.T])]
     size = int((~edges.fixed).sum()) + 1
-    size = int((~edges.fixed).sum()) + 1
     K, slope = sp.csc_matrix((size, size)), np.zeros(size)
     for own in cells.blocks:
         change = _changes(cells, own, edges)
