@@ -21,10 +21,12 @@ and s(v) differ by is the mesh's, the second term that of contact, the third tha
 s* comes from contactopt.accuracy.equilibrated. Its pressure is the piecewise linear one that has
 the values r_i / A_i at the contacts, for the forces r and nodal areas A of the solution. The finite
 elements were loaded otherwise, so each body is solved once more under this pressure, with the
-factors that are there, and s* is made from that displacement. Plates and free motions stay in
-balance: the pressures are scaled by what is missing, which also makes the bound hold for a solver
-that stopped early. v is the solution, plus quadratic bubbles on the contact surface where it
-penetrates between contacts. The bound of the solution is that of v plus the norm of what was added.
+factors that are there, and s* is made from that displacement. In bodies of revolution s* comes from
+contactopt.accuracy.revolved, and it is the pressure times the radius that is linear between the
+contacts. Plates and free motions stay in balance: the pressures are scaled by what is missing,
+which also makes the bound hold for a solver that stopped early. v is the solution, plus quadratic
+bubbles on the contact surface where it penetrates between contacts. The bound of the solution is
+that of v plus the norm of what was added.
 
 A quantity J, linear in contact forces and plates' motions, has an adjoint: displacements z, and a
 stress s_z in equilibrium with a unit of what J measures and with a pressure tau at the contact.
@@ -108,7 +110,7 @@ class Bound:
         self.norm = float(np.sqrt(2 * sum(energies)))
         works = scene.works(self.displacement)
         self.contact, self.friction = (float(np.sqrt(2 * max(work, 0.0))) for work in works)
-        u, r = scene.reduction.seen(displaced), scene.tractions * scene.problem.areas[:, None]
+        u, r = scene.reduction.seen(displaced), scene.forces(scene.tractions)
         slips = scene.problem.law.bound(r[:, 0]) * np.linalg.norm(u[:, 1:], axis=1)
         left = r[:, 0] * np.maximum(u[:, 0], 0.0) + slips + np.sum(r[:, 1:] * u[:, 1:], axis=1)
         self.solver = float(np.sqrt(2 * np.maximum(left, 0.0).sum()))
@@ -126,7 +128,12 @@ class Bound:
 
     def size(self, data: Data) -> float:
         """The norm of a composite stress."""
-        return float(np.sqrt(sum(own.sum() for own in self.products(data, data))))
+        square = sum(own.sum() for own in self.products(data, data))
+        if not square >= 0:
+            raise InputError(
+                "rounding leaves no bound: some elements are too long for their height."
+            )
+        return float(np.sqrt(square))
 
     def products(self, one: Data, other: Data) -> list[np.ndarray]:
         """For each body (e,) the products of two stresses in its elements."""
@@ -247,7 +254,7 @@ class Bound:
         c = float(np.max(np.abs(t[p > 0, 0]) / p[p > 0], initial=0.0))
         z = [own.copy() for own in scene.nodal(duals.fields)]
         for pair in scene.pairs:
-            pressed = (pair.of_contacts(p) > 0).T  # (f, v)
+            pressed = (pair.of_contacts(scene.pressed) > 0).T  # (f, v)
             gap = np.maximum(pair.jump(self.displacement, pair.nodes)[0], 0.0)
             value = pair.jump(z, pair.nodes, True)[0] + pair.at_points(omega, pair.nodes)
             most = np.where(pressed @ nodes > 1 - ALL, 0.0, limit * gap)

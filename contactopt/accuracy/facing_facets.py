@@ -64,9 +64,9 @@ class FacingFacets:
         name, self.joined = f"contact '{pair.name}'", coupling.kind == "mortar"
         if pair.law not in LAWS:
             raise InputError(f"{name} has the law '{pair.law}'; a bound knows {', '.join(LAWS)}.")
-        if self.joined and scene.dim == 3:
+        if self.joined and scene.kind != "plane-strain":
             raise InputError(
-                f"{name} joins surfaces by mortar; in space a bound needs matching ones."
+                f"{name} joins surfaces by mortar; only in plane strain a bound knows them."
             )
         if np.ptp(coupling.frames, axis=0).max() > FLAT:
             raise InputError(f"{name} has a curved surface; a bound needs a flat one.")
@@ -129,6 +129,11 @@ class FacingFacets:
         own = self.of_contacts(values)[:, points.facets[0]]
         return np.einsum("vS,vSs->Ss", own, points.at[0])
 
+    def places(self, number: int, points: Points) -> np.ndarray:
+        """Points (dim, S, s) on one of the sides."""
+        own = self.points[number][:, :, points.facets[number]]
+        return np.einsum("dvS,vSs->dSs", own, points.at[number])
+
     def jump(self, nodal: Sequence[np.ndarray], points: Points, change: bool = False) -> np.ndarray:
         """Gap and slip (dim, S, s) at points, or what the displacements change of them."""
         total = np.zeros(1)
@@ -140,10 +145,7 @@ class FacingFacets:
         out = np.einsum("lc,cSs->lSs", self.frame, total)
         if change:
             return out
-        places = [
-            side.sign * np.einsum("dvS,vSs->dSs", own[:, :, facets], at)
-            for side, own, facets, at in zip(self.sides, self.points, points.facets, points.at)
-        ]
+        places = [side.sign * self.places(number, points) for number, side in enumerate(self.sides)]
         if self.shape is not None:
             own = self.sides[0].sign * places[0]
             out[0] += np.reshape(self.shape(own.reshape(len(out), -1)), out[0].shape)

@@ -18,13 +18,15 @@ from contactopt.accuracy.facing_facets import (
     measures,
     quadratic_shapes,
 )
+from contactopt.accuracy.revolved import Revolved
 from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.rigid import RigidBody
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved
-from contactopt.scenes.scene import Plate, Traction
+from contactopt.scenes.scene import BodyForce, Plate, Traction
 from contactopt.solving.solve_scene import Solved
 
+THIN = 3e4  # length over height: half as much again is past what rounding permits
 CLEAR = 1.5  # of the bubbles that a facet beside the pressure needs, so that it stays open
 
 
@@ -36,29 +38,32 @@ class PressedScene:
     loads       for each body the matrix (n, k dim) from tractions at the contacts, linear between
                 them, to its nodal forces
     tractions   (k, dim) at the contacts, in their frames, that the law allows and that balance all
-                free motions;   limit  (k,) the friction bound [stress]
+                free motions;   limit  (k,) the friction bound [stress]. For bodies of revolution
+                both are those times r, and linear between contacts as such.
+    share       (k,) tractions by forces at the contacts;   pressed  (k,) 1 where there is pressure,
+                else 0
     Raises InputError for what a bound does not know.
     """
 
     def __init__(self, solved: Solved):
         self.reduction, self.solution = solved.reduction, solved.solution
         self.problem, scene = solved.reduction.problem, solved.reduction.scene
-        if scene.kind == "axisymmetric":
-            raise InputError(
-                "a bound needs plane strain or space: near the axis of revolution no stress of"
-                " composite elements has a finite energy."
-            )
         if solved.path is not None or self.reduction.on_ground:
             raise InputError("a bound is of one state of bodies that need no ground to hold them.")
         self.bodies: list[Any] = list(self.reduction.bodies)
-        self.cells: list[Any] = [_cells(body) for body in self.bodies]
-        plane = scene.kind == "plane-strain"
-        self.factor = scene.copies * (scene.thickness if plane else 1.0)
+        self.revolved = scene.kind == "axisymmetric"
+        self.cells: list[Any] = [
+            self._elements(number, body) for number, body in enumerate(self.bodies)
+        ]
+        full = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}
+        self.factor = scene.copies * full[scene.kind]
         count = range(len(scene.pairs))
         self.pairs = [FacingFacets(solved, number, self.cells) for number in count]
         self.loads = [self._load(number, body) for number, body in enumerate(self.bodies)]
-        areas = self.problem.areas
-        self.share = np.divide(1.0, areas, out=np.zeros(len(areas)), where=areas > 0)
+        areas, r = self.problem.areas, np.ones(len(self.problem.q))
+        if self.revolved:
+            r = np.concatenate([own.positions[0] for own in self.reduction.couplings])
+        self.share = np.divide(r, areas, out=np.zeros(len(areas)), where=areas > 0)
         t = self.share[:, None] * self.solution.reactions
         t[:, 0] = np.maximum(t[:, 0], 0.0)
         bound, size = self.limit_of(t), np.linalg.norm(t[:, 1:], axis=1)
@@ -67,14 +72,48 @@ class PressedScene:
         given = [body.resultants for body in self.bodies]
         self.tractions = self.balanced(t, np.concatenate(given))
         self.limit = self.limit_of(self.tractions)
+        on_axis = (self.share == 0) & (self.solution.reactions[:, 0] > 0)
+        self.pressed = np.where(on_axis, 1.0, self.tractions[:, 0] > 0)
         for pair in self.pairs:
             if pair.joined and np.any(self.tractions[pair.alone, 0] > 0):
                 raise InputError("a surface is pressed beyond the end of the other: no bound.")
 
+    def _elements(self, number: int, body: Any) -> Simplices | None:
+        """The elements of an elastic body, None for a rigid one."""
+        if isinstance(body, RigidBody):
+            return None
+        if not isinstance(body, ElasticBody):
+            raise InputError(f"body '{body.name}' has no elements here; a bound needs them.")
+        mesh, name = body.body.basis.mesh, f"body '{body.name}'"
+        if mesh.refdom.__name__ not in ("RefTri", "RefTet") or is_curved(mesh):
+            raise InputError(f"{name}: a bound needs triangles or tetrahedra, not curved.")
+        if not self.revolved:
+            return Simplices(mesh)
+        made: Any = Simplices(mesh)
+        edges = mesh.p[:, mesh.facets[1]] - mesh.p[:, mesh.facets[0]]
+        longest = np.sum(edges**2, axis=0)[made.opposite].max(axis=0)
+        if np.any(longest > THIN * 2 * made.volume):
+            raise InputError(
+                f"{name}: of a ring of triangles {THIN:g} times as long as high rounding leaves no"
+                " bound; make the mesh less steeply graded."
+            )
+        part: Any = self.reduction.scene.parts[number]
+        holding = [own for own in part.supports if "z" in (own.displacement or ("z",))]
+        plates = [own for own in part.loads if isinstance(own, Plate)]
+        if plates and len(holding) + len(plates) > 1:
+            raise InputError(f"{name}: a bound needs nothing else that holds it beside the plate.")
+        heavy = any(isinstance(own, BodyForce) and own.value[1] for own in part.loads)
+        return Revolved(mesh, 2 if heavy else body.body.degree)
+
     def limit_of(self, t: np.ndarray) -> np.ndarray:
         """The friction bound (k,) under tractions."""
-        bound = self.problem.law.bound(t[:, 0] * self.problem.areas)
+        bound = self.problem.law.bound(self.forces(t)[:, 0])
         return np.asarray(self.share * np.broadcast_to(bound, len(t)))
+
+    def forces(self, t: np.ndarray) -> np.ndarray:
+        """The forces (k, dim) at the contacts of tractions."""
+        share = self.share[:, None]
+        return np.divide(t, share, out=np.zeros(t.shape), where=share > 0)
 
     def nodal(self, displaced: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Displacements (dim, vertices and edges) of every body; (dim, 1) of a rigid one."""
@@ -146,7 +185,7 @@ class PressedScene:
             shape = (pair.contacts.shape[1], nodes.shape[1])
             missing = -pair.jump(out, pair.nodes)[0].reshape(shape)
             missing[pair.nodes.weights.reshape(shape) == 0] = 0.0
-            closed = (pair.of_contacts(self.tractions)[..., 0] > 0).T @ nodes > 1 - NEAR
+            closed = (pair.of_contacts(self.pressed) > 0).T @ nodes > 1 - NEAR
             least = np.maximum(missing[:, :d], 0.0) @ nodes
             pair.lift(out, np.where(closed, missing, np.maximum(missing, least)))
             bubble = quadratic_shapes(pair.rule.at[0])[d:].sum(axis=0)
@@ -190,12 +229,15 @@ class PressedScene:
         moments = np.zeros((*held.shape, d))
         areas = measures(mesh.p[:, mesh.facets])
         holding = [(own.boundary, own.displacement) for own in part.supports]
+        lever = mesh.p[0, mesh.facets] if self.revolved else np.ones(mesh.facets.shape)
+        lever = (lever + lever.sum(axis=0)) / (d + 1)  # with the hat functions
         for load in part.loads:
             if isinstance(load, Plate):
                 holding.append((load.boundary, None if load.glued else load.force))
             elif isinstance(load, Traction) and loaded:
                 own = np.asarray(mesh.boundaries[load.boundary])
-                moments[own] += areas[own, None, None] / d * np.asarray(load.value, dtype=float)
+                size = (areas * lever).T[own, :, None] / d
+                moments[own] += size * np.asarray(load.value, dtype=float)
             elif loaded:
                 force += np.asarray(load.value, dtype=float)
         for boundary, names in holding:
@@ -207,15 +249,3 @@ class PressedScene:
                     slot = np.argsort(np.argsort(side.vertices, axis=0), axis=0)
                     np.add.at(moments, (side.facets, slot), pair.moments(i, tractions))
         return force, held, moments
-
-
-def _cells(body: Any) -> Simplices | None:
-    """The elements of an elastic body, None for a rigid one."""
-    if isinstance(body, RigidBody):
-        return None
-    if not isinstance(body, ElasticBody):
-        raise InputError(f"body '{body.name}' has no elements here; a bound needs them.")
-    mesh = body.body.basis.mesh
-    if mesh.refdom.__name__ not in ("RefTri", "RefTet") or is_curved(mesh):
-        raise InputError(f"body '{body.name}': a bound needs triangles or tetrahedra, not curved.")
-    return Simplices(mesh)

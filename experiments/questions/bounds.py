@@ -131,15 +131,46 @@ def scenes() -> Iterator[Scene]:
             yield replace(on_floor("pushed", degree, *law, across=4), name="long elements, floor")
             yield replace(on_floor("plate", degree, *law, dim=3), name="plate, floor, space")
         yield replace(two_blocks("pushed", degree, *LAWS[1], dim=3), name="pushed, blocks, space")
-        for name in ("stack", "arch", "cylinder-2d"):
+        for law in LAWS:
+            for load in ("pushed", "plate", "pressed", "heavy"):
+                yield revolved(on_floor(load, degree, *law), "disc")
+            yield revolved(two_blocks("pushed", degree, *law), "discs")
+            yield revolved(two_blocks("sheared", degree, *law), "rings", 0.5)
+        for name in ("stack", "arch", "cylinder-2d", "sphere"):
             yield of_straight_edges(make_scene(name, simplices=True, degree=degree))
 
 
-def of_straight_edges(scene: Scene) -> Scene:
-    """A named scene on a given coarse mesh."""
+def revolved(scene: Scene, name: str, inner: float = 0.0) -> Scene:
+    """A plane scene turned about an axis at the left, or a distance away from it."""
+
+    def about(given: Any) -> Any:
+        if given is None:
+            return None
+        return {{"x": "r", "y": "z"}[key]: value for key, value in given.items()}
+
+    def turned(part: Any) -> Any:
+        if not part.elastic:
+            return part
+        supports = (replace(own, displacement=about(own.displacement)) for own in part.supports)
+        loads = (
+            replace(own, force=about(own.force)) if isinstance(own, Plate) else own
+            for own in part.loads
+        )
+        mesh = replace(part.mesh, doflocs=part.mesh.p + np.array([[inner], [0.0]]))
+        return replace(part, mesh=mesh, supports=tuple(supports), loads=tuple(loads))
+
+    name = f"{scene.name.partition(',')[0]}, {name}"
+    bodies: dict[str, Any] = {"bodies": tuple(map(turned, scene.bodies))}
+    if scene.upper is not None:
+        bodies = {"upper": turned(scene.upper), "lower": turned(scene.lower)}
+    return replace(scene, name=name, kind="axisymmetric", **bodies)
+
+
+def of_straight_edges(scene: Scene, elements: int = NAMED) -> Scene:
+    """A named scene on a given mesh."""
     return scene.with_parts(
         lambda part: (
-            replace(part, mesh=part.build_mesh(NAMED, scene.zone), curve=None)
+            replace(part, mesh=part.build_mesh(elements, scene.zone), curve=None)
             if part.elastic
             else part
         )
@@ -259,6 +290,9 @@ def costs() -> list[dict[str, Any]]:
     for degree, n in ((1, 10), (2, 5)):
         scene = make_scene("punch-3d", simplices=True, degree=degree, mu=0.5)
         made.append((f"punch-3d, tetrahedra of degree {degree}, mu = 0.5", scene, n))
+    for degree, n in ((1, 48), (2, 24)):
+        scene = of_straight_edges(make_scene("sphere", simplices=True, degree=degree), n)
+        made.append((f"sphere, triangles of degree {degree}, mu = {scene.pairs[0].mu:g}", scene, n))
     rows = []
     for name, scene, n in made:
         solved = solve_scene(scene, n)
