@@ -144,7 +144,14 @@ class Revolved(Simplices):
         made = self._particular(force)
         for (own, split), part in zip(self._pieces, parts):
             c = (part.stress @ g[number[own], None])[..., 0] + part.rest
-            made[own] += np.einsum("escn,en->esc", self._made(own, split), c)
+            S, divergence = _by_points(split)
+            made[own, :, :3] += (
+                (c @ S).reshape(len(own), -1, 3)
+                @ self._carried(own).swapaxes(1, 2)
+                / self._radius[own, :, None]
+            )
+            down = self._map[own, :1] / self._ratio[own, None, None]
+            made[own, :, 3:] += (c @ divergence).reshape(len(own), -1, 2) @ down.swapaxes(1, 2)
         return made, missed
 
     @cached_property
@@ -218,12 +225,12 @@ class Revolved(Simplices):
 
     def _made(self, own: np.ndarray, split: SplitTriangle) -> np.ndarray:
         """(e, s, 4, n) the stress by the composite stresses of elements."""
-        n = split.stress.shape[-1]
-        S, divergence = split.stress.reshape(-1, 3, n), split.divergence.reshape(-1, 2, n)
+        n, (S, divergence) = split.stress.shape[-1], _by_points(split)
         there, down = self._carried(own), self._map[own, 0] / self._ratio[own, None]
-        out = np.empty((len(there), len(S), 4, n))
-        out[:, :, :3] = there[:, None] @ S / self._radius[own, :, None, None]
-        out[:, :, 3] = np.einsum("ea,san->esn", down, divergence)
+        out = np.empty((len(own), len(S.T) // 3, 4, n))
+        out[:, :, :3] = there[:, None] @ S.T.reshape(-1, 3, n) / self._radius[own, :, None, None]
+        hoop = down @ divergence.T.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
+        out[:, :, 3] = hoop.reshape(len(own), -1, n)
         return out
 
     def _least_within(
@@ -244,7 +251,8 @@ class Revolved(Simplices):
         tractions = split.tractions.reshape(-1, n)
         borne, inner = np.linalg.pinv(tractions), null_space(tractions, rcond=1e-9)
         up = self._map[own, 1] / self._ratio[own, None]
-        Z = np.einsum("ea,dan->edn", up, split.nodes.reshape(-1, 2, n))[:, :-1]
+        Z = up @ split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
+        Z = Z.reshape(count, -1, n)[:, :-1]
         r = np.einsum("ve,pvd->epd", self.mesh.p[0][self.mesh.t[:, own]], split.lever)
         wanted = -force[1] * r.reshape(count, -1)[:, :-1, None]
         size = np.sqrt(np.trace(H, axis1=1, axis2=2))[:, None, None]
@@ -259,10 +267,15 @@ class Revolved(Simplices):
         found = inner @ np.linalg.solve(system, right)[:, y]
         R, rest = borne + found[..., :-1], found[..., -1:]
         back, sign = self.back[own], self._numbers[1][own]
-        R = np.einsum("enpa,eac->enpc", R.reshape(count, n, -1, 2), back).reshape(R.shape)
-        R *= sign[:, None]
+        R = (R.reshape(count, -1, 2) @ back).reshape(R.shape) * sign[:, None]
         turned = R.swapaxes(1, 2)
         return _Elements(R, rest[..., 0], turned @ H @ R, (turned @ (H @ rest + h))[..., 0])
+
+
+def _by_points(split: SplitTriangle) -> tuple[np.ndarray, np.ndarray]:
+    """The stress (n, 3 s) and its divergence (n, 2 s) at all points."""
+    n = split.stress.shape[-1]
+    return split.stress.reshape(-1, n).T, split.divergence.reshape(-1, n).T
 
 
 def _compliance(material: Material) -> np.ndarray:
