@@ -61,6 +61,14 @@ def ring_on_floor(degree=1, plate=True, inner=0.0, law="frictionless", mu=0.0):
     return Scene("s", ring, floor, mu, "axisymmetric", law=law, degree=degree)
 
 
+def discs(degree, below):
+    """A disc on another one, joined by mortar."""
+    axis = Support("left", {"r": 0.0})
+    top = Part("upper", block(5, 1.0, 1), MATERIAL, (axis, Support("far", {"z": -0.1})))
+    low = Part("lower", block(below, -1.0, 2), Material(3000.0, 0.2), (axis, Support("far")))
+    return Scene("s", top, low, 0.0, "axisymmetric", law="frictionless", degree=degree)
+
+
 def two_blocks(degree=1, law="coulomb", mu=0.3, n=5, below=5):
     top = Part("upper", block(n, 1.0, 1), MATERIAL, (Support("far", {"x": 0.05, "y": -0.1}),))
     low = Part("lower", block(below, -1.0, 2), Material(3000.0, 0.2), (Support("far"),))
@@ -145,6 +153,8 @@ def test_the_nearest_stress_does_not_depend_on_the_numbering():
         (two_blocks(2, "frictionless", 0.0, below=4), 0.0),
         (ring_on_floor(1, plate=False), 0.0),
         (ring_on_floor(2, plate=False, inner=0.5), 0.0),
+        (discs(1, 7), 0.0),
+        (discs(2, 4), 0.0),
     ],
     ids=[
         "linear",
@@ -156,6 +166,8 @@ def test_the_nearest_stress_does_not_depend_on_the_numbering():
         "coarse below",
         "disc",
         "quadratic ring",
+        "mortar of discs",
+        "quadratic mortar of discs",
     ],
 )
 def test_no_dual_energy_exceeds_a_primal_one(scene, limit):

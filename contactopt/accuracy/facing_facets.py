@@ -61,12 +61,13 @@ class FacingFacets:
     def __init__(self, solved: Solved, number: int, cells: Sequence[Any]):
         scene, coupling = solved.reduction.scene, solved.reduction.couplings[number]
         pair, self.gap, self.frame = scene.pairs[number], coupling.gap, coupling.frames[0]
+        self.revolved = scene.kind == "axisymmetric"
         name, self.joined = f"contact '{pair.name}'", coupling.kind == "mortar"
         if pair.law not in LAWS:
             raise InputError(f"{name} has the law '{pair.law}'; a bound knows {', '.join(LAWS)}.")
-        if self.joined and scene.kind != "plane-strain":
+        if self.joined and scene.dim == 3:
             raise InputError(
-                f"{name} joins surfaces by mortar; only in plane strain a bound knows them."
+                f"{name} joins surfaces by mortar; in space a bound needs matching ones."
             )
         if np.ptp(coupling.frames, axis=0).max() > FLAT:
             raise InputError(f"{name} has a curved surface; a bound needs a flat one.")
@@ -165,7 +166,9 @@ class FacingFacets:
         nodal[side.body][:] += side.sign * self.frame[0][:, None] * added
 
     def moments(self, number: int, tractions: np.ndarray) -> np.ndarray:
-        """(v, f, dim) of tractions (k, dim) on one of the sides with the hat functions."""
+        """(v, f, dim) of tractions (k, dim) on one of the sides with the hat functions. Next to an
+        axis of revolution they are those of the linear traction that is zero there.
+        """
         side, points = self.sides[number], self.rule
         t = self.of_contacts(tractions)[:, points.facets[0]] @ self.frame  # (v, S, dim)
         own = np.einsum(
@@ -173,6 +176,12 @@ class FacingFacets:
         )
         out = np.zeros((len(t), len(side.facets), len(self.frame)))
         np.add.at(out.swapaxes(0, 1), points.facets[number], side.sign * own.swapaxes(0, 1))
+        if self.revolved:
+            r = self.points[number][0]
+            for end in range(2):
+                on = r[end] <= FLAT * r.max()
+                total = out[:, on].sum(axis=0)
+                out[end, on], out[1 - end, on] = total / 3, 2 * total / 3
         return out
 
 

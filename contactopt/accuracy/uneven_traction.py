@@ -19,9 +19,11 @@ import skfem
 from scipy.sparse.linalg import splu
 
 from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.revolved import Revolved
 from contactopt.errors import InputError
 
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
+UNBALANCED = 1e-6  # of the force on a piece
 SOFT = 1e-12  # of the energy: rigid motions of a fan leave as many equations over
 
 
@@ -40,16 +42,15 @@ def uneven_traction(scene: Any) -> float:
             x = pair.ends.at[1][1, own]  # (pieces, 2)
             a, b = pair.points[1][..., f].T
             length = float(np.linalg.norm(b - a))
-            # per length of this side; straight surfaces that face each other have one ratio
-            ratio = pair.rule.weights[own].sum() / (length * np.abs(np.diff(x)).sum())
+            ratio = pair.rule.weights[own].sum(axis=1) / (length * np.abs(np.diff(x))[:, 0])
             at = np.unique(np.concatenate([[0.0, 1.0], x.ravel()]))
             at = at[np.concatenate([[True], np.diff(at) > SAME])]
             if len(at) < 3:
                 continue
             found = np.zeros((len(at) - 1, 2, d))  # of pieces that face nothing
             order, turn = np.argsort(x.min(axis=1)), np.argsort(x, axis=1)[..., None]
-            sorted_ends = np.take_along_axis(ends[own], turn, axis=1)[order]
-            found[np.searchsorted(at, x.mean(axis=1)[order]) - 1] = ratio * sorted_ends
+            per_length = ratio[:, None, None] * np.take_along_axis(ends[own], turn, axis=1)
+            found[np.searchsorted(at, x.mean(axis=1)[order]) - 1] = per_length[order]
             even = np.array([[4.0, -2.0], [-2.0, 4.0]]) / length @ moments[:, f]
             shares = np.stack([at[:-1], at[1:]], axis=1)[..., None]
             missing = found - (1 - shares) * even[0] - shares * even[1]
@@ -62,14 +63,18 @@ def uneven_traction(scene: Any) -> float:
                 outer.append(f)
                 rest.append(missing[i])
         if corners:
-            energy = _least_energy(np.array(corners), np.array(outer), np.array(rest), material)
+            mesh, moments = _fans(np.array(corners), np.array(outer), np.array(rest))
+            if isinstance(cells, Revolved):
+                energy = _least_revolved(Revolved(mesh, cells.degree), moments, material)
+            else:
+                energy = _least_energy(Simplices(mesh), moments, material)
             total += scene.factor * energy
     return float(np.sqrt(total))
 
 
-def _least_energy(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray, material: Any) -> float:
-    """Least energy of stresses on fans of triangles (e, 3, 2), numbered fan by fan, with tractions
-    (e, 2, 2) that are linear between the first two corners of each.
+def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, np.ndarray]:
+    """A mesh of fans of triangles (e, 3, 2), numbered fan by fan, and the moments (facets, 2, 2) of
+    tractions (e, 2, 2) that are linear between the first two corners of each.
     """
     count = len(corners)
     follows = np.concatenate([[False], fan[1:] == fan[:-1]])
@@ -82,7 +87,6 @@ def _least_energy(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray, materi
         points.append(corners[e, 1])
         number[:, e] = len(points) - 2, len(points) - 1, tip
     mesh = skfem.MeshTri(np.array(points).T, number)
-    cells = Simplices(mesh)
     m = np.zeros((mesh.facets.shape[1], 2, 2))
     edge = {tuple(own): i for i, own in enumerate(np.sort(mesh.facets, axis=0).T.tolist())}
     facets = np.array([edge[tuple(own)] for own in np.sort(number[:2], axis=0).T.tolist()])
@@ -91,6 +95,23 @@ def _least_energy(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray, materi
     place = mesh.facets[:, facets] == number[1]  # which of the facet's vertices is the second one
     for v in range(2):
         m[facets, v] = np.where(place[v][:, None], own[:, 1], own[:, 0])
+    return mesh, m
+
+
+def _least_revolved(cells: Revolved, m: np.ndarray, material: Any) -> float:
+    """The least energy of stresses with these moments of tractions in bodies of revolution."""
+    held = np.zeros(m.shape[:2], dtype=bool)
+    none = np.zeros_like(cells.stress(material, np.zeros((2, len(m) + cells.mesh.nvertices))))
+    stress, missed = cells.equilibrated(material, none, np.zeros(2), held, m)
+    if missed > UNBALANCED:
+        raise InputError("pieces of the facets in contact are too short for a bound.")
+    return float(cells.products(material, stress, stress).sum())
+
+
+def _least_energy(cells: Simplices, m: np.ndarray, material: Any) -> float:
+    """The least energy of stresses with these moments of tractions, in the plane."""
+    mesh, count = cells.mesh, len(cells.volume)
+    centre = mesh.p[:, mesh.t].mean(axis=1)
     metric = cells.metric(material, slice(None))
     K = (cells.by_moments.T @ sp.block_diag(metric, format="csr") @ cells.by_moments).tocsr()
     rows, columns, values = [], [], []
@@ -99,7 +120,7 @@ def _least_energy(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray, materi
             x = mesh.p[:, mesh.t[a]]
             for c in range(2):
                 column = (cells.opposite[o] * 2 + slot) * 2 + c
-                arm = cells.sign[o] * (x[0] - corners[:, 2, 0] if c else corners[:, 2, 1] - x[1])
+                arm = cells.sign[o] * (x[0] - centre[0] if c else centre[1] - x[1])
                 for row, value in ((c, cells.sign[o]), (2, arm)):
                     rows.append(3 * np.arange(count) + row)
                     columns.append(column)

@@ -136,6 +136,8 @@ def scenes() -> Iterator[Scene]:
                 yield revolved(on_floor(load, degree, *law), "disc")
             yield revolved(two_blocks("pushed", degree, *law), "discs")
             yield revolved(two_blocks("sheared", degree, *law), "rings", 0.5)
+            yield revolved(two_blocks("pushed", degree, *law, below=7), "mortar of rings", 0.5)
+            yield revolved(two_blocks("plate", degree, *law, below=4), "mortar of discs")
         for name in ("stack", "arch", "cylinder-2d", "sphere"):
             yield of_straight_edges(make_scene(name, simplices=True, degree=degree))
 
