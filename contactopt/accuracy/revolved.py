@@ -139,7 +139,10 @@ class Revolved(Simplices):
         starts = np.arange(len(number) + 1) * number.shape[1]
         C = sp.csr_matrix(((sign * np.tile(share, 3)).ravel(), number.ravel(), starts))
         missing = C @ g + force[1] * self.volume * self.mesh.p[0][self.mesh.t].mean(axis=0)
-        x, missed = _least(K[free][:, free], (slope + K @ g)[free], C[:, free], -missing)
+        rows = np.flatnonzero(abs(C) @ free)  # of elements with a traction to be found
+        x, missed = _least(
+            K[free][:, free], (slope + K @ g)[free], C[rows][:, free], -missing[rows]
+        )
         g[free] = x
         made = self._particular(force)
         for (own, split), part in zip(self._pieces, parts):
@@ -252,7 +255,7 @@ class Revolved(Simplices):
         borne, inner = np.linalg.pinv(tractions), null_space(tractions, rcond=1e-9)
         up = self._map[own, 1] / self._ratio[own, None]
         Z = up @ split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
-        Z = Z.reshape(count, -1, n)[:, :-1]
+        Z = Z.reshape(count, -1, n)[:, :-1]  # the last follows from the balance of the element
         r = np.einsum("ve,pvd->epd", self.mesh.p[0][self.mesh.t[:, own]], split.lever)
         wanted = -force[1] * r.reshape(count, -1)[:, :-1, None]
         size = np.sqrt(np.trace(H, axis1=1, axis2=2))[:, None, None]
