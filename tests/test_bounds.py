@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import skfem
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support
 from contactopt.accuracy.bound import Bound, bounded
+from contactopt.accuracy.displaced_stress import halved
 from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.accuracy.loop import refine
-from contactopt.accuracy.revolved import Revolved
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
@@ -21,14 +23,14 @@ from contactopt.solving.solve_scene import Options, solve_scene
 MATERIAL = Material(1000.0, 0.3)
 
 
-def block(n, up=1.0, seed=0):
-    """A unit square above or below y = 0 of triangles whose inner vertices are moved at random."""
+def block(n, up=1.0, seed=0, kind=skfem.MeshTri):
+    """A unit square above or below y = 0 of elements whose inner vertices are moved at random."""
     ticks = np.linspace(0, 1, n + 1)
-    mesh = skfem.MeshTri.init_tensor(ticks, up * ticks)
+    mesh = kind.init_tensor(ticks, up * ticks)
     p = mesh.p.copy()
     inner = np.all((np.abs(p) > 1e-9) & (np.abs(p) < 1 - 1e-9), axis=0)
     p[:, inner] += 0.15 / n * np.random.default_rng(seed).uniform(-1, 1, p[:, inner].shape)
-    named = skfem.MeshTri(p, mesh.t).with_boundaries(
+    named = kind(p, mesh.t).with_boundaries(
         {
             "contact": lambda x: np.abs(x[1]) < 1e-9,
             "far": lambda x: np.abs(x[1] - up) < 1e-9,
@@ -61,6 +63,12 @@ def ring_on_floor(degree=1, plate=True, inner=0.0, law="frictionless", mu=0.0):
     return Scene("s", ring, floor, mu, "axisymmetric", law=law, degree=degree)
 
 
+def of_quadrilaterals(scene):
+    return scene.with_parts(
+        lambda part: replace(part, mesh=block(5, kind=skfem.MeshQuad)) if part.elastic else part
+    )
+
+
 def discs(degree, below):
     """A disc on another one, joined by mortar."""
     axis = Support("left", {"r": 0.0})
@@ -87,10 +95,15 @@ def narrower():
 
 
 def fine(scene, times=2):
+    """Quadratic displacements on triangles of half the size, as often as asked for."""
+
+    def finer(part):
+        quadrilaterals = part.elastic and isinstance(part.mesh, skfem.MeshQuad)
+        mesh = halved(part.mesh).mesh if quadrilaterals else part.elastic and part.mesh
+        return replace(part, mesh=split(mesh, {})) if part.elastic else part
+
     for _ in range(times):
-        scene = scene.with_parts(
-            lambda part: replace(part, mesh=split(part.mesh, {})) if part.elastic else part
-        )
+        scene = scene.with_parts(finer)
     return solve_scene(replace(scene, degree=2))
 
 
@@ -154,6 +167,8 @@ def test_the_nearest_stress_does_not_depend_on_the_numbering():
         (ring_on_floor(1, plate=False), 0.0),
         (ring_on_floor(2, plate=False, inner=0.5), 0.0),
         (discs(1, 7), 0.0),
+        (of_quadrilaterals(on_floor(1, plate=False)), 0.0),
+        (of_quadrilaterals(ring_on_floor(1, plate=False)), 0.0),
         (discs(2, 4), 0.0),
     ],
     ids=[
@@ -167,6 +182,8 @@ def test_the_nearest_stress_does_not_depend_on_the_numbering():
         "disc",
         "quadratic ring",
         "mortar of discs",
+        "quadrilaterals",
+        "disc of quadrilaterals",
         "quadratic mortar of discs",
     ],
 )
@@ -208,36 +225,70 @@ def test_the_bound_is_the_error_where_the_stress_is_linear():
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("inner", [0.0, 0.5, 50.0])
-def test_a_stress_of_revolution_does_the_work_of_the_loads(degree, inner):
-    """For every displacement of a ring, from any stress: it is in equilibrium everywhere."""
-    random, mesh = np.random.default_rng(1), block(4)
-    cells = Revolved(replace(mesh, doflocs=mesh.p + np.array([[inner], [0.0]])), degree)
-    mesh, (first, second) = cells.mesh, cells.mesh.facets
+@pytest.mark.parametrize("inner", [0.0, 0.5, 50.0, None])
+def test_a_stress_of_a_section_does_the_work_of_the_loads(degree, inner):
+    """For every displacement of a ring, or in plane strain, from any stress: it is in equilibrium
+    everywhere.
+    """
+    random, mesh, revolved = np.random.default_rng(1), block(4), inner is not None
+    mesh = replace(mesh, doflocs=mesh.p + np.array([[inner or 0.0], [0.0]]))
+    cells = EquilibriumElements(mesh, degree, revolved)
+    first, second = mesh.facets
     height = mesh.p[1, mesh.facets]
     held = np.repeat(np.all(height < 1e-9, axis=0)[:, None], 2, axis=1)
     loaded = np.all(height > 1 - 1e-9, axis=0)
     length = np.linalg.norm(mesh.p[:, second] - mesh.p[:, first], axis=0)
-    t = random.standard_normal((2, mesh.nvertices)) * (mesh.p[0] > 1e-9)  # r times tractions
+    axis = mesh.p[0] < 1e-9 if revolved else np.zeros(mesh.nvertices, dtype=bool)
+    t = random.standard_normal((2, mesh.nvertices)) * ~axis  # in a ring r times tractions
     one, other = t[:, first], t[:, second]
     moments = np.stack([2 * one + other, one + 2 * other]).transpose(2, 0, 1) / 6
     moments *= (length * loaded)[:, None, None]
-    force = np.array([1.3, -2.0 if degree == 2 else 0.0])
+    force = np.array([1.3, 0.0 if revolved and degree == 1 else -2.0])
     near = random.standard_normal((mesh.nelements, 18 * degree, 4))
     made, unbalanced = cells.equilibrated(MATERIAL, near, force, held, moments)
     w = random.standard_normal((2, mesh.nvertices + len(length)))
     x = cells.quadratic(mesh.p)
-    w[:, x[1] < 1e-9], w[0, x[0] < 1e-9] = 0.0, 0.0
+    w[:, x[1] < 1e-9] = 0.0
+    if revolved:
+        w[0, x[0] < 1e-9] = 0.0
     found = cells.products(MATERIAL, made, cells.stress(MATERIAL, w)).sum()
     basis = skfem.CellBasis(mesh, skfem.ElementTriP2(), intorder=4)
-    r = skfem.LinearForm(lambda v, own: own.x[0] * v).assemble(basis)
+    measure = skfem.LinearForm(lambda v, own: (own.x[0] if revolved else 1.0) * v).assemble(basis)
     places = np.argsort(np.lexsort(x)), np.lexsort(basis.doflocs)
-    work = force @ w @ r[places[1][places[0]]]
+    work = force @ w @ measure[places[1][places[0]]]
     a, b, c = w[:, first], w[:, second], w[:, mesh.nvertices + np.arange(len(length))]
     # of a quadratic displacement and a linear traction
     ends = one * (a + 2 * c) + other * (b + 2 * c)
     work += np.sum(ends * length * loaded) / 6
-    assert abs(found - work) < 1e-11 * abs(near).max() * max(1.0, inner) and unbalanced < 1e-13
+    assert abs(found - work) < 1e-11 * max(1.0, inner or 0.0) and unbalanced < 1e-11
+
+
+def test_the_stress_of_a_bilinear_displacement():
+    """On any quadrilaterals: the slopes at a point are those between points near it, and on
+    parallelograms the displacement is quadratic.
+    """
+    random = np.random.default_rng(0)
+    square = skfem.MeshQuad().refined(2)
+    sheared = replace(square, doflocs=np.array([[1.0, 0.3], [-0.2, 0.8]]) @ square.p)
+    U = random.standard_normal((2, square.nvertices))
+    halves = halved(sheared)
+    cells = EquilibriumElements(halves.mesh, 1, False, halves.corners)
+    plain, nodal = EquilibriumElements(halves.mesh, 1, False), cells.quadratic(U)
+    for facet in np.flatnonzero(halves.mesh.f2t[1] >= 0):
+        own = halves.corners[:, halves.mesh.f2t[:, facet]]
+        if set(own[:, 0]) == set(own[:, 1]):  # a diagonal
+            nodal[:, halves.mesh.nvertices + facet] = U[:, own[:, 0]].mean(axis=1)
+    one = cells.stress(MATERIAL, cells.quadratic(U))
+    assert np.allclose(one, plain.stress(MATERIAL, nodal))
+    bent = replace(square, doflocs=square.p + 0.02 * random.standard_normal(square.p.shape))
+    halves = halved(bent)
+    basis = skfem.CellBasis(bent, skfem.ElementVector(skfem.ElementQuad1()), intorder=6)
+    cells = EquilibriumElements(halves.mesh, 1, False, halves.corners)
+    found = cells.stress(MATERIAL, cells.quadratic(U))
+    energy = linear_elasticity(*lame_parameters(1000.0, 0.3)).assemble(basis)
+    flat = U.T.ravel()
+    whole = cells.products(MATERIAL, found, found).sum()
+    assert np.isclose(whole, flat @ energy @ flat, rtol=1e-4)
 
 
 @pytest.mark.parametrize(("plate", "name"), [(True, "approach"), (False, "normal_force")])
@@ -272,9 +323,9 @@ def test_a_solver_that_stops_early_shows_in_the_bound():
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        (make_scene("sphere"), "triangles or tetrahedra"),
+        (make_scene("rigid-punch-2d"), "with linear displacements"),
         (make_scene("rigid-punch-axisymmetric", simplices=True), "rounding leaves no bound"),
-        (make_scene("punch-2d"), "triangles or tetrahedra"),
+        (make_scene("punch-3d"), "triangles, tetrahedra"),
         (replace(on_floor(), mu=0.2, law="associated"), "law 'associated'"),
     ],
 )
@@ -296,7 +347,9 @@ def test_a_search_says_bound_or_estimate():
     scene = on_floor()
     _, found = refine([scene], "approach", 0.02, adaptive=True)
     assert found.guarantee.sentence.startswith("bound:") and found.guarantee.bound < 0.1
-    _, found = refine([make_scene("punch-2d")], "approach", 0.05)
+    _, found = refine([make_scene("punch-2d", mu=0.0)], "approach", 0.05)
+    assert found.guarantee.bound < 0.1
+    _, found = refine([make_scene("punch-3d")], "approach", 0.05)
     assert found.guarantee.sentence.startswith("estimate, no bound: body")
 
 

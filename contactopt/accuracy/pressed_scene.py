@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.accuracy.displaced_stress import Halves, halved
 from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.accuracy.facing_facets import (
     NEAR,
     FacingFacets,
@@ -18,7 +20,6 @@ from contactopt.accuracy.facing_facets import (
     measures,
     quadratic_shapes,
 )
-from contactopt.accuracy.revolved import Revolved
 from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.rigid import RigidBody
 from contactopt.errors import InputError
@@ -84,26 +85,34 @@ class PressedScene:
             return None
         if not isinstance(body, ElasticBody):
             raise InputError(f"body '{body.name}' has no elements here; a bound needs them.")
-        mesh, name = body.body.basis.mesh, f"body '{body.name}'"
-        if mesh.refdom.__name__ not in ("RefTri", "RefTet") or is_curved(mesh):
-            raise InputError(f"{name}: a bound needs triangles or tetrahedra, not curved.")
-        if not self.revolved:
+        mesh, degree, name = body.body.basis.mesh, body.body.degree, f"body '{body.name}'"
+        shape = mesh.refdom.__name__
+        linear = ("RefQuad",) if degree == 1 else ()
+        if shape not in ("RefTri", "RefTet", *linear) or is_curved(mesh):
+            raise InputError(
+                f"{name}: a bound needs triangles, tetrahedra, or quadrilaterals with linear"
+                " displacements, none of them curved."
+            )
+        if shape == "RefTet" or (shape == "RefTri" and not self.revolved):
             return Simplices(mesh)
+        halves = Halves(mesh) if shape == "RefTri" else halved(mesh)
+        mesh = halves.mesh
         made: Any = Simplices(mesh)
         edges = mesh.p[:, mesh.facets[1]] - mesh.p[:, mesh.facets[0]]
         longest = np.sum(edges**2, axis=0)[made.opposite].max(axis=0)
         if np.any(longest > THIN * 2 * made.volume):
             raise InputError(
-                f"{name}: of a ring of triangles {THIN:g} times as long as high rounding leaves no"
-                " bound; make the mesh less steeply graded."
+                f"{name}: of elements {THIN:g} times as long as high rounding leaves no bound; make"
+                " the mesh less steeply graded."
             )
         part: Any = self.reduction.scene.parts[number]
         holding = [own for own in part.supports if "z" in (own.displacement or ("z",))]
         plates = [own for own in part.loads if isinstance(own, Plate)]
-        if plates and len(holding) + len(plates) > 1:
+        if self.revolved and plates and len(holding) + len(plates) > 1:
             raise InputError(f"{name}: a bound needs nothing else that holds it beside the plate.")
         heavy = any(isinstance(own, BodyForce) and own.value[1] for own in part.loads)
-        return Revolved(mesh, 2 if heavy else body.body.degree)
+        order = 2 if self.revolved and heavy else degree
+        return EquilibriumElements(mesh, order, self.revolved, halves.corners)
 
     def limit_of(self, t: np.ndarray) -> np.ndarray:
         """The friction bound (k,) under tractions."""

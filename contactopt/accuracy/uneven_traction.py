@@ -19,7 +19,7 @@ import skfem
 from scipy.sparse.linalg import splu
 
 from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.revolved import Revolved
+from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.errors import InputError
 
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
@@ -64,8 +64,9 @@ def uneven_traction(scene: Any) -> float:
                 rest.append(missing[i])
         if corners:
             mesh, moments = _fans(np.array(corners), np.array(outer), np.array(rest))
-            if isinstance(cells, Revolved):
-                energy = _least_revolved(Revolved(mesh, cells.degree), moments, material)
+            if isinstance(cells, EquilibriumElements):
+                fans = EquilibriumElements(mesh, cells.degree, cells.revolved)
+                energy = _least_in_balance(fans, moments, material)
             else:
                 energy = _least_energy(Simplices(mesh), moments, material)
             total += scene.factor * energy
@@ -98,8 +99,8 @@ def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, 
     return mesh, m
 
 
-def _least_revolved(cells: Revolved, m: np.ndarray, material: Any) -> float:
-    """The least energy of stresses with these moments of tractions in bodies of revolution."""
+def _least_in_balance(cells: EquilibriumElements, m: np.ndarray, material: Any) -> float:
+    """The least energy of stresses with these moments of tractions."""
     held = np.zeros(m.shape[:2], dtype=bool)
     none = np.zeros_like(cells.stress(material, np.zeros((2, len(m) + cells.mesh.nvertices))))
     stress, missed = cells.equilibrated(material, none, np.zeros(2), held, m)
@@ -109,7 +110,7 @@ def _least_revolved(cells: Revolved, m: np.ndarray, material: Any) -> float:
 
 
 def _least_energy(cells: Simplices, m: np.ndarray, material: Any) -> float:
-    """The least energy of stresses with these moments of tractions, in the plane."""
+    """The same of the composite stresses of contactopt.accuracy.equilibrated."""
     mesh, count = cells.mesh, len(cells.volume)
     centre = mesh.p[:, mesh.t].mean(axis=1)
     metric = cells.metric(material, slice(None))

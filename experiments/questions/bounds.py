@@ -19,10 +19,13 @@ from typing import Any
 
 import numpy as np
 import skfem
+from skfem.refdom import RefQuad
 
 from contactopt import Material
 from contactopt.accuracy.bound import Bound
+from contactopt.accuracy.displaced_stress import bilinear, halved
 from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.accuracy.loop import refine
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
@@ -140,6 +143,10 @@ def scenes() -> Iterator[Scene]:
             yield revolved(two_blocks("plate", degree, *law, below=4), "mortar of discs")
         for name in ("stack", "arch", "cylinder-2d", "sphere"):
             yield of_straight_edges(make_scene(name, simplices=True, degree=degree))
+    for name in ("punch-2d", "cylinder-2d", "sphere"):
+        for mu in (0.0, 0.5):
+            scene = make_scene(name, mu=mu)
+            yield replace(of_straight_edges(scene), name=f"{name}, quadrilaterals, mu = {mu:g}")
 
 
 def revolved(scene: Scene, name: str, inner: float = 0.0) -> Scene:
@@ -180,11 +187,16 @@ def of_straight_edges(scene: Scene, elements: int = NAMED) -> Scene:
 
 
 def finer(scene: Scene) -> Scene:
-    """The scene of the reference."""
+    """The scene of the reference, of triangles or tetrahedra."""
+
+    def halves(part: Any) -> Any:
+        if not part.elastic:
+            return part
+        mesh = halved(part.mesh).mesh if part.mesh.refdom is RefQuad else part.mesh
+        return replace(part, mesh=split(mesh, {}))
+
     for _ in range(FINER[scene.dim]):
-        scene = scene.with_parts(
-            lambda part: replace(part, mesh=split(part.mesh, {})) if part.elastic else part
-        )
+        scene = scene.with_parts(halves)
     return replace(scene, degree=2)
 
 
@@ -195,6 +207,10 @@ def carried(coarse: Simplices, nodal: np.ndarray, fine: Simplices) -> np.ndarray
     own = np.zeros(places.shape[1], dtype=int)
     for nodes in (*mesh.t, *(mesh.nvertices + fine.between[1])):
         own[nodes] = holder
+    if isinstance(coarse, EquilibriumElements) and coarse.corners is not None:
+        corners = coarse.corners[:, own]
+        N, _ = bilinear(coarse.mesh.p[:, corners], places[..., None])
+        return np.asarray(np.einsum("an,can->cn", N[..., 0], nodal[:, corners]))
     origin = coarse.mesh.p[:, coarse.mesh.t[0, own]]
     shares = np.einsum("nai,in->an", coarse.slopes[own], places - origin)
     shares[0] += 1
@@ -295,6 +311,9 @@ def costs() -> list[dict[str, Any]]:
     for degree, n in ((1, 48), (2, 24)):
         scene = of_straight_edges(make_scene("sphere", simplices=True, degree=degree), n)
         made.append((f"sphere, triangles of degree {degree}, mu = {scene.pairs[0].mu:g}", scene, n))
+    for given in ("punch-2d", "cylinder-2d", "sphere"):
+        scene = of_straight_edges(make_scene(given, mu=0.0), 48)
+        made.append((f"{given}, quadrilaterals, mu = 0", scene, 48))
     rows = []
     for name, scene, n in made:
         solved = solve_scene(scene, n)

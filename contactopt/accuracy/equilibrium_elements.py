@@ -1,24 +1,26 @@
-"""A stress in exact equilibrium in a body of revolution.
+"""A stress in exact equilibrium in a plane section: of plane strain, or of a body of revolution.
 
-With S = r s for the stresses s_rr, s_zz and s_rz in the half plane of cylindrical coordinates, and
-the force f per volume, equilibrium says that
+In plane strain it is S = s with div S + f = 0 for the force f per volume. In the half plane of
+cylindrical coordinates let S = r s for the stresses s_rr, s_zz and s_rz. Equilibrium then says that
 
     (div S)_z + r f_z = 0,        s_tt = (div S)_r + r f_r,
 
-where the second equation is only what the hoop stress s_tt is. So the bodies need no balance of
-forces along r. S is made of the composite stresses of contactopt.accuracy.split_triangle, of degree
-1 for linear displacements and 2 for quadratic ones. Hence tractions times r are polynomials of this
-degree on each edge. On the axis S is zero, which makes every stress finite.
+where the second equation is only what the hoop stress s_tt is, so that the bodies need no balance
+of forces along r. S is made of the composite stresses of contactopt.accuracy.split_triangle, of
+degree 1 for linear displacements and 2 for quadratic ones. Hence tractions, times r in bodies of
+revolution, are polynomials of this degree on each edge. On the axis S is zero, which makes every
+stress finite.
 
 Unknown are the tractions S n at points of the edges, so many that they determine the polynomials.
-They hold every element in balance along z. Of all stresses in an element that have these tractions
-that one is taken which makes the energy of s - s(u) least, and then the tractions that make it
-least in the whole body: a sparse linear system.
+They hold every element in balance. Of all stresses in an element that have these tractions that one
+is taken which makes the energy of s - s(u) least, and then the tractions that make it least in the
+whole body: a sparse linear system. The displacement u may be any one.
 
 Integrals with 1 / r are taken by a rule on each part of a triangle.
 
-Source: Love (1927), A treatise on the mathematical theory of elasticity, section 188, for the
-equations of equilibrium; else as contactopt.accuracy.split_triangle.
+Source: Fraeijs de Veubeke (1965), Displacement and equilibrium models in the finite element method,
+for tractions as unknowns; Love (1927), A treatise on the mathematical theory of elasticity, section
+188, for bodies of revolution; else as contactopt.accuracy.split_triangle.
 """
 
 from __future__ import annotations
@@ -29,21 +31,27 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import null_space
+from scipy.linalg import null_space, qr
 from scipy.sparse.linalg import splu
 
+from contactopt.accuracy.displaced_stress import bilinear, displaced_stress
 from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.split_triangle import PAIRS, SplitTriangle, split_triangle
 from contactopt.errors import InputError
-from contactopt.material import Material, lame
+from contactopt.material import Material
 
+NONE = 1e-9  # of the largest singular value, what is zero
 BLOCK = 1024  # elements at a time
 AXIS = 1e-12  # of the largest radius
 SOFT = 1e-12  # of the scaled energy: constraints leave nothing free
-STIFF = 1e4  # of the balance of elements, in the same scale
-BALANCED = 1e-14  # of the force on an element, so much may be missing
+STIFF = 1e6  # of the balance of elements, in the same scale
+BALANCED = 1e-11  # of the force on an element, so much may be missing
 CORRECTIONS = 20  # of the multipliers of the balance, at most
-SHARES = {1: np.array([1.0, 1.0]) / 2, 2: np.array([1.0, 4.0, 1.0]) / 6}  # integrals over edges
+# integrals over an edge of the hat functions of its ends times the shape functions of its points
+LEVERS = {
+    1: np.array([[2.0, 1.0], [1.0, 2.0]]) / 6,
+    2: np.array([[1.0, 2.0, 0.0], [0.0, 2.0, 1.0]]) / 6,
+}
 
 
 class _Elements(NamedTuple):
@@ -62,14 +70,20 @@ class _Elements(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Revolved(Simplices):
-    """Triangles in the half plane r >= 0 of a body of revolution, and the degree of S there.
+class EquilibriumElements(Simplices):
+    """Triangles of a plane section, and the degree of S there.
 
-    A stress (e, s, 4) has the components rr, zz, rz and hoop at s points of each element. Integrals
-    are those over an angle of one.
+    revolved  whether the section is the half plane r >= 0 of a body of revolution
+    corners   (4, e) of the quadrilaterals that the triangles are halves of, if displacements are
+              bilinear there
+
+    A stress (e, s, 4) has the components rr, zz, rz and hoop, in plane strain xx, yy, xy and zz, at
+    s points of each element. Integrals are those over an angle or a thickness of one.
     """
 
     degree: int
+    revolved: bool
+    corners: np.ndarray | None = None
 
     @property
     def _any(self) -> SplitTriangle:
@@ -78,22 +92,20 @@ class Revolved(Simplices):
 
     def stress(self, material: Material, nodal: np.ndarray) -> np.ndarray:
         """The stress (e, s, 4) of a displacement (2, vertices and edges)."""
-        lam, shear = lame(material)
-        at = self._any.shares.transpose(1, 0, 2).reshape(3, -1)
-        (i, j), edges = self.between
-        own = np.concatenate(
-            [nodal[:, self.mesh.t], nodal[:, self.mesh.nvertices + edges]], axis=1
-        )  # (2, 6, e)
-        at_vertices = np.einsum("vs,evk->vkes", 4 * at - 1, self.slopes)
-        at_edges = np.einsum("js,ejk->jkes", 4 * at[i], self.slopes[:, j])
-        at_edges += np.einsum("js,ejk->jkes", 4 * at[j], self.slopes[:, i])
-        slopes = np.concatenate([at_vertices, at_edges])
-        gradient = np.einsum("cqe,qkes->ckes", own, slopes, optimize=True)
-        shapes = np.concatenate([at * (2 * at - 1), 4 * at[i] * at[j]])
-        strains = gradient[0, 0], gradient[1, 1], own[0].T @ shapes / self._radius
-        normal = [lam * sum(strains) + 2 * shear * strain for strain in strains]
-        turn = shear * (gradient[0, 1] + gradient[1, 0])
-        return np.stack([normal[0], normal[1], turn, normal[2]], axis=-1)
+        return displaced_stress(
+            self, material, nodal, self._points, self._radius if self.revolved else None
+        )
+
+    @cached_property
+    def _points(self) -> np.ndarray:
+        """(3, s) shares of the vertices."""
+        return self._any.shares.transpose(1, 0, 2).reshape(3, -1)
+
+    @cached_property
+    def bilinear(self) -> tuple[np.ndarray, np.ndarray]:
+        """Shape functions of the quadrilaterals, and their slopes, at the points."""
+        places = np.einsum("dve,vs->des", self.mesh.p[:, self.mesh.t], self._points)
+        return bilinear(self.mesh.p[:, self.corners], places)
 
     def data_of(self, stress: np.ndarray) -> np.ndarray:
         """A stress is its own data."""
@@ -117,16 +129,16 @@ class Revolved(Simplices):
         Parameters
         ----------
         material, stress, force, held : As for Simplices.equilibrated().
-        moments : (facets, 2, 2) of r times the tractions on the other boundary facets, vertex by
-            vertex, with the hat functions of the edge [force / length].
+        moments : (facets, 2, 2) of the tractions on the other boundary facets, vertex by vertex,
+            with the hat functions of the edge; of r times them in bodies of revolution.
 
         Returns
         -------
-        The stress (e, s, 4), and the largest force by which an element is out of balance along z
-        over the largest force on one.
+        The stress (e, s, 4), and the largest force by which an element is out of balance over the
+        largest force on one.
         """
         parts = [self._least_within(material, stress, force, *own) for own in self._pieces]
-        g, (number, sign) = self._given(held, moments).ravel(), self._numbers
+        g, number = self._given(held, moments).ravel(), self._numbers[0]
         free = np.isnan(g)
         g[free] = 0.0
         K, slope = sp.csr_matrix((len(g), len(g))), np.zeros(len(g))
@@ -135,10 +147,8 @@ class Revolved(Simplices):
             slope += np.bincount(at.ravel(), part.slope.ravel(), len(g))
             rows, columns = np.repeat(at, at.shape[1], axis=1), np.tile(at, (1, at.shape[1]))
             K = K + sp.csr_matrix((part.form.ravel(), (rows.ravel(), columns.ravel())), K.shape)
-        share = np.repeat(SHARES[self.degree], 2) * np.tile([0.0, 1.0], self.degree + 1)
-        starts = np.arange(len(number) + 1) * number.shape[1]
-        C = sp.csr_matrix(((sign * np.tile(share, 3)).ravel(), number.ravel(), starts))
-        missing = C @ g + force[1] * self.volume * self.mesh.p[0][self.mesh.t].mean(axis=0)
+        C, load = self._balance(force)
+        missing = C @ g + load
         rows = np.flatnonzero(abs(C) @ free)  # of elements with a traction to be found
         x, missed = _least(
             K[free][:, free], (slope + K @ g)[free], C[rows][:, free], -missing[rows]
@@ -147,14 +157,7 @@ class Revolved(Simplices):
         made = self._particular(force)
         for (own, split), part in zip(self._pieces, parts):
             c = (part.stress @ g[number[own], None])[..., 0] + part.rest
-            S, divergence = _by_points(split)
-            made[own, :, :3] += (
-                (c @ S).reshape(len(own), -1, 3)
-                @ self._carried(own).swapaxes(1, 2)
-                / self._radius[own, :, None]
-            )
-            down = self._map[own, :1] / self._ratio[own, None, None]
-            made[own, :, 3:] += (c @ divergence).reshape(len(own), -1, 2) @ down.swapaxes(1, 2)
+            made[own] += self._combined(own, split, material, c)
         return made, missed
 
     @cached_property
@@ -170,7 +173,9 @@ class Revolved(Simplices):
 
     @cached_property
     def _radius(self) -> np.ndarray:
-        """(e, s) of the points."""
+        """(e, s) of the points; one in plane strain."""
+        if not self.revolved:
+            return np.ones((len(self.volume), self._any.shares.size // 3))
         r = np.einsum("ve,pvs->eps", self.mesh.p[0][self.mesh.t], self._any.shares)
         return np.asarray(r.reshape(len(r), -1))
 
@@ -182,7 +187,7 @@ class Revolved(Simplices):
     @cached_property
     def _axis(self) -> np.ndarray:
         """(facets,) whether an edge lies on the axis."""
-        r = self.mesh.p[0]
+        r = self.mesh.p[0] if self.revolved else np.ones(self.mesh.nvertices)
         return np.asarray(np.all(r[self.mesh.facets] <= AXIS * r.max(), axis=0))
 
     @cached_property
@@ -200,8 +205,34 @@ class Revolved(Simplices):
     def _particular(self, force: np.ndarray) -> np.ndarray:
         """The hoop stress of a force along r."""
         out = np.zeros((*self._radius.shape, 4))
-        out[..., 3] = force[0] * self._radius
+        if self.revolved:
+            out[..., 3] = force[0] * self._radius
         return out
+
+    def _balance(self, force: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
+        """The forces on elements by the tractions, and those of the load: along z, or in plane
+        strain along both axes and about the centroid.
+        """
+        number, sign = self._numbers
+        count, lever = self.degree + 1, LEVERS[self.degree]
+        corners = self.mesh.p[:, self.mesh.t]
+        middle = corners.mean(axis=1)
+        arms = np.einsum(
+            "dove,vp->edop", (corners - middle[:, None])[:, self.others], lever, optimize=True
+        )  # of each traction
+        way = np.zeros((3, len(number), 3, count, 2))
+        for c in range(2):
+            way[c, ..., c] = lever.sum(axis=0)
+        way[2, ..., 0], way[2, ..., 1] = -arms[:, 1], arms[:, 0]
+        load = np.stack([force[0] * self.volume, force[1] * self.volume, 0 * self.volume])
+        if self.revolved:
+            way, load = way[1:2], load[1:2] * middle[0]
+        value = way.reshape(len(way), *number.shape) * sign
+        starts = np.arange(value[..., 0].size + 1) * number.shape[1]
+        columns = np.broadcast_to(number, value.shape)
+        size = self.mesh.facets.shape[1] * count * 2
+        C = sp.csr_matrix((value.ravel(), columns.ravel(), starts), (len(starts) - 1, size))
+        return C, load.ravel()
 
     def _given(self, held: np.ndarray, moments: np.ndarray) -> np.ndarray:
         """Tractions (facets, k + 1, 2) on the boundary and the axis; else they are not a number."""
@@ -211,8 +242,9 @@ class Revolved(Simplices):
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
         g = np.where(known[:, None], g, np.nan)
         g[self._axis] = 0.0
-        for end, vertices in zip((0, -1), self.mesh.facets):
-            g[self.mesh.p[0, vertices] <= AXIS * self.mesh.p[0].max(), end] = 0.0
+        on_axis = np.isin(self.mesh.facets, self.mesh.facets[:, self._axis])
+        for end, there in zip((0, -1), on_axis):
+            g[there, end] = 0.0
         return np.asarray(g)
 
     def _carried(self, own: np.ndarray) -> np.ndarray:
@@ -226,15 +258,57 @@ class Revolved(Simplices):
                     out[:, row, column] += B[:, i, b] * B[:, j, a]
         return out / self._ratio[own, None, None]
 
-    def _made(self, own: np.ndarray, split: SplitTriangle) -> np.ndarray:
-        """(e, s, 4, n) the stress by the composite stresses of elements."""
-        n, (S, divergence) = split.stress.shape[-1], _by_points(split)
-        there, down = self._carried(own), self._map[own, 0] / self._ratio[own, None]
-        out = np.empty((len(own), len(S.T) // 3, 4, n))
-        out[:, :, :3] = there[:, None] @ S.T.reshape(-1, 3, n) / self._radius[own, :, None, None]
-        hoop = down @ divergence.T.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
-        out[:, :, 3] = hoop.reshape(len(own), -1, n)
+    def _combined(
+        self, own: np.ndarray, split: SplitTriangle, material: Material, c: np.ndarray
+    ) -> np.ndarray:
+        """The stress (e, s, 4) of c (e, n) times the composite stresses of elements."""
+        n = split.stress.shape[-1]
+        S = (c @ split.stress.reshape(-1, n).T).reshape(len(own), -1, 3)
+        out = np.empty((*S.shape[:2], 4))
+        out[..., :3] = S @ self._carried(own).swapaxes(1, 2) / self._radius[own, :, None]
+        if not self.revolved:
+            out[..., 3] = material.nu * (out[..., 0] + out[..., 1])
+            return out
+        divergence = (c @ split.divergence.reshape(-1, n).T).reshape(len(own), -1, 2)
+        down = self._map[own, 0] / self._ratio[own, None]
+        out[..., 3] = (divergence @ down[..., None])[..., 0]
         return out
+
+    def _made(self, own: np.ndarray, split: SplitTriangle, material: Material) -> np.ndarray:
+        """(e, s, 4, n) the stress by the composite stresses of elements."""
+        n = split.stress.shape[-1]
+        S, r = split.stress.reshape(-1, 3, n), self._radius[own, :, None, None]
+        out = np.empty((len(own), len(S), 4, n))
+        out[:, :, :3] = self._carried(own)[:, None] @ S / r
+        if self.revolved:
+            down = self._map[own, 0] / self._ratio[own, None]
+            by_point = split.divergence.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
+            out[:, :, 3] = (down @ by_point).reshape(len(own), -1, n)
+        else:
+            out[:, :, 3] = material.nu * (out[:, :, 0] + out[:, :, 1])
+        return out
+
+    def _divergences(
+        self, own: np.ndarray, split: SplitTriangle, force: np.ndarray, inner: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(e, m, n) and (e, m) which divergences are wanted; others follow from the balance of the
+        element.
+        """
+        n, ratio = split.stress.shape[-1], self._ratio[own]
+        if self.revolved:
+            by_node = split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
+            up = self._map[own, 1] / ratio[:, None]
+            r = np.einsum("ve,pvd->epd", self.mesh.p[0][self.mesh.t[:, own]], split.lever)
+            Z = (up @ by_node).reshape(len(own), -1, n)
+            return Z[:, :-1], -force[1] * r.reshape(len(own), -1)[:, :-1]
+        every = split.nodes.reshape(-1, n)  # on the reference triangle, the same for all
+        _, left, order = qr((every @ inner).T, mode="economic", pivoting=True)
+        chosen = order[: np.count_nonzero(np.abs(left.diagonal()) > NONE)]
+        wanted = -(self.back[own] @ force) * ratio[:, None]
+        return (
+            np.broadcast_to(every[chosen], (len(own), len(chosen), n)),
+            np.tile(wanted, (1, len(every) // 2))[:, chosen],
+        )
 
     def _least_within(
         self,
@@ -246,20 +320,16 @@ class Revolved(Simplices):
     ) -> _Elements:
         """The stresses in some elements that make the energy of s - s(u) least."""
         n, count = split.stress.shape[-1], len(own)
-        made = self._made(own, split)
+        made = self._made(own, split, material)
         weighted = _compliance(material) @ made * self._weights[own, :, None, None]
         made, weighted = made.reshape(count, -1, n), weighted.reshape(count, -1, n).swapaxes(1, 2)
         H = weighted @ made
         h = weighted @ (self._particular(force) - stress)[own].reshape(count, -1, 1)
         tractions = split.tractions.reshape(-1, n)
-        borne, inner = np.linalg.pinv(tractions), null_space(tractions, rcond=1e-9)
-        up = self._map[own, 1] / self._ratio[own, None]
-        Z = up @ split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
-        Z = Z.reshape(count, -1, n)[:, :-1]  # the last follows from the balance of the element
-        r = np.einsum("ve,pvd->epd", self.mesh.p[0][self.mesh.t[:, own]], split.lever)
-        wanted = -force[1] * r.reshape(count, -1)[:, :-1, None]
+        borne, inner = np.linalg.pinv(tractions), null_space(tractions, rcond=NONE)
+        Z, wanted = self._divergences(own, split, force, inner)
         size = np.sqrt(np.trace(H, axis1=1, axis2=2))[:, None, None]
-        Z, wanted = size * Z, size * wanted  # entries of one size
+        Z, wanted = size * Z, size * wanted[..., None]  # entries of one size
         system = np.zeros((count, *[inner.shape[1] + Z.shape[1]] * 2))
         y, mu = slice(0, inner.shape[1]), slice(inner.shape[1], None)
         system[:, y, y], system[:, mu, y] = inner.T @ H @ inner, Z @ inner
@@ -275,14 +345,8 @@ class Revolved(Simplices):
         return _Elements(R, rest[..., 0], turned @ H @ R, (turned @ (H @ rest + h))[..., 0])
 
 
-def _by_points(split: SplitTriangle) -> tuple[np.ndarray, np.ndarray]:
-    """The stress (n, 3 s) and its divergence (n, 2 s) at all points."""
-    n = split.stress.shape[-1]
-    return split.stress.reshape(-1, n).T, split.divergence.reshape(-1, n).T
-
-
 def _compliance(material: Material) -> np.ndarray:
-    """(4, 4) strains by the stresses rr, zz, rz and hoop, with the shear strain twice."""
+    """(4, 4) strains by the stresses, with the shear strain twice."""
     out = np.full((4, 4), -material.nu)
     np.fill_diagonal(out, 1.0)
     out[2] = out[:, 2] = 0.0
