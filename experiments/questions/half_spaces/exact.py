@@ -10,7 +10,7 @@ import numpy as np
 from contactopt import HalfSpace, Material, follow, scenes, solve
 from contactopt.analytic import contact_modulus, cycle_loss_point, tangential_modulus
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.readings.half_space_readings import subsurface_stress, surface_contact
+from contactopt.readings.half_space_readings import surface_contact
 from experiments.questions.half_spaces.measured import Row, cpu, solved
 
 STEPS = 4  # of the path from zero to the largest shear
@@ -49,26 +49,12 @@ def hertz_rows() -> list[Row]:
             else np.nan,
             "pressure in L2": np.linalg.norm(pressure - exact.pressure(distance))
             / np.linalg.norm(exact.pressure(distance)),
-            "von Mises / p0": np.nan,
-            "at depth / a": np.nan,
         }
-        if points >= 64:
-            depths = exact.half_width * np.linspace(0.44, 0.52, 9)
-            mises = subsurface_stress(reduction, solution, depths)[1].reshape(len(depths), -1)
-            below = mises[:, np.argmin(distance)]
-            place, curve = _summit(depths, below)
-            made |= {"von Mises / p0": curve / exact.peak, "at depth / a": place / exact.half_width}
         rows.append(
             made
             | {"products": row["products"], "CPU s": row["CPU s, problem"] + row["CPU s, solve"]}
         )
     return rows
-
-
-def _summit(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Place and height of the summit of a parabola through all points."""
-    c, b, a = np.polyfit(x - x.mean(), y, 2)
-    return float(x.mean() - b / (2 * c)), float(a - b**2 / (4 * c))
 
 
 def cattaneo_rows() -> list[Row]:
