@@ -1,10 +1,10 @@
 """The choice between the ways to a solution by their cost, estimated from the matrices at hand.
 
 A way is a form of Q and a solver of the bodies: a dense Q, products with Q by factors, or bodies
-and contact at once by multigrid. `python -m experiments.questions.ways` measures them on meshes
-that nobody prepared, fits COSTS to one family of meshes and judges the choice by another
-(reports/ways/report.md). MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a
-gigabyte, and a coupled way that takes less than half the time of factors.
+and contact at once by multigrid. COSTS were fitted to times on meshes that nobody prepared, and
+`python -m experiments.questions.ways` judges the choice by other ones (reports/ways/report.md).
+MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a gigabyte, and a coupled way
+that takes less than half the time of factors.
 """
 
 from __future__ import annotations

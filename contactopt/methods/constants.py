@@ -1,9 +1,8 @@
-"""Numbers of the methods and their kernels that were chosen by trial, all of them, with the command
-that shows what each is worth.
+"""Numbers of the methods and their kernels that were chosen by trial, all of them.
 
-`python -m experiments.questions.solving_constants` halves and doubles each of them on problems of
-elastic bodies, of random rigid bodies and of packings, and prints how many are certified and the
-time that it takes. None of them changes what a certificate means. Limits and tolerances that follow
+`contactopt report --run full small_tier` shows what another value of one is worth: how many
+problems of the small tier are certified, and in which time. None of them changes what a certificate
+means. Limits and tolerances that follow
 from rounding, from the literature or from a proof stand beside the code that uses them.
 """
 
