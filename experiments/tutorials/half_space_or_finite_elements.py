@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 8. Half-space or finite elements?
+# # 7. Half-space or finite elements?
 #
 # Seen from its contact, a large body looks like a half-space: everything below (or above) a plane
 # is elastic. A half-space needs no mesh, because it is known since Boussinesq (1885) how its
