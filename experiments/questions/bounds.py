@@ -23,25 +23,21 @@ import skfem
 from contactopt import Material
 from contactopt.accuracy.bound import Bound
 from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.loop import refine
-from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.figures.style import COLOURS, LETTERS, MARKS, add_legend, paper_axes
 from contactopt.meshes.mesh_refinement import split
 from contactopt.methods.diagnosis import diagnose
-from contactopt.readings.quantities import find_quantity, value_of
+from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
-from contactopt.solving.limits import Limits
-from contactopt.solving.solve_scene import Options, Solved, solve_scene
+from contactopt.solving.solve_scene import solve_scene
 from experiments.report import measure, template
 
 LAWS = (("frictionless", 0.0), ("tresca", 10.0), ("coulomb", 0.3))
 COARSE, FINER = {2: 6, 3: 3}, {2: 2, 3: 1}  # elements along an edge, and halvings of the reference
 NAMED = 4  # elements across the half-width of contact of named scenes
 SOFT, STIFF = 1000.0, 3000.0  # Young's moduli [stress]
-ANY = 1.0  # a residual that the first step of a solver has
 REPEATED = 3
 
 
@@ -271,45 +267,6 @@ def costs() -> list[dict[str, Any]]:
     return rows
 
 
-def stopping() -> list[dict[str, Any]]:
-    """CPU time of solves that stop in time, with the usual tolerance and after their first step,
-    and of a whole search.
-    """
-    rows = []
-    for name, n, solver in (
-        ("punch-3d", 16, "multigrid"),
-        ("cattaneo-3d", 10, "multigrid"),
-        ("cattaneo-3d", 10, "auto"),
-    ):
-        scene, found = make_scene(name), []
-        for tol in (1e-8, CERTIFIED, ANY):
-            work = partial(solve_scene, scene, n, scene.zone, Options(solver=solver, tol=tol))
-            found.append((_seconds(work), work()))
-        saved = _saved(*found[:2], "energy") | {"first step [s]": found[2][0]}
-        rows.append({"work": f"solve {name}, {solver}"} | saved)
-    found = []
-    for tol in (1.000001e-8, 1e-8):  # one that is asked for, and the usual one
-        options, most = Options(solver="multigrid", tol=tol), Limits(unknowns=40_000)
-        work = partial(refine, [make_scene("punch-3d")], "energy", 1e-2, options, most)
-        found.append((_seconds(work), work()[0]))
-    saved = _saved(*found, "energy") | {"first step [s]": ""}
-    rows.append({"work": "search punch-3d, multigrid"} | saved)
-    return rows
-
-
-def _saved(
-    usual: tuple[float, Solved], early: tuple[float, Solved], quantity: str
-) -> dict[str, Any]:
-    one, other = (value_of(quantity, own.reduction, own.solution) for _, own in (usual, early))
-    return {
-        "unknowns": early[1].reduction.dofs,
-        "usual [s]": usual[0],
-        "in time [s]": early[0],
-        "saved": 1 - early[0] / usual[0],
-        "change of the energy": other / one - 1,
-    }
-
-
 def figures(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
     figure, axes = paper_axes(2, wide=True)
     for ax, error, bound, what, line in (
@@ -334,5 +291,4 @@ TEXT = template(__file__)
 TITLE = "Guaranteed bounds of the error"
 
 if __name__ == "__main__":
-    tables = {"bounds": bounds, "costs": costs, "stopping": stopping}
-    measure("bounds", TITLE, TEXT, tables, figures)
+    measure("bounds", TITLE, TEXT, {"bounds": bounds, "costs": costs}, figures)
