@@ -115,15 +115,6 @@ LOCAL_TRIES = 60  # iterates of the default method on them
 LOCAL_ENOUGH = 1e-3  # residual at which they are solved, over the one that they began with
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where shifts of slipping contacts begin to grow, how much
 
-# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).
-# on the estimate of the largest eigenvalue, which power steps approach from below
-EIGENVALUE_MARGIN = 1.1
-ROWS_FALL = 0.3  # factor by which the error of the rows should fall in one step of the multipliers
-ROWS_SHARE = 0.1  # accuracy of an inner solve, over the penalty times the error of the rows
-FINEST_SHARE = 1e-3  # and the finest, over the accuracy that is asked for
-STIFFER = 4  # factor by which the penalty grows
-ROUGH_NORMAL = 1e-4  # accuracy of the normal problem of `lagrangian` before its active set steps
-
 # The balancing of rho (contactopt.methods.admm).
 FIRST_BALANCING = 10  # iteration of the first one; each further one comes after twice as many
 MOST_CHANGE = 10.0  # largest factor by which rho changes at once
