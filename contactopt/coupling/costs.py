@@ -10,11 +10,11 @@ that takes less than half the time of factors.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from contactopt.bodies.assembled import Work
+from contactopt.linear.budget import NextBest
 
 MOST_EXPLICIT = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
 AGAIN = 2.0  # factor on the cost of the coupled way where factors would serve more than one solve
@@ -74,26 +74,6 @@ def estimates(
             cost = float(np.dot(prices, terms(way, works, unknowns, dim)))
             found[way, solver] = cost * (AGAIN if way == "coupled" and not once else 1.0)
     return found
-
-
-@dataclass(frozen=True)
-class NextBest:
-    """The way to take where one of many steps turns out dearer than it promised.
-
-    left : The way that is left then: 'coupled' or 'products'.
-    Q, solver : The form of Q and the solver of the bodies to take instead.
-    expected : Work [steps times unknowns] of the way that is left, by its estimate.
-    most : Work that costs as much as both ways were estimated to cost. Who gives up after it has
-        spent at most twice what the better of the two would have taken.
-    then : What takes the place of this way in turn; None where nothing does.
-    """
-
-    left: str
-    Q: str
-    solver: str
-    expected: float
-    most: float
-    then: NextBest | None
 
 
 def next_best(costs: Mapping[tuple[str, str], float], unknowns: int, once: bool) -> NextBest | None:
