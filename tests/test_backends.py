@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import BackendError, InputError, natural_map_residual, solve
+from contactopt import BackendError, InputError, InterfaceProblem, natural_map_residual, solve
 from contactopt.methods.backends import CONIC, QP, Backend, find
-from contactopt.methods.backends.conic import DiscSOCP
+from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.qp import BoxQP
+from contactopt.models import tangential
 
 REQUIRED_QP = ("clarabel", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
 REQUIRED_CONIC = ("clarabel", "ecos", "scs")
@@ -119,14 +120,14 @@ def test_box_qp_multiplier_sign():
 
 
 def test_socp_is_built_once_and_solved_for_new_parameters():
-    socp = DiscSOCP.using("clarabel", np.eye(2), np.zeros((0, 2)))
-    program = socp.program
+    program = tangential(InterfaceProblem(np.eye(3), [[0.0, -3.0, -4.0]], 0.5))
+    socp = Conic.using("clarabel", program, np.eye(2))
     for radius in (1.0, 3.0):
-        t, _ = socp.solve(np.array([-3.0, -4.0]), np.zeros(0), np.array([radius]))
+        t = socp.solve(r_n=np.ones(1), g=np.array([radius]))["r_t"]
         assert np.allclose(t, radius * np.array([0.6, 0.8]), atol=1e-6)
-    assert socp.program is program and program.is_dcp(dpp=True)
+    assert program.problem.is_dcp(dpp=True)
 
 
 def test_indefinite_tangential_compliance_is_refused():
     with pytest.raises(BackendError, match="not positive semidefinite"):
-        DiscSOCP.using("clarabel", np.diag([1.0, -1.0]), np.zeros((0, 2)))
+        Conic.using("clarabel", None, np.diag([1.0, -1.0]))

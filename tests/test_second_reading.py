@@ -28,7 +28,7 @@ from contactopt import (
 from contactopt.methods.preconditioners.circulant import seminorm
 
 SHIFT = np.array([[0.001, -0.0003]])  # from a solution to a start near it [N]
-NODE = np.linalg.inv([[4.0, -1.5], [-1.5, 1.0]])  # compliance of the node of tutorial 3 [mm/N]
+NODE = np.linalg.inv([[4.0, -1.5], [-1.5, 1.0]])  # compliance of the node of tutorial 2 [mm/N]
 
 
 def load_is_s():
@@ -96,11 +96,11 @@ def nitsche(gamma):
 # sentence, where it stands, number, what makes it true
 CLAIMS = (
     ("s is the load", "chapters 4 and 6, course", load_is_s, lambda x: abs(x + 4) < 1e-9),
-    ("Newton's method finds the solution near which it starts", "tutorial 3",
+    ("Newton's method finds the solution near which it starts", "tutorial 2",
      lambda: returns("newton"), lambda x: x == 3),
-    ("other methods need not (here Tresca's iteration)", "tutorial 3",
+    ("other methods need not (here Tresca's iteration)", "tutorial 2",
      lambda: returns("tresca"), lambda x: x < 3),
-    ("in unloading the middle keeps its slip, and not its traction", "tutorial 4",
+    ("in unloading the middle keeps its slip, and not its traction", "tutorial 3",
      sticking_traction, lambda x: abs(x - 1) > 0.1),
     ("the shift fails for some mu if Q_nt^2 > 8/9 Q_nn Q_tt", "chapter 2",
      lambda: least_factor(1.001 * np.sqrt(8 / 9)), lambda x: x < -1),
@@ -111,7 +111,7 @@ CLAIMS = (
      share_at_the_end, lambda x: abs(x - 0.5) < 1e-6),
     ("Nitsche's function is concave if gamma < k", "chapter 1",
      lambda: nitsche(1.0), lambda x: x < 0),
-    ("about 2 log2 N entries in a row, here over log2 N for N = 128", "tutorial 2",
+    ("about 2 log2 N entries in a row, here over log2 N for N = 128", "tutorial 1",
      lambda: np.count_nonzero(seminorm(128)) / 7, lambda x: 2 <= x < 2.2),
     ("with a plate the forces of associated friction may be Coulomb's", "test set",
      relaxed_force, lambda x: x < 1e-6),

@@ -94,14 +94,14 @@ def test_every_method_and_public_name_has_its_place(built):
 
 
 @pytest.mark.slow
-def test_tutorials_were_executed_and_their_slider_is_there(built):
+def test_tutorials_and_chapters_were_executed_and_their_slider_is_there(built):
     for path in (ROOT / "experiments" / "tutorials").glob("*.py"):
         page = (built / "generated" / "tutorials" / f"{path.stem}.html").read_text()
         assert "<img" in page, f"{path.stem}: no figure"
         assert page.count("<details>") == path.read_text().count("<details>") > 0
     assert (
         'class="slider"'
-        in (built / "generated" / "tutorials" / "one_contact_node.html").read_text()
+        in (built / "generated" / "course" / "chapter_2_friction_at_one_node.html").read_text()
     )
 
 

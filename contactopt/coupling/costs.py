@@ -1,20 +1,20 @@
 """The choice between the ways to a solution by their cost, estimated from the matrices at hand.
 
 A way is a form of Q and a solver of the bodies: a dense Q, products with Q by factors, or bodies
-and contact at once by multigrid. `python -m experiments.questions.ways` measures them on meshes
-that nobody prepared, fits COSTS to one family of meshes and judges the choice by another
-(reports/ways/report.md). MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a
-gigabyte, and a coupled way that takes less than half the time of factors.
+and contact at once by multigrid. COSTS were fitted to times on meshes that nobody prepared, and
+`python -m experiments.questions.ways` judges the choice by other ones (reports/ways/report.md).
+MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a gigabyte, and a coupled way
+that takes less than half the time of factors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from contactopt.bodies.assembled import Work
+from contactopt.linear.budget import NextBest
 
 MOST_EXPLICIT = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
 AGAIN = 2.0  # factor on the cost of the coupled way where factors would serve more than one solve
@@ -74,26 +74,6 @@ def estimates(
             cost = float(np.dot(prices, terms(way, works, unknowns, dim)))
             found[way, solver] = cost * (AGAIN if way == "coupled" and not once else 1.0)
     return found
-
-
-@dataclass(frozen=True)
-class NextBest:
-    """The way to take where one of many steps turns out dearer than it promised.
-
-    left : The way that is left then: 'coupled' or 'products'.
-    Q, solver : The form of Q and the solver of the bodies to take instead.
-    expected : Work [steps times unknowns] of the way that is left, by its estimate.
-    most : Work that costs as much as both ways were estimated to cost. Who gives up after it has
-        spent at most twice what the better of the two would have taken.
-    then : What takes the place of this way in turn; None where nothing does.
-    """
-
-    left: str
-    Q: str
-    solver: str
-    expected: float
-    most: float
-    then: NextBest | None
 
 
 def next_best(costs: Mapping[tuple[str, str], float], unknowns: int, once: bool) -> NextBest | None:

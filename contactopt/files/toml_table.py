@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
@@ -247,77 +248,61 @@ def _lost(table: Table, told: str, parents: Any, key: str | int, at: Any) -> Inp
 
 def lines_of(text: str) -> dict[Place, int]:
     """The line, from 1, of the place of every entry of a valid TOML text."""
-    tokens, line = [], 1
+    tokens, line = deque[tuple[str, str | None, int]](), 1
     for match in TOKEN.finditer(text):
         if match.lastgroup != "space":
             tokens.append((match.group(), match.lastgroup, line))
         line += match.group().count("\n")
-    return _Lines(tokens).read()
+    found: dict[Place, int] = {}
+    counts: dict[Place, int] = {}  # of the tables of an array
 
+    def parts() -> Iterator[str]:
+        """The parts of the dotted key that is next."""
+        while tokens[0][1] != "mark":
+            token, kind, _ = tokens.popleft()
+            quoted = [tomllib.loads(f"x = {token}")["x"]] if kind == "text" else token.split(".")
+            yield from (part for part in quoted if part or kind == "text")
 
-class _Lines:
-    """One walk over the tokens of a TOML text."""
+    def entry(place: Place) -> None:
+        line = tokens[0][2]
+        for part in parts():
+            place = (*place, part)
+            found.setdefault(place, line)
+        tokens.popleft()  # the equals sign
+        value(place)
 
-    def __init__(self, tokens: list[tuple[str, str | None, int]]):
-        self.tokens, self.at = tokens, 0
-        self.found: dict[Place, int] = {}
-
-    def read(self) -> dict[Place, int]:
-        prefix: Place = ()
-        counts: dict[Place, int] = {}
-        while self.at < len(self.tokens):
-            if self.tokens[self.at][0] != "[":
-                self._entry(prefix)
-                continue
-            line, array = self.tokens[self.at][2], self.tokens[self.at + 1][0] == "["
-            self.at += 1 + array
-            *parents, name = self._key()
-            self.at += 1 + array
-            prefix = ()
-            for part in parents:
-                prefix = (*prefix, part)
-                prefix = (*prefix, counts[prefix] - 1) if prefix in counts else prefix
-            prefix = (*prefix, name)
-            if array:
-                counts[prefix] = counts.get(prefix, 0) + 1
-                self.found.setdefault(prefix, line)
-                prefix = (*prefix, counts[prefix] - 1)
-            self.found.setdefault(prefix, line)
-        return self.found
-
-    def _key(self) -> list[str]:
-        parts: list[str] = []
-        while self.tokens[self.at][1] != "mark":
-            token, kind, _ = self.tokens[self.at]
-            parts += (
-                [tomllib.loads(f"x = {token}")["x"]]
-                if kind == "text"
-                else [part for part in token.split(".") if part]
-            )
-            self.at += 1
-        return parts
-
-    def _entry(self, prefix: Place) -> None:
-        line = self.tokens[self.at][2]
-        for part in self._key():
-            prefix = (*prefix, part)
-            self.found.setdefault(prefix, line)
-        self.at += 1  # the equals sign
-        self._value(prefix)
-
-    def _value(self, place: Place) -> None:
-        token, kind, line = self.tokens[self.at]
-        self.found.setdefault(place, line)
-        self.at += 1
-        if kind != "mark":
-            return
+    def value(place: Place) -> None:
+        opens, kind, line = tokens.popleft()
+        found.setdefault(place, line)
         count = 0
-        while self.tokens[self.at][0] not in "]}":
-            if self.tokens[self.at][0] == ",":
-                self.at += 1
-            elif token == "{":
-                self._entry(place)
+        while kind == "mark" and tokens[0][0] not in "]}":
+            if tokens[0][0] == ",":
+                tokens.popleft()
+            elif opens == "{":
+                entry(place)
             else:
-                self._value((*place, count))
+                value((*place, count))
                 count += 1
-        self.at += 1
+        if kind == "mark":
+            tokens.popleft()
+
+    place: Place = ()
+    while tokens:
+        if tokens[0][0] != "[":
+            entry(place)
+            continue
+        line, array = tokens.popleft()[2], tokens[0][0] == "["
+        if array:
+            tokens.popleft()
+        place = ()
+        for part in parts():
+            # a table within the last one of an array
+            place = (*place, counts[place] - 1, part) if place in counts else (*place, part)
+        for _ in range(1 + array):
+            tokens.popleft()
+        found.setdefault(place, line)
+        if array:
+            counts[place] = counts.get(place, 0) + 1
+            place = (*place, counts[place] - 1)
+            found.setdefault(place, line)
+    return found

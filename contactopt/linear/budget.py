@@ -11,18 +11,26 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 
-class Alternative(Protocol):
-    """Another way to a solution, the work that was expected of the first one, and the most that it
-    may take.
+@dataclass(frozen=True)
+class NextBest:
+    """The way to take where one of many steps turns out dearer than it promised.
+
+    left : The way that is left then: 'coupled' or 'products'.
+    Q, solver : The form of Q and the solver of the bodies to take instead.
+    expected : Work [steps times unknowns] of the way that is left, by its estimate.
+    most : Work that costs as much as both ways were estimated to cost. Who gives up after it has
+        spent at most twice what the better of the two would have taken.
+    then : What takes the place of this way in turn; None where nothing does.
     """
 
-    @property
-    def expected(self) -> float: ...
-    @property
-    def most(self) -> float: ...
+    left: str
+    Q: str
+    solver: str
+    expected: float
+    most: float
+    then: NextBest | None
 
 
 @dataclass(eq=False)
@@ -30,7 +38,7 @@ class Budget:
     """Work that was done, and what is done instead of too much of it."""
 
     spent: float = 0.0
-    instead: Any = None
+    instead: NextBest | None = None
 
     def check(self, work: float) -> None:
         """TooDear if so much work in all is too much."""
@@ -44,7 +52,7 @@ class TooDear(Exception):
     instead  the other way
     """
 
-    def __init__(self, instead: Any):
+    def __init__(self, instead: NextBest):
         super().__init__(instead)
         self.instead = instead
 
@@ -58,7 +66,7 @@ def _present() -> Budget:
 
 
 @contextmanager
-def open_budget(instead: Alternative | None = None) -> Iterator[None]:
+def open_budget(instead: NextBest | None = None) -> Iterator[None]:
     """Count the work inside the block from zero on; without a limit where there is no other way,
     until `fill` names one.
     """
@@ -69,7 +77,7 @@ def open_budget(instead: Alternative | None = None) -> Iterator[None]:
         _open.reset(token)
 
 
-def fill(instead: Alternative | None) -> None:
+def fill(instead: NextBest | None) -> None:
     """Say what is done where the budget that is open is too low, if anything is."""
     if instead is not None:
         _present().instead = instead

@@ -23,6 +23,7 @@ log = logging.getLogger(__name__)
 FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
+POWER_STEPS, MARGIN = 10, 1.1  # towards a largest eigenvalue, and the factor on what they find
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
 # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
 NOTABLE_BYTES = 2**28
@@ -217,6 +218,21 @@ def asymmetry(Q: Interface) -> float:
     size = max((float(np.abs(part).max(initial=0.0)) for part in whole), default=0.0)
     worst = max((float(np.abs(part).max(initial=0.0)) for part in skew), default=0.0)
     return worst / size if size > 0 else 0.0
+
+
+def eigenvalue_bound(Q: np.ndarray | sp.csr_array) -> float:
+    """A number above the largest eigenvalue of a semidefinite Q, by power steps, which approach it
+    from below; 1 for an empty or a zero matrix.
+    """
+    n, value = Q.shape[0], 0.0
+    v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(Q.dtype)
+    for _ in range(POWER_STEPS if n else 0):
+        v /= np.linalg.norm(v)
+        v = Q @ v
+        value = float(np.linalg.norm(v))
+        if value == 0.0:
+            break
+    return MARGIN * value or 1.0
 
 
 def held(Q: Interface) -> np.ndarray:

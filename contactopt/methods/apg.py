@@ -22,9 +22,9 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.linear.deadline import check_time
+from contactopt.linear.operators import eigenvalue_bound
 from contactopt.methods.constants import SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import eigenvalue_bound
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Projected

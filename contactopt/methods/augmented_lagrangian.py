@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from contactopt.checks import check_number
+from contactopt.linear.operators import eigenvalue_bound
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import eigenvalue_bound
 from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import Iterate, Method, at_rest

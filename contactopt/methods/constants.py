@@ -1,9 +1,8 @@
-"""Numbers of the methods and their kernels that were chosen by trial, all of them, with the command
-that shows what each is worth.
+"""Numbers of the methods and their kernels that were chosen by trial, all of them.
 
-`python -m experiments.questions.solving_constants` halves and doubles each of them on problems of
-elastic bodies, of random rigid bodies and of packings, and prints how many are certified and the
-time that it takes. None of them changes what a certificate means. Limits and tolerances that follow
+`contactopt report --run full small_tier` shows what another value of one is worth: how many
+problems of the small tier are certified, and in which time. None of them changes what a certificate
+means. Limits and tolerances that follow
 from rounding, from the literature or from a proof stand beside the code that uses them.
 """
 
@@ -115,15 +114,6 @@ AROUND = 2  # rings of contacts around them that are solved with them
 LOCAL_TRIES = 60  # iterates of the default method on them
 LOCAL_ENOUGH = 1e-3  # residual at which they are solved, over the one that they began with
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where shifts of slipping contacts begin to grow, how much
-
-# Conjugate gradients with bounds (contactopt.methods.kernels.mprgp).
-# on the estimate of the largest eigenvalue, which power steps approach from below
-EIGENVALUE_MARGIN = 1.1
-ROWS_FALL = 0.3  # factor by which the error of the rows should fall in one step of the multipliers
-ROWS_SHARE = 0.1  # accuracy of an inner solve, over the penalty times the error of the rows
-FINEST_SHARE = 1e-3  # and the finest, over the accuracy that is asked for
-STIFFER = 4  # factor by which the penalty grows
-ROUGH_NORMAL = 1e-4  # accuracy of the normal problem of `lagrangian` before its active set steps
 
 # The balancing of rho (contactopt.methods.admm).
 FIRST_BALANCING = 10  # iteration of the first one; each further one comes after twice as many

@@ -1,8 +1,7 @@
 """Lagrange multipliers for friction inside the two-stage iteration: Uzawa's iteration (paper, 5.1).
 
-The normal problem (21) is solved by conjugate gradients with bounds
-(contactopt.methods.kernels.mprgp) and made exact by active set steps. The tangential program (22)
-is solved by Uzawa's ascent on the multiplier of the bound on the slip rate,
+The normal problem (21) is that of `alternating`, a quadratic program for the backend proxqp. The
+tangential program (22) is solved by Uzawa's ascent on the multiplier of the bound on the slip rate,
 
     r_t <- projection of r_t - rho u_t on |r_t| <= mu |r_n|,    u_t = (Q r + V lambda + q)_t,
 
@@ -22,15 +21,16 @@ from typing import Any
 import numpy as np
 
 from contactopt.linear.deadline import check_time
+from contactopt.linear.operators import eigenvalue_bound
 from contactopt.methods.alternating import TwoStage
-from contactopt.methods.constants import ROUGH_NORMAL, SHARPER, SHARPEST
+from contactopt.methods.backends import QP, find
+from contactopt.methods.constants import SHARPER, SHARPEST
 from contactopt.methods.kernels.balance import project_balanced
-from contactopt.methods.kernels.mprgp import eigenvalue_bound, smalbe
-from contactopt.methods.kernels.semismooth import Projection, crossover
-from contactopt.methods.kernels.splitting import Components
-from contactopt.methods.method import Iterate
+from contactopt.methods.kernels.semismooth import Projection
+from contactopt.methods.kernels.splitting import Components, NormalProblem
+from contactopt.methods.method import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import disc_derivative, half_line_derivative
+from contactopt.problem.cones import disc_derivative
 
 INNER = 5000  # Uzawa steps in one tangential problem
 
@@ -46,20 +46,11 @@ class Lagrangian(TwoStage):
 
     relaxation: float = 1.0
 
+    def backends(self, dim: int) -> tuple[str, str]:
+        return find("proxqp", QP).name, NATIVE
+
     def subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
-        return Normal(problem, pushes, True), Tangential(problem, ~pushes, False)
-
-
-class Normal(Components):
-    """The normal QP."""
-
-    def solve(self, r: np.ndarray, lam: np.ndarray) -> Iterate:
-        low = self.problem.law.lowest
-        c, s = self.given(r[:, 1:], lam)
-        rough = smalbe(self.Q, c, low, self.V.T, -s, r[:, 0], lam[self.own], ROUGH_NORMAL)
-        project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
-        r_n, own = crossover(self.Q, c, self.V, s, project, rough.x[:, None], rough.multipliers)
-        return np.concatenate([r_n, r[:, 1:]], axis=1), own
+        return NormalProblem("proxqp", problem, pushes), Tangential(problem, ~pushes, False)
 
 
 class Tangential(Components):

@@ -30,7 +30,6 @@ from contactopt.models.forces import (
     normal,
     penalised,
     tangential,
-    tangential_disc_program,
     tresca,
 )
 from contactopt.models.program import Program
@@ -43,6 +42,5 @@ __all__ = [
     "normal",
     "penalised",
     "tangential",
-    "tangential_disc_program",
     "tresca",
 ]

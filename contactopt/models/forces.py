@@ -241,33 +241,6 @@ def acary_cadoux(
     )
 
 
-def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dict[str, Any]]:
-    """min t' Q t / 2 + c' t   subject to  |t_i| <= g_i at each contact i,  A t = b.
-
-    This is `tangential` for one matrix and many c, g and b: build it once, set the parameters and
-    solve many times.
-
-    Parameters
-    ----------
-    Q : (2k, 2k) symmetric positive semidefinite; the caller checks that.
-    A : (p, 2k) rows of the balance.
-
-    Returns
-    -------
-    The cvxpy problem, its variable t (2k,), and its parameters c (2k,), g (k,) and b (p,) by name.
-    The multipliers of A t = b are the dual value of the last constraint.
-    """
-    k, p = len(Q) // 2, len(A)
-    t = cp.Variable(2 * k, name="t")
-    parameters = {"c": cp.Parameter(2 * k), "g": cp.Parameter(k, nonneg=True)}
-    constraints = [cp.SOC(parameters["g"], columns(t, k), axis=0)]
-    if p:
-        parameters["b"] = cp.Parameter(p)
-        constraints.append(A @ t == parameters["b"])
-    objective = cp.Minimize(cp.quad_form(t, cp.psd_wrap(Q)) / 2 + parameters["c"] @ t)
-    return cp.Problem(objective, constraints), t, parameters
-
-
 def _normal_parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, list[Any], dict]:
     """Variable r_n, Q_nn, c = q_n + Q_nt r_t, parameter r_t, balance, its multiplier by name."""
     n, t = components(problem)

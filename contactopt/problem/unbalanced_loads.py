@@ -3,10 +3,10 @@
 Every solution has forces r in the friction cones K with V' r + s = 0. A motion z (p,) of the free
 bodies that every contact lets pass, V z in the dual cone of K, g_n >= mu |g_t| at each contact, has
 z' V' r >= 0 for all such r. Where it moves the loads forward, s' z > 0, this contradicts z' V' r =
--s' z: there is no solution, and the bodies fly apart, slide off or topple along z. Where forces in
-the cones are found that balance the loads there is no such motion: nonnegative least squares looks
-for them, or, among many bodies, a sparse linear program. Otherwise the search for the motion is a
-linear program with a polygon inside each cone; what it finds is checked on its own.
+-s' z: there is no solution, and the bodies fly apart, slide off or topple along z. Where the forces
+of least squares that balance the loads lie in the cones there is no such motion. Otherwise the
+search for it is a linear program with a polygon inside each cone; what it finds is checked on its
+own.
 
 Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
@@ -30,9 +30,6 @@ BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
 SECONDS = 5.0  # for a linear program
-# multipliers up to which nonnegative least squares, of cubic cost, is faster than a sparse linear
-# program
-FEW = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,48 +84,17 @@ def _along(rows: sp.csr_array, dim: int) -> list[Any]:
 
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
-    """Whether forces in polygons inside the cones are found that balance the loads."""
+    """Whether the forces of least squares that balance the loads lie in the cones."""
     even = problem.V @ np.linalg.lstsq(problem.V.T @ problem.V, -s, rcond=None)[0]
     r = even.reshape(problem.q.shape)
     held = np.all(np.linalg.norm(r[:, 1:], axis=1) <= problem.mu * r[:, 0])
     left = np.linalg.norm(problem.V.T @ even + s)
-    if held and left <= BALANCED * np.linalg.norm(s):
-        return True
-    V = sp.csr_array(problem.V)
-    normal, mu = V[:: problem.dim], sp.diags_array(problem.mu)
-    edges = (
-        [normal + mu @ slope for slope in _along(V, problem.dim)]
-        if np.any(problem.mu)
-        else [normal]
-    )
-    A = sp.csc_array(sp.vstack(edges).T)
-    sizes = np.sqrt(np.asarray((A * A).sum(axis=1)).ravel())
-    if np.any(sizes == 0):
-        return False
-    A, b = sp.diags_array(1 / sizes) @ A, -s / sizes
-    forces = _nonnegative(A, b)
-    return forces is not None and bool(
-        np.linalg.norm(A @ forces - b) <= BALANCED * np.linalg.norm(b)
-    )
-
-
-def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
-    """x >= 0 with A x near b; None if none is found."""
-    from scipy.optimize import linprog, nnls  # late, since it takes long to import
-
-    if len(b) <= FEW:
-        try:
-            return np.asarray(nnls(A.toarray(), b)[0])
-        except RuntimeError:  # too many iterations
-            return None
-    options = {"time_limit": SECONDS, "primal_feasibility_tolerance": BALANCED}
-    answer = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, method="highs-ds", options=options)
-    return None if answer.x is None else np.maximum(answer.x, 0.0)
+    return bool(held and left <= BALANCED * np.linalg.norm(s))
 
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
     """min |z|_1 with s' z = 1 and V z in a polygon inside each dual cone; None without any."""
-    from scipy.optimize import linprog
+    from scipy.optimize import linprog  # late, since it takes long to import
 
     normal, factor = V[:: problem.dim], polygon(problem.dim)[1]
     fixed = ~_cones(problem)

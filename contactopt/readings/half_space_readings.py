@@ -1,17 +1,13 @@
-"""What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps,
-stresses below the surface.
-"""
+"""What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.bodies.half_space import HalfSpaceBody
-from contactopt.bodies.subsurface import stress_below, von_mises
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.linear.operators import block
@@ -107,7 +103,12 @@ def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarr
     n1]) and 'slip' (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1
     where sticking and 2 where slipping. InputError if the scene has no half-space.
     """
-    problem, grid = reduction.problem, _half_space(reduction, None).grid
+    found = [body for body in reduction.bodies if isinstance(body, HalfSpaceBody)]
+    if not found:
+        raise InputError(
+            f"scene '{reduction.scene.name}' has no half-space; this is asked of half-spaces only."
+        )
+    problem, grid = reduction.problem, found[-1].grid
     r, areas = solution.reactions, problem.areas
     u, status = problem.displacements(r, solution.multipliers), contact_status(problem, r)
     return {
@@ -117,35 +118,3 @@ def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarr
         "slip": u[:, 1:].reshape(*grid, -1),
         "status": (status.stick + 2 * status.slip).reshape(grid),
     }
-
-
-def subsurface_stress(
-    reduction: Reduction, solution: Solution, depths: Sequence[float], body: str | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """The stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress] at depths (j,)
-    [length] below the (n0[, n1]) points of a half-space, at least half a spacing of the points; by
-    default below the lower one, if both bodies are half-spaces.
-
-    InputError if there is no such half-space, if it is periodic, or if a depth is too small.
-    """
-    found = _half_space(reduction, body)
-    place = reduction.bodies.index(found)
-    force = reduction.maps[place].T @ solution.reactions.ravel()
-    stress = stress_below(found, force[: found.unknowns].reshape(-1, len(found.components)), depths)
-    return stress, von_mises(stress)
-
-
-def _half_space(reduction: Reduction, name: str | None) -> HalfSpaceBody:
-    candidates = [
-        body
-        for body in reduction.bodies
-        if isinstance(body, HalfSpaceBody) and name in (None, body.name)
-    ]
-    if not candidates:
-        named = "" if name is None else f" named '{name}'"
-        raise InputError(
-            f"scene '{reduction.scene.name}' has no half-space{named}; this is asked of half-spaces"
-            " only."
-        )
-    found: HalfSpaceBody = candidates[-1]
-    return found

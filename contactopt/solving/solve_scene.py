@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.coupling.costs import NextBest
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.errors import InputError
-from contactopt.linear.budget import TooDear, open_budget
+from contactopt.linear.budget import NextBest, TooDear, open_budget
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods.driver import TOL, solve

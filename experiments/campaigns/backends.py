@@ -11,9 +11,10 @@ import numpy as np
 from contactopt import InterfaceProblem
 from contactopt.benchmark import method
 from contactopt.methods.backends import CONIC, QP, TIGHT, find
-from contactopt.methods.backends.conic import DiscSOCP
+from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.qp import BoxQP
 from contactopt.methods.kernels.semismooth import crossover
+from contactopt.models import tangential
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 
@@ -65,11 +66,9 @@ def friction_socp(
     normal = np.maximum(-p.q[:, 0] / np.diag(p.Q)[::dim], 0.0)
     tangents = np.arange(k * dim).reshape(k, dim)[:, 1:].ravel()
     Q, radius = p.Q[np.ix_(tangents, tangents)], p.mu * normal
-    bridge = DiscSOCP.using(backend, Q, np.zeros((0, len(Q))))
-    t, _ = replace(bridge, backend=asked(find(backend, CONIC), tol)).solve(
-        p.q[:, 1:].ravel(), np.zeros(0), radius
-    )
-    t = t.reshape(k, dim - 1)
+    bridge = Conic.using(backend, tangential(p), Q)
+    bridge = replace(bridge, backend=asked(find(backend, CONIC), tol))
+    t = bridge.solve(r_n=normal, g=radius)["r_t"].reshape(k, dim - 1)
     if exact:
         c, V = p.q[:, 1:].ravel(), np.zeros((len(Q), 0))
         t, _ = crossover(Q, c, V, np.zeros(0), lambda y: disc_derivative(y, radius), t, np.zeros(0))

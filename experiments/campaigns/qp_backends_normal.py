@@ -22,8 +22,8 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     )
     mid = time_table(asked[asked["setting"] == "mid"], metric="cpu_seconds")
     fastest = mid.sort_values("shifted mean").iloc[0]
-    other = mid[~mid["method"].isin(["auto", "lagrangian"])].sort_values("shifted mean").iloc[0]
-    own = mid[mid["method"].isin(["auto", "lagrangian"])]
+    other = mid[mid["method"] != "auto"].sort_values("shifted mean").iloc[0]
+    own = mid[mid["method"] == "auto"]
     solved = asked[asked["success"] & (asked["setting"] == "mid")]
     powers = [p for _, rows in groups(solved, "method") if np.isfinite(p := _power(rows))]
     return [

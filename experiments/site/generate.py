@@ -26,7 +26,6 @@ from experiments.course.nbgrader import solved
 ROOT = Path(__file__).parents[2]
 # the order in which a course would take them
 TUTORIALS = (
-    "one_contact_node",
     "why_the_preconditioner_works",
     "no_one_or_three_solutions",
     "a_load_cycle",

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 4. A load cycle and its hysteresis
+# # 3. A load cycle and its hysteresis
 #
 # Press a cylinder on a flat body. Push it sideways, but not so hard that it slides off. Then take
 # the push away. Does the cylinder come back to where it was? It does not, because friction has done
@@ -7,7 +7,8 @@
 # this problem exactly. In this tutorial we solve it numerically, step by step. We compare the slip
 # zones, the tractions and the energy that a cycle costs with the exact ones.
 #
-# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has Coulomb's law for one step.
+# Reading time: 10 minutes. [Chapter 2](../course/chapter_2_friction_at_one_node.py) of the course
+# has Coulomb's law for one step.
 
 # %%
 import matplotlib.pyplot as plt

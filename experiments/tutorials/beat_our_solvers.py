@@ -1,13 +1,13 @@
 # %% [markdown]
-# # 5. Add your own solver and beat ours
+# # 4. Add your own solver and beat ours
 #
 # You have an idea for an algorithm. How good is it? In this tutorial we write a method in 20 lines,
 # and compare it with the methods of the package in a benchmark. The package need not be changed for
 # this. We do so with two ideas. The first one turns out to be slow. The second one is about as fast
 # as the methods of the package, but on some problems its answers are wrong.
 #
-# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters. You should know
-# Newton's method.
+# Reading time: 10 minutes. [Chapter 2](../course/chapter_2_friction_at_one_node.py) of the course
+# explains the letters. You should know Newton's method.
 
 # %%
 from pathlib import Path

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 7. The derivative of a solution, and its kinks
+# # 6. The derivative of a solution, and its kinks
 #
 # How does the contact force change if friction grows a little, or if the load does? Whoever fits a
 # friction coefficient to measurements, or shapes a punch so that its pressure is even, needs the
@@ -8,8 +8,8 @@
 # contact node. We compute its derivative by hand and by `contactopt.sensitivity`. We look at the
 # points where it has no derivative, and see why it is a bad idea to smooth these points away.
 #
-# Reading time: 15 minutes. [Tutorial 1](one_contact_node.py) explains the letters, and solves the
-# problem of the one node.
+# Reading time: 15 minutes. [Chapter 2](../course/chapter_2_friction_at_one_node.py) of the course
+# explains the letters, and solves the problem of one node.
 
 # %%
 from dataclasses import replace
@@ -33,8 +33,8 @@ from contactopt import (
 # %% [markdown]
 # ## One node as a function of friction and load
 #
-# The node of tutorial 1 would sink 1 mm into the floor and move 0.9 mm to the right if there were
-# no contact. The floor answers with a normal force $r_n$ and a friction force $r_t$. We solve the
+# An elastic node would sink 1 mm into the floor and move 0.9 mm to the right if there were no
+# contact. The floor answers with a normal force $r_n$ and a friction force $r_t$. We solve the
 # problem for many friction coefficients $\mu$, and then for many horizontal loads $q_t$, and each
 # time we also ask for the slope.
 

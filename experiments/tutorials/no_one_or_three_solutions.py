@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 3. When friction has no solution, two or three
+# # 2. When friction has no solution, two or three
 #
 # A problem of elasticity has one solution if the bodies are supported, and so has contact without
 # friction. With friction this
@@ -7,8 +7,9 @@
 # exactly two, and none at all. It also shows a method that runs in circles although there is
 # exactly one solution. And it shows the tools that tell you all this before you solve.
 #
-# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters. The pages of [the
-# museum](../museum.md#one-node-one-solution-or-three) show the same with sliders.
+# Reading time: 10 minutes. [Chapter 2](../course/chapter_2_friction_at_one_node.py) of the course
+# explains the letters. The pages of [the museum](../museum.md#one-node-one-solution-or-three) show
+# the same with sliders.
 
 # %%
 from dataclasses import replace
@@ -29,11 +30,10 @@ from contactopt import (
 # %% [markdown]
 # ## One node, two springs
 #
-# An elastic node stands on a floor. As in [tutorial 1](one_contact_node.py), $n$ points up, $t$
-# points to the right, and the normal component comes first. The node hangs on springs with the
-# stiffness matrix $K$. A load *pushes* it to the right and *presses* it down on the floor. The
-# compliance is $Q = K^{-1}$, and without the floor the node would go to $q = Q\,(-\text{press},\
-# \text{push})$.
+# An elastic node stands on a floor. The direction $n$ points up, $t$ points to the right, and the
+# normal component comes first. The node hangs on springs with the stiffness matrix $K$. A load
+# *pushes* it to the right and *presses* it down on the floor. The compliance is $Q = K^{-1}$, and
+# without the floor the node would go to $q = Q\,(-\text{press},\ \text{push})$.
 
 # %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5, 3), layout="constrained")

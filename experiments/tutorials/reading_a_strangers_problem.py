@@ -1,5 +1,5 @@
 # %% [markdown]
-# # 6. Reading a stranger's problem: FCLib
+# # 5. Reading a stranger's problem: FCLib
 #
 # FCLib is a collection of friction problems from real simulations: boxes in a stack, grains in a
 # silo, a wall of bricks. It is also a file format (HDF5), by which people with different codes can

@@ -1,10 +1,9 @@
 # %% [markdown]
-# # 2. What Q does to waves, and the preconditioner that undoes it
+# # 1. What Q does to waves, and the preconditioner that undoes it
 #
-# [Tutorial 1](one_contact_node.py) took the compliance $Q$ for granted.
-# [Chapter 4](../course/chapter_4_from_bodies_to_the_interface.py) of the course builds it from
-# elastic bodies, by eliminating everything that is not on the interface. In this tutorial we look
-# at its spectrum: $Q$ makes a wave of displacement out of a wave of force, and divides it by the
+# [Chapter 4](../course/chapter_4_from_bodies_to_the_interface.py) of the course builds the
+# compliance $Q$ from elastic bodies, by eliminating everything that is not on the interface. In
+# this tutorial we look at its spectrum: $Q$ makes a wave of displacement out of a wave of force, and divides it by the
 # wave number $|\xi|$. If we multiply a displacement by $|\xi|$, we nearly undo $Q$. The Fourier
 # transform does this at almost no cost. We write such a preconditioner in a few lines. We compare
 # it with those of a paper, A. Lotfi's *Domain-Decomposition based H^1/2 Seminorm Preconditioners

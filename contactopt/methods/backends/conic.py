@@ -40,36 +40,6 @@ class Conic:
         return variables | {name: np.nan_to_num(m) for name, m in self.program.multipliers.items()}
 
 
-@dataclass(eq=False)
-class DiscSOCP:
-    """models.tangential_disc_program, compiled once and solved again with new parameters."""
-
-    backend: Backend
-    program: Any
-    variable: Any
-    parameters: dict[str, Any]
-
-    @classmethod
-    def using(cls, name: str, Q: np.ndarray, A: np.ndarray) -> DiscSOCP:
-        from contactopt.models import tangential_disc_program
-
-        backend = find(name, CONIC)
-        Q = (Q + Q.T) / 2
-        check_semidefinite(Q)
-        return cls(backend, *tangential_disc_program(Q, A))
-
-    def solve(
-        self, c: np.ndarray, b: np.ndarray, radius: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """t (2k,) and the multipliers (p,) of A t = b; BackendError if there is no answer."""
-        self.parameters["c"].value, self.parameters["g"].value = c, radius
-        if len(b):
-            self.parameters["b"].value = b
-        run(self.backend, self.program)
-        y = self.program.constraints[-1].dual_value if len(b) else np.zeros(0)
-        return np.asarray(self.variable.value), np.asarray(y, dtype=float).reshape(len(b))
-
-
 def run(backend: Backend, problem: Any) -> None:
     """Solve a cvxpy problem; BackendError if the backend crashes or leaves no finite answer."""
     import cvxpy as cp

@@ -6,10 +6,12 @@ A backend's answer is made exact by active-set steps, or asked for again at tigh
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 import numpy as np
 
 from contactopt.methods.backends import attempts
-from contactopt.methods.backends.conic import DiscSOCP
+from contactopt.methods.backends.conic import Conic
 from contactopt.methods.backends.qp import BoxQP
 from contactopt.methods.kernels.semismooth import Equations, certified
 from contactopt.methods.method import Iterate
@@ -65,8 +67,13 @@ class TangentialProblem(Components):
         super().__init__(problem, own, normal=False)
         self.active = bool(np.any(problem.law.rough))
         if self.active:
-            bridge = BoxQP if problem.dim == 2 else DiscSOCP
-            self.solver = bridge.using(backend, self.Q, self.V.T)
+            self.solver: BoxQP | Conic
+            if problem.dim == 2:
+                self.solver = BoxQP.using(backend, self.Q, self.V.T)
+            else:
+                from contactopt.models import tangential
+
+                self.solver = Conic.using(backend, tangential(problem), self.Q)
 
     def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
         """r (k, dim) with new r_t, and the multipliers of this problem's balance rows."""
@@ -78,7 +85,11 @@ class TangentialProblem(Components):
         if isinstance(self.solver, BoxQP):
             tries = attempts(self.solver, lambda qp: qp.solve(c, -s, -radius, radius, start=start))
         else:
-            tries = attempts(self.solver, lambda socp: socp.solve(c, -s, radius))
+            given = {"r_n": r[:, 0], "g": radius}
+            if not self.own.all():
+                given["approach"] = multipliers[~self.own]
+            parts = itemgetter("r_t", "shift")
+            tries = attempts(self.solver, lambda conic: parts(conic.solve(**given)))
         discs = Equations(
             self.Q, c.reshape(r_t.shape), self.V, s, lambda y: disc_derivative(y, radius)
         )

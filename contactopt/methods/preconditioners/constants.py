@@ -1,9 +1,8 @@
 """The fitted numbers of the preconditioners, all of them, and what they were fitted on.
 
-ALONG was chosen for small condition numbers of `laplacian` on the disc of
-`python -m experiments.questions.contact_surfaces`, whose other surfaces judge it
-(reports/contact_surfaces/report.md). They judge PIECE, THINNEST and DISTORTED, too, which were
-chosen by trial.
+ALONG was chosen for small condition numbers of `laplacian` on a disc; PIECE, THINNEST and DISTORTED
+were chosen by trial. On a disc, an annulus, an L, a graded square and a ring tests bound the
+condition numbers (tests/test_surface_laplacian.py).
 
 EIGENVECTORS was chosen by the times of both ways; a solve takes up to thousands of products.
 

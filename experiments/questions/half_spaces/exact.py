@@ -1,4 +1,4 @@
-"""Half-spaces against exact answers: influence coefficients, Hertz, Cattaneo and Mindlin."""
+"""Half-spaces against exact answers: Cattaneo and Mindlin."""
 
 from __future__ import annotations
 
@@ -10,65 +10,10 @@ import numpy as np
 from contactopt import HalfSpace, Material, follow, scenes, solve
 from contactopt.analytic import contact_modulus, cycle_loss_point, tangential_modulus
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.readings.half_space_readings import subsurface_stress, surface_contact
-from experiments.questions.half_spaces.measured import Row, cpu, solved
+from contactopt.readings.half_space_readings import surface_contact
+from experiments.questions.half_spaces.measured import Row, cpu
 
 STEPS = 4  # of the path from zero to the largest shear
-
-
-def _box(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """n x n points of a square that is 2.5 contact radii wide."""
-    a = scenes.hertz_half_space().reference.half_width
-    x = (np.arange(n) + 0.5) * 2.5 * a / n - 1.25 * a
-    return x, x
-
-
-def hertz_rows() -> list[Row]:
-    """The scene hertz-half-space on more and more points."""
-    rows: list[Row] = []
-    for points in (16, 32, 64, 128, 256):
-        scene = scenes.hertz_half_space()
-        row, reduction, solution = solved(
-            replace(scene, lower=replace(scene.lower, points=_box(points))), 1e-10
-        )
-        exact, problem = scene.reference, reduction.problem
-        pressure = solution.reactions[:, 0] / problem.areas
-        distance = np.linalg.norm(problem.chart.places, axis=0)
-        inner = distance < 0.5 * exact.half_width
-        fit = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, 2)
-        edge = (distance > 0.5 * exact.half_width) & (distance < 0.95 * exact.half_width)
-        slope, top = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
-        approach = -solution.multipliers[0] / exact.approach - 1
-        made: Row = {
-            "points a side": points,
-            "peak, rel. error": np.sqrt(fit[-1]) / exact.peak - 1,
-            "width, rel. error": np.sqrt(-top / slope) / exact.half_width - 1,
-            "approach, rel. error": approach,
-            "order of the approach": np.log2(abs(rows[-1]["approach, rel. error"] / approach))
-            if rows
-            else np.nan,
-            "pressure in L2": np.linalg.norm(pressure - exact.pressure(distance))
-            / np.linalg.norm(exact.pressure(distance)),
-            "von Mises / p0": np.nan,
-            "at depth / a": np.nan,
-        }
-        if points >= 64:
-            depths = exact.half_width * np.linspace(0.44, 0.52, 9)
-            mises = subsurface_stress(reduction, solution, depths)[1].reshape(len(depths), -1)
-            below = mises[:, np.argmin(distance)]
-            place, curve = _summit(depths, below)
-            made |= {"von Mises / p0": curve / exact.peak, "at depth / a": place / exact.half_width}
-        rows.append(
-            made
-            | {"products": row["products"], "CPU s": row["CPU s, problem"] + row["CPU s, solve"]}
-        )
-    return rows
-
-
-def _summit(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Place and height of the summit of a parabola through all points."""
-    c, b, a = np.polyfit(x - x.mean(), y, 2)
-    return float(x.mean() - b / (2 * c)), float(a - b**2 / (4 * c))
 
 
 def cattaneo_rows() -> list[Row]:

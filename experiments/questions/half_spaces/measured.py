@@ -10,8 +10,8 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from contactopt import Scene, Solution, solve
-from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt import Scene, solve
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.readings.half_space_readings import surface_contact
 
 Row = dict[str, Any]
@@ -46,18 +46,18 @@ class Steps(logging.Handler):
             self.iterations.append(int(args[2]))  # type: ignore[call-overload]
 
 
-def solved(scene: Scene, tol: float = 1e-8) -> tuple[Row, Reduction, Solution]:
-    """The solved problem of a scene of half-spaces: what it took, reduction and solution."""
+def solved(scene: Scene) -> Row:
+    """What the solution of a scene of half-spaces took."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     making, reduction = cpu(lambda: reduce_bodies(scene))
     steps = Steps(reduction.problem.Q.kernel.grid)
     log = logging.getLogger("contactopt.methods.nested")
     log.addHandler(steps)
     log.setLevel(logging.INFO)
-    solving, solution = cpu(lambda: solve(reduction.problem, tol=tol))
+    solving, solution = cpu(lambda: solve(reduction.problem))
     log.removeHandler(steps)
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    row = {
+    return {
         "points": reduction.problem.contacts,
         "law": scene.law,
         "contact": surface_contact(reduction.problem, solution).fraction,
@@ -71,4 +71,3 @@ def solved(scene: Scene, tol: float = 1e-8) -> tuple[Row, Reduction, Solution]:
         "peak GB": after / 1e6,
         "kB a point": (after - before) / reduction.problem.contacts,
     }
-    return row, reduction, solution

@@ -1,8 +1,7 @@
 """Which way to the solution is the cheapest, and does contactopt take it?
 
-`python -m experiments.questions.ways` measures all ways on both families of meshes. The costs of
-contactopt.coupling.costs are fitted to the family `fit`, and the choice is judged by the family
-`judge`. `times`, `judges` and `prices` after the command choose a table alone.
+`python -m experiments.questions.ways` measures all ways and the choice on meshes other than those
+to which the costs of contactopt.coupling.costs were fitted.
 """
 
 from __future__ import annotations
@@ -14,15 +13,13 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
 
 from contactopt import Scene, reduce_bodies, solve
 from contactopt.bodies import assemble
-from contactopt.bodies.assembled import Work
 from contactopt.bodies.solvers import solvers_there
-from contactopt.coupling.costs import COSTS, FORM_OF, terms
+from contactopt.coupling.costs import COSTS, FORM_OF
 from experiments.questions.ways.unprepared import Case, cases, scene, warm
-from experiments.report import Tables, measure, stored, template
+from experiments.report import Tables, measure, template
 
 LIMIT = 60.0  # CPU seconds after which a way is given up
 SHORT, REPEATS = 0.5, 2  # the least of so many runs counts if the first one takes less seconds
@@ -60,11 +57,11 @@ def measured(case: Case) -> dict[str, Any]:
     """Times of all ways and of the choice, alternating where they are short."""
     made = scene(case)
     runs = {" ".join(way): (FORM_OF[way[0]], way[1]) for way in COSTS if way[1] in solvers_there()}
+    bodies = [assemble(made, part, 16, None) for part in made.parts]
     row: dict[str, Any] = {
-        "family": case.family,
         "scene": case.name,
-        "unknowns": sum(body.unknowns for body in _assembled(made)),
-        "on the contact": sizes(made)[1],
+        "unknowns": sum(body.unknowns for body in bodies),
+        "on the contact": len(bodies[0].body.nodes) * made.dim,
         "taken": "",
     }
     best: dict[str, float] = {}
@@ -81,61 +78,22 @@ def measured(case: Case) -> dict[str, Any]:
     return row | {name: round(took, 3) for name, took in best.items()}
 
 
-def sizes(made: Scene) -> tuple[list[Work], int]:
-    """What the estimates are made from: the work of each body, and the interface unknowns."""
-    bodies = _assembled(made)
-    return [body.work for body in bodies], len(bodies[0].body.nodes) * made.dim
-
-
-def _assembled(made: Scene) -> list[Any]:
-    return [assemble(made, part, 16, None) for part in made.parts]
-
-
-def fitted(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The prices by least squares of relative errors, not negative, and how far they are off."""
-    named = {case.name: case for case in cases("fit")}
-    known = {row["scene"]: (*sizes(scene(named[row["scene"]])), row) for row in rows}
-    found = []
-    for way, solver in COSTS:
-        name = f"{way} {solver}"
-        mine = [one for one in known.values() if 0 < float(one[2].get(name) or 0) < LIMIT]
-        if not mine:
-            continue
-        t = np.array([float(row[name]) for *_, row in mine])
-        dims = [3 if row["scene"].startswith("solid") else 2 for *_, row in mine]
-        A = np.array([terms(way, works, k, dim) for (works, k, _), dim in zip(mine, dims)])
-        prices, _ = nnls(A / t[:, None], np.ones(len(t)))
-        off = A @ prices / t
-        found.append(
-            {
-                "way": name,
-                "prices": " ".join(f"{price:.2e}" for price in prices),
-                "estimate over measured": f"{off.min():.2f} to {off.max():.2f}",
-            }
-        )
-    return found
-
-
-def measured_all(family: str) -> list[dict[str, Any]]:
-    """All scenes of a family; what is imported and compiled at first is nobody's time."""
+def judges() -> list[dict[str, Any]]:
+    """All scenes, with what the choice costs over the best way; what is imported and compiled at
+    first is nobody's time.
+    """
     for small in warm():
         for way, solver in COSTS:
             if solver in solvers_there():
                 timed(small, FORM_OF[way], solver)
     rows = []
-    for case in cases(family):
-        rows.append(measured(case))
-        print(rows[-1], flush=True)
-    return rows
-
-
-def judges() -> list[dict[str, Any]]:
-    """The scenes by which the choice is judged, with what it costs over the best way."""
-    rows = measured_all("judge")
-    ways = [" ".join(way) for way in COSTS if any(row.get(" ".join(way)) for row in rows)]
-    for row in rows:
+    for case in cases():
+        row = measured(case)
+        ways = [" ".join(way) for way in COSTS if row.get(" ".join(way))]
         row["best"] = min(ways, key=lambda way: float(row[way]))
         row["auto / best"] = round(float(row["auto"]) / float(row[row["best"]]), 2)
+        rows.append(row)
+        print(row, flush=True)
     return rows
 
 
@@ -152,9 +110,4 @@ def text(tables: Tables) -> str:
 
 
 if __name__ == "__main__":
-    tables = {
-        "judges": judges,
-        "times": lambda: measured_all("fit"),
-        "prices": lambda: fitted(stored("ways", "times")),
-    }
-    measure("ways", "Which way to the solution", text, tables)
+    measure("ways", "Which way to the solution", text, {"judges": judges})

@@ -1,8 +1,7 @@
 """Scenes on meshes that nobody prepared: Gmsh's, and structured ones shaken and renumbered. A few
 regular ones are among them, which multigrid takes fewer cycles for.
 
-A block is pressed and pushed on another one. Lengths have no unit here. The two families differ in
-shape, gradation, stiffness and seeds.
+A block is pressed and pushed on another one. Lengths have no unit here.
 """
 
 from __future__ import annotations
@@ -22,34 +21,16 @@ from contactopt.meshes.structured import graded, tensor_mesh
 SOFT, HARD = Material(5.0, 0.3), Material(50.0, 0.3)
 SHAKEN = 0.2  # way of a node inside, over the distance to its neighbour
 COARSER = 1.17  # elements of the lower body over those of the upper one, where nodes do not match
-
-
-@dataclass(frozen=True)
-class Family:
-    """A family of scenes: the shape of the upper body from Gmsh, the heights of both bodies, the
-    width of the lower one over that of the upper one, growth of the elements away from the contact
-    in Gmsh's meshes and in structured ones, the stiffness of the upper body, and a seed.
-    """
-
-    shape: str
-    height: float
-    wider: float
-    growth: tuple[float, float]
-    upper: Material
-    seed: int
-
-
-FAMILIES = {
-    "fit": Family("block", 1.0, 1.6, (0.2, 1.2), SOFT, 0),
-    "judge": Family("taper", 0.6, 1.3, (0.35, 1.35), HARD, 100),
-}
+HEIGHT, WIDER = 0.6, 1.3  # of both bodies; width of the lower one over that of the upper one
+# of the elements away from the contact, in Gmsh's meshes and in structured ones
+GMSH_GROWTH, GROWTH = 0.35, 1.35
+SEED = 100
 
 
 @dataclass(frozen=True)
 class Case:
-    """One scene of a family; `size` is that of the elements at the contact, over its width."""
+    """One scene; `size` is that of the elements at the contact, over its width."""
 
-    family: str
     kind: str
     source: str
     degree: int
@@ -62,65 +43,63 @@ class Case:
         return f"{self.kind}, {self.source}, degree {self.degree}, {match}, {self.size:g}"
 
 
-# kind, source, degree, matching -> sizes of the fit, sizes of the judges
+# kind, source, degree, matching -> sizes
 SIZES = {
-    ("plane-strain", "gmsh", 1, False): ((0.04, 0.015, 0.005, 0.0025), (0.02, 0.006, 0.003, 4e-4)),
-    ("plane-strain", "gmsh", 2, True): ((0.03, 0.008), (0.01, 0.005)),
-    ("plane-strain", "shaken", 1, True): ((0.02, 0.005), (0.015, 0.004, 6e-4)),
-    ("plane-strain", "shaken", 2, False): ((), (0.02, 0.006)),
-    ("axisymmetric", "gmsh", 1, False): ((0.03, 0.006), (0.012, 0.004)),
-    ("axisymmetric", "gmsh", 2, True): ((), (0.012, 0.005)),
-    ("axisymmetric", "shaken", 2, False): ((0.03, 0.008), (0.02, 0.006, 0.0015)),
-    ("plane-strain", "regular", 1, True): ((0.02, 0.006), (0.01, 0.004)),
-    ("solid", "regular", 1, True): ((0.1, 0.06, 0.04), (0.08, 0.05, 0.022)),
-    ("solid", "gmsh", 1, False): ((0.12, 0.07, 0.045), (0.1, 0.06, 0.05, 0.04)),
-    ("solid", "gmsh", 1, True): ((0.1, 0.05), (0.07, 0.045, 0.015)),
-    ("solid", "gmsh", 2, False): ((0.2, 0.11), (0.18, 0.12)),
-    ("solid", "gmsh", 2, True): ((), (0.15,)),
-    ("solid", "shaken", 1, True): ((0.12, 0.07, 0.045), (0.09, 0.05, 0.025)),
-    ("solid", "shaken", 1, False): ((), (0.08, 0.06)),
-    ("solid", "shaken", 2, False): ((0.25, 0.125), (0.17, 0.1, 0.05)),
+    ("plane-strain", "gmsh", 1, False): (0.02, 0.006, 0.003, 4e-4),
+    ("plane-strain", "gmsh", 2, True): (0.01, 0.005),
+    ("plane-strain", "shaken", 1, True): (0.015, 0.004, 6e-4),
+    ("plane-strain", "shaken", 2, False): (0.02, 0.006),
+    ("axisymmetric", "gmsh", 1, False): (0.012, 0.004),
+    ("axisymmetric", "gmsh", 2, True): (0.012, 0.005),
+    ("axisymmetric", "shaken", 2, False): (0.02, 0.006, 0.0015),
+    ("plane-strain", "regular", 1, True): (0.01, 0.004),
+    ("solid", "regular", 1, True): (0.08, 0.05, 0.022),
+    ("solid", "gmsh", 1, False): (0.1, 0.06, 0.05, 0.04),
+    ("solid", "gmsh", 1, True): (0.07, 0.045, 0.015),
+    ("solid", "gmsh", 2, False): (0.18, 0.12),
+    ("solid", "gmsh", 2, True): (0.15,),
+    ("solid", "shaken", 1, True): (0.09, 0.05, 0.025),
+    ("solid", "shaken", 1, False): (0.08, 0.06),
+    ("solid", "shaken", 2, False): (0.17, 0.1, 0.05),
 }
 
 
-def cases(family: str) -> list[Case]:
-    """The scenes of a family, the small ones first."""
-    place = list(FAMILIES).index(family)
-    found = [Case(family, *kind, size) for kind, sizes in SIZES.items() for size in sizes[place]]
+def cases() -> list[Case]:
+    """All scenes, the small ones first."""
+    found = [Case(*kind, size) for kind, sizes in SIZES.items() for size in sizes]
     return sorted(found, key=lambda case: -case.size)
 
 
 def scene(case: Case) -> Scene:
     """The scene of a case: mu is 0.3, and the upper body floats."""
-    own, dim = FAMILIES[case.family], 3 if case.kind == "solid" else 2
-    wider = 1.0 if case.matching else own.wider
+    dim, wider = 3 if case.kind == "solid" else 2, 1.0 if case.matching else WIDER
     coarse = case.size * (1.0 if case.matching else COARSER)
     if case.source in ("regular", "shaken"):
-        upper = _structured(dim, 1.0, own.height, case.size, own.growth[1])
-        lower = _structured(dim, wider, -own.height, coarse, own.growth[1])
+        upper = _structured(dim, 1.0, HEIGHT, case.size)
+        lower = _structured(dim, wider, -HEIGHT, coarse)
         if case.source == "shaken":
-            upper, lower = _shaken(upper, own.seed), _shaken(lower, own.seed + 1)
+            upper, lower = _shaken(upper, SEED), _shaken(lower, SEED + 1)
     else:
-        upper = _gmsh(own.shape, dim, 1.0, own.height, case.size, own.growth[0])
-        lower = _renumbered(_moved(upper, mirrored=True), own.seed)
+        upper = _gmsh("taper", dim, 1.0, HEIGHT, case.size)
+        lower = _renumbered(_moved(upper, mirrored=True), SEED)
         if not case.matching:
-            lower = _gmsh("block", dim, wider, -own.height, coarse, own.growth[0])
+            lower = _gmsh("block", dim, wider, -HEIGHT, coarse)
     axis = case.kind == "axisymmetric"
     upper = _moved(upper, shift=0.0 if axis else (wider - 1.0) / 2)
     supports = (Support("axis", {"r": 0.0}),) if axis else ()
     push = (0.0, -1.0) if axis else (0.15, *(0.05,) * (dim - 2), -1.0)
     pressed = (Traction("top", push),)
     bodies = (
-        Part("upper", _named(upper), own.upper, supports, pressed, contact="bottom"),
+        Part("upper", _named(upper), HARD, supports, pressed, contact="bottom"),
         Part("lower", _named(lower), SOFT, (*supports, Support("bottom")), contact="top"),
     )
     return Scene(case.name, *bodies, 0.3, kind=case.kind, degree=case.degree)
 
 
-def _structured(dim: int, width: float, height: float, size: float, growth: float) -> Any:
+def _structured(dim: int, width: float, height: float, size: float) -> Any:
     """Rectangles or bricks, whose height grows away from the contact."""
     flat = np.linspace(0, width, max(2, round(width / size)) + 1)
-    rise = graded(abs(height), size, growth)
+    rise = graded(abs(height), size, GROWTH)
     return tensor_mesh(*[flat] * (dim - 1), rise if height > 0 else -rise[::-1])
 
 
@@ -134,7 +113,7 @@ def _shaken(mesh: Any, seed: int) -> Any:
     return _renumbered(type(mesh)(points, mesh.t), seed)
 
 
-def _gmsh(shape: str, dim: int, width: float, height: float, size: float, growth: float) -> Any:
+def _gmsh(shape: str, dim: int, width: float, height: float, size: float) -> Any:
     """Gmsh's mesh of a block, or of one that is narrower, in space round, away from the contact."""
     import gmsh
 
@@ -155,7 +134,7 @@ def _gmsh(shape: str, dim: int, width: float, height: float, size: float, growth
         occ.synchronize()
         field = gmsh.model.mesh.field
         number = field.add("MathEval")
-        field.setString(number, "F", f"{size}+{growth}*abs({'xyz'[dim - 1]})")
+        field.setString(number, "F", f"{size}+{GMSH_GROWTH}*abs({'xyz'[dim - 1]})")
         field.setAsBackgroundMesh(number)
         for source in ("ExtendFromBoundary", "FromPoints"):
             gmsh.option.setNumber(f"Mesh.MeshSize{source}", 0)
@@ -199,4 +178,4 @@ def _named(mesh: Any) -> Any:
 def warm() -> Iterator[Scene]:
     """Small scenes whose solution imports what is imported late."""
     for kind in ("plane-strain", "solid"):
-        yield scene(Case("fit", kind, "gmsh", 1, False, 0.25))
+        yield scene(Case(kind, "gmsh", 1, False, 0.25))

@@ -23,7 +23,7 @@ from contactopt.readings.quantities import value_of
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL
-from experiments.questions.half_spaces.rough import LENGTH, TAMAAS, gap_of, pressed
+from experiments.questions.half_spaces.rough import LENGTH, gap_of, pressed
 from experiments.questions.half_spaces.rough import MATERIAL as ROUGH
 
 Row = dict[str, Any]
@@ -31,6 +31,22 @@ QUANTITIES = ("peak", "width", "stick", "approach", "area")
 BOX = 2.5  # side of the square of a half-space's points over the contact radius
 SHORT = 0.5  # CPU seconds, below which a run is repeated three times
 FINEST = 1024  # points along a side of the rough surface that the others are compared with
+# what a Python that has Tamaas runs: the file that is given, and that of the answer
+TAMAAS = """
+import sys, time, numpy as np, tamaas as tm
+data = np.load(sys.argv[1])
+gap, length, tol = data["gap"], float(data["length"]), float(data["tol"])
+model = tm.Model(tm.model_type.basic_2d, [length, length], list(gap.shape))
+model.E, model.nu = float(data["modulus"]), 0.0
+kind = tm.PolonskyKeerRey.pressure
+solver = tm.PolonskyKeerRey(model, gap.max() - gap, tol, kind, kind)
+tm.ModelFactory.registerNonPeriodic(model, "dcfft")
+solver.setIntegralOperator("dcfft")
+solver.max_iter = 5000
+start = time.process_time()
+solver.solve(float(data["pressure"]))
+np.savez(sys.argv[2], seconds=time.process_time() - start, pressure=np.array(model.traction))
+"""
 
 
 def timed(act: Callable[[], Any]) -> tuple[float, Any]:
@@ -114,7 +130,7 @@ def in_tamaas(python: str, gap: np.ndarray, **given: Any) -> tuple[float, np.nda
     """CPU seconds of Tamaas' solve by Polonsky and Keer's method, and its pressure."""
     with tempfile.TemporaryDirectory() as folder:
         file, answer = Path(folder) / "given.npz", Path(folder) / "answer.npz"
-        np.savez(file, gap=gap, tol=1e-9, periodic=False, **given)
+        np.savez(file, gap=gap, tol=1e-9, **given)
         subprocess.run([python, "-c", TAMAAS, file, answer], check=True, capture_output=True)
         theirs = np.load(answer)
         return float(theirs["seconds"]), theirs["pressure"].ravel()
