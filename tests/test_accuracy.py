@@ -54,7 +54,7 @@ def test_no_functional_of_contact_is_believed_to_have_order_4():
     """
     rest, order = mesh_error([8.198854, 8.480154, 7.820111, 7.815798], best_order("energy", 2))
     assert order is not None and order > 7
-    assert 0.5 < everywhere.SAFETY * abs(rest) / (7.815798 - 7.804) < 4
+    assert 0.5 < everywhere.safety(4) * abs(rest) / (7.815798 - 7.804) < 4
     assert best_order("energy", 1) == best_order("width", 2) == 2
 
 
