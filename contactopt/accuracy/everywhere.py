@@ -49,6 +49,7 @@ from contactopt.solving.solve_scene import Options, Solved
 SAFETY = {2: 3.0, 3: 1.25}
 FEW = 4  # meshes, below which no order above CERTAIN is believed
 CERTAIN = 2.0
+SWING = 0.25  # of a difference that remains if the next one has the opposite sign
 
 
 def best_order(quantity: str, degree: int) -> int:
@@ -79,7 +80,7 @@ def remainder(before: float | None, last: float, best: float) -> tuple[float, fl
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
     if before and last and before / last < 0:
-        size = max(abs(last), abs(before) / 4)
+        size = max(abs(last), SWING * abs(before))
     elif before and last:
         order = float(np.log2(before / last))
         size = max(size, abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1))

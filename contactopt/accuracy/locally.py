@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.accuracy.estimate import Judged, read
-from contactopt.accuracy.everywhere import best_order, mesh_error, safety, stuck
+from contactopt.accuracy.everywhere import SAFETY, best_order, mesh_error, safety, stuck
 from contactopt.accuracy.indicators import ElementErrors, along_path, misfit
 from contactopt.accuracy.marking import (
     at_contacts,
@@ -31,7 +31,6 @@ from contactopt.solving.solve_scene import Options, Solved, solve_scene
 # of the estimated error that the marked elements make; Doerfler's marking allows anything between 0
 # and 1
 SHARE = 0.6
-SAFE = 1.25  # factor of safety of an error that is summed over the elements
 LESS = 0.25  # by how much the change of a path falls at most from one mesh to the next
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
 
@@ -77,14 +76,14 @@ class Locally:
         last = along_path(solved, self.quantity, reading.value)
         self.errors = [*self.errors[-2:], last]
         if not last.unsigned:
-            size = SAFE * last.size + max(misfit(self.errors), reading.uncertainty)
+            size = SAFETY[3] * abs(last.total) + max(misfit(self.errors), reading.uncertainty)
             return Judged(size, -last.total, energy=last.energy)
         # of two refinements, since what one changes may be small by chance
         changes = np.abs(np.diff(self.values[-3:]))[::-1]
         if not len(changes):
             size = np.inf
         elif solved.path is not None:  # nothing but the changes tells the error of a whole path
-            size = SAFE * float(np.max(changes * (1.0, LESS)[: len(changes)]))
+            size = SAFETY[3] * float(np.max(changes * (1.0, LESS)[: len(changes)]))
         else:  # no adjoint: what a refinement changed, twice
             size = 2 * float(np.max(changes))
         mesh = np.nan if solved.path is not None else -last.total
