@@ -8,12 +8,13 @@ until the target is met or a sentence says why not.
 Every mesh is a Level, the end is an Estimate. The estimated error of the value is the largest of
 
     what the search says of it: differences of nested solutions, or a sum over the elements (below);
-    how uncertain its reading is (contactopt.readings.quantities);
+    how uncertain its reading is (contactopt.readings.quantities). It is added to the differences of
+    meshes that are given: where nodes do not match, readings scatter, which differences may hide;
     by how much another local maximum may exceed it, whose elements are refined, too.
 
 The error of a geometry that the file gives by straight edges alone is added at the end
-(contactopt.accuracy.polygon). A target is not reached on fewer than two meshes, nor where few
-contacts touch, nor where the gap of a rigid body undercuts what the contacts see of it. A value
+(contactopt.accuracy.polygon). A target is not reached on fewer than three meshes, nor where
+few contacts touch, nor where the gap of a rigid body undercuts what the contacts see of it. A value
 that grows at one place with every refinement is infinite (contactopt.accuracy.corners).
 
 Refined where the quantity needs it, the error of J is estimated element by element by the
@@ -35,10 +36,13 @@ A stress at a place is recovered by a fit to the stresses of the elements near i
 at least two standard errors of the fit. For a largest stress this covers the places where it could
 be larger by as much; these are refined too.
 
-The estimated error is also at least what the last refinement changed. What is not estimated: the
-linearisation of a J that is not linear, what recovery does not see where the solution is not
-smooth, and that straight edges are chords of a curved boundary. So the estimate is not a bound.
-A guaranteed bound is made at the end, where there is one (contactopt.accuracy.bound).
+What is not estimated: the linearisation of a J that is not linear, what recovery does not see where
+the solution is not smooth, and that straight edges are chords of a curved boundary. Much of it
+shows in the corrected value, J_h and its estimated error together, which would be the same on every
+mesh if the estimates were exact. What the last two refinements changed of it is therefore added to
+the sum, which has a factor of safety of 1.25, unless the reading is more uncertain than that
+(indicators.misfit). So the estimate is not a bound. A guaranteed bound is made at the end, where
+there is one (contactopt.accuracy.bound).
 
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for

@@ -12,16 +12,20 @@ holds fixed. The error is taken as one part that falls with each,
 both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n
 elements, the second of the last of them and its split, measured anew on the mesh that it asks to
 split. Their sizes are added, and the larger part is refined next. The claim is their sum times a
-factor of safety. Orders are observed where there are three solutions, and held between 3/4 and the
-order of functionals of smooth solutions, 2 per degree of the displacement. But a solution whose
-contact ends by itself is not smooth. It has less than 5/2 derivatives, and no functional converges
-faster than with order 3 on meshes that are halved; where an edge is read, with order 2.
+factor of safety, 1.25 from three meshes on and 3 of two. Orders are observed where there are three
+solutions, and held between 3/4 and the order of functionals of smooth solutions, 2 per degree of
+the displacement. But a solution whose contact ends by itself is not smooth. It has less than 5/2
+derivatives, and no functional converges faster than with order 3 on meshes that are halved; where
+an edge is read, with order 2. Where the edge of contact moves through the elements, the error
+changes its sign from mesh to mesh, and three meshes may fall with any order by chance: more than
+order 2 is believed of four meshes and more.
 
 Sources: Moussaoui, Khodja (1992), Regularite des solutions d'un probleme mele Dirichlet-Signorini
 dans un domaine polygonal plan, for the derivatives; Roache (1994), Perspective: a method for
-uniform reporting of grid refinement studies, for the factor of safety of estimates from three and
-more meshes; Roache (1998), Verification and Validation in Computational Science and Engineering,
-chapter 5.
+uniform reporting of grid refinement studies, for the factors of safety; Roache (1998), Verification
+and Validation in Computational Science and Engineering, chapter 5; Eca, Hoekstra (2014), A
+procedure for the estimation of the numerical uncertainty of CFD calculations based on grid
+refinement studies, for the four meshes.
 """
 
 from __future__ import annotations
@@ -41,12 +45,26 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
 from contactopt.solving.solve_scene import Options, Solved
 
-SAFETY = 1.25  # of an error that is read from differences of nested solutions
+# of an error that is read from the difference of two nested solutions, and from differences of more
+SAFETY = {2: 3.0, 3: 1.25}
+FEW = 4  # meshes, below which no order above CERTAIN is believed
+CERTAIN = 2.0
+SWING = 0.25  # of a difference that remains if the next one has the opposite sign
 
 
 def best_order(quantity: str, degree: int) -> int:
     """The highest order of convergence that is believed of a quantity."""
     return 2 if quantity.startswith(EDGES) else min(2 * degree, 3)
+
+
+def safety(meshes: int) -> float:
+    """The factor of safety of an error that is read from so many nested meshes, at least one."""
+    return SAFETY[min(max(meshes, 2), 3)]
+
+
+def believed(best: float, meshes: int) -> float:
+    """The highest order that is believed of so many nested meshes, `best` in the limit."""
+    return best if meshes >= FEW else min(best, CERTAIN)
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
@@ -62,7 +80,7 @@ def remainder(before: float | None, last: float, best: float) -> tuple[float, fl
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
     if before and last and before / last < 0:
-        size = max(abs(last), abs(before) / 4)
+        size = max(abs(last), SWING * abs(before))
     elif before and last:
         order = float(np.log2(before / last))
         size = max(size, abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1))
@@ -76,7 +94,8 @@ def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | Non
     steps = np.diff(values[-3:])
     if not len(steps):
         return np.inf, None
-    rest, order = remainder(steps[-2] if len(steps) > 1 else None, steps[-1], best)
+    before = steps[-2] if len(steps) > 1 else None
+    rest, order = remainder(before, steps[-1], believed(best, len(values)))
     return -rest, order
 
 
@@ -146,9 +165,11 @@ class Everywhere:
         grading = 0.0
         if self.changes:
             before = self.changes[-2] if len(self.changes) > 1 else None
-            rest = remainder(before, self.changes[-1], self.best)[0]
+            best = believed(self.best, len(self.changes) + 1)
+            rest = remainder(before, self.changes[-1], best)[0]
             grading = -rest - sum(self.changes[splits:])
-        return Judged(SAFETY * (abs(mesh) + abs(grading)), mesh, grading, order)
+        size = safety(len(self.meshes)) * (abs(mesh) + abs(grading))
+        return Judged(size, mesh, grading, order)
 
     def vain(self) -> str:
         """One sentence that says why further refinement would be in vain, or an empty text."""

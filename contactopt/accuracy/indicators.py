@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -64,6 +65,17 @@ class ElementErrors:
         chosen[order[:count]] = True
         first = np.cumsum([0, *(len(part) for part in self.bodies)])
         return tuple(np.flatnonzero(chosen[a:b]) for a, b in pairwise(first))
+
+
+def misfit(found: Sequence[ElementErrors]) -> float:
+    """By how much the last two refinements changed the value with its estimated error added, which
+    exact estimates would leave as it is [unit of the quantity]; `found` belong to the last three
+    meshes. The change of the earlier refinement falls with the estimated error since.
+    """
+    changes = np.abs(np.diff([errors.value + errors.total for errors in found]))
+    if len(changes) > 1:
+        changes[0] *= min(1.0, found[-1].size / (found[-2].size or 1.0))
+    return float(np.max(changes, initial=0.0))
 
 
 def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:

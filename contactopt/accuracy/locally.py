@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from contactopt.accuracy.estimate import Judged, read
-from contactopt.accuracy.everywhere import SAFETY, best_order, mesh_error, stuck
-from contactopt.accuracy.indicators import ElementErrors, along_path
+from contactopt.accuracy.everywhere import SAFETY, best_order, mesh_error, safety, stuck
+from contactopt.accuracy.indicators import ElementErrors, along_path, misfit
 from contactopt.accuracy.marking import (
     at_contacts,
     check_refinable,
@@ -54,7 +54,7 @@ class Locally:
         self.quantity, self.options, self.whole, self.watches = quantity, options, whole, not whole
         self.best = best_order(quantity.name, states[-1].degree)
         self.values: list[float] = []
-        self.errors: ElementErrors | None = None
+        self.errors: list[ElementErrors] = []
         self.last: Solved | None = None
         self.splits = 0
 
@@ -71,27 +71,30 @@ class Locally:
         self.values.append(reading.value)
         if self.whole:
             mesh, order = mesh_error(self.values, self.best)
-            return Judged(SAFETY * abs(mesh), mesh, order=order)
-        self.errors = along_path(solved, self.quantity, reading.value)
+            size = safety(len(self.values)) * abs(mesh) + reading.uncertainty
+            return Judged(size, mesh, order=order)
+        last = along_path(solved, self.quantity, reading.value)
+        self.errors = [*self.errors[-2:], last]
+        if not last.unsigned:
+            size = SAFETY[3] * abs(last.total) + max(misfit(self.errors), reading.uncertainty)
+            return Judged(size, -last.total, energy=last.energy)
         # of two refinements, since what one changes may be small by chance
-        changes = np.abs(np.diff(self.values[-3:]))
-        if solved.path is not None:  # nothing but the changes tells the error of a whole path
-            size = SAFETY * float(np.max(changes[::-1] * (1.0, LESS)[: len(changes)], initial=0.0))
-            size = size if len(changes) else np.inf
-            return Judged(size + reading.uncertainty, np.nan, energy=self.errors.energy)
-        change = float(np.max(changes, initial=0.0))
-        size = self.errors.size
-        if self.errors.unsigned:  # no adjoint: what the last refinement changed, twice
-            size = 2 * change if len(self.values) > 1 else np.inf
-        size = max(size, change) + reading.uncertainty
-        return Judged(size, -self.errors.total, energy=self.errors.energy)
+        changes = np.abs(np.diff(self.values[-3:]))[::-1]
+        if not len(changes):
+            size = np.inf
+        elif solved.path is not None:  # nothing but the changes tells the error of a whole path
+            size = SAFETY[3] * float(np.max(changes * (1.0, LESS)[: len(changes)]))
+        else:  # no adjoint: what a refinement changed, twice
+            size = 2 * float(np.max(changes))
+        mesh = np.nan if solved.path is not None else -last.total
+        return Judged(size + reading.uncertainty, mesh, energy=last.energy)
 
     def vain(self) -> str:
         return stuck(self.quantity.name, self.values) if self.whole else ""
 
     @property
     def ready(self) -> bool:
-        return len(self.values) > (2 if self.whole else 1)
+        return len(self.values) > 2
 
     def facts(self, solved: Solved) -> dict[str, Any]:
         if not self.whole:
@@ -106,7 +109,7 @@ class Locally:
         """
         marked = None
         if not self.whole:
-            assert self.last is not None and self.errors is not None
+            assert self.last is not None
             reduction = self.last.reduction
             chosen = list(rivals)
             if reading.uncertainty > judged.size / 3:  # of which it is a part
@@ -116,7 +119,7 @@ class Locally:
                 pressure = nodal_pressure(reduction.problem, self.last.solution)
                 near.append(plateau(reduction, pressure, rivals))
             marks = zip(
-                self.errors.marked(SHARE),
+                self.errors[-1].marked(SHARE),
                 at_contacts(reduction, np.concatenate(near).astype(int)),
             )
             inside = [(peak.body, peak.elements) for peak in chosen]

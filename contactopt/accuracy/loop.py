@@ -12,7 +12,7 @@ import numpy as np
 from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
 from contactopt.accuracy.estimate import Estimate, Judged, Level, read
-from contactopt.accuracy.everywhere import Everywhere
+from contactopt.accuracy.everywhere import SWING, Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.checks import check_number
@@ -197,22 +197,29 @@ class _Loop:
         """The local maxima that may be the largest, and by how much they may exceed the value.
 
         The largest is among them until smaller elements around it have changed it little; where
-        all elements are divided, the differences of nested solutions tell more.
+        all elements are divided, the differences of nested solutions tell more. The search judges
+        what the value changed; what the peak changed beyond that counts here. Another may grow by
+        as much again as it did on smaller elements. One that has fallen is not expected to, but may
+        swing back as differences of nested solutions do (contactopt.accuracy.everywhere).
         """
         last = self.peaks[-1]
         found, excess = [], 0.0
         if self.search.watches and last and last[0].size:
-            excess = self._change(last[0])
-            found = [last[0]] if excess > self.judged.size / 2 else []
+            then, largest = self._before(last[0])
+            change = abs(last[0].value - then)
+            excess = max(change - abs(last[0].value - largest), 0.0)
+            found = [last[0]] if change > self.judged.size / 2 else []
         for peak in last[1:]:
-            doubt = self._change(peak)
-            if peak.value + doubt >= last[0].value - last[0].uncertainty:
+            grown = peak.value - self._before(peak)[0]
+            if peak.value + abs(grown) >= last[0].value - last[0].uncertainty:
                 found.append(peak)
+                doubt = max(grown, -SWING * grown)
                 excess = max(excess, peak.value + doubt - last[0].value)
         return found, excess
 
-    def _change(self, peak: Peak) -> float:
-        """By how much a peak differed on the last mesh of larger elements there, or half the value.
+    def _before(self, peak: Peak) -> tuple[float, float]:
+        """The value of a peak, and the largest value, on the last mesh of larger elements there;
+        where there is none, a share of its value, and its value.
 
         What nodes scatter about a fit is no measure here: where facets change their length, it is
         large on every mesh.
@@ -220,13 +227,13 @@ class _Loop:
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
             larger = [
-                (distance, abs(one.value - peak.value))
+                (distance, one.value)
                 for one, distance in zip(earlier, away)
                 if one.size >= WATCHED * peak.size and distance <= SAME_PEAK * one.size
             ]
             if larger:
-                return min(larger)[1]
-        return UNWATCHED * peak.value
+                return min(larger)[1], earlier[0].value
+        return (1 - UNWATCHED) * peak.value, peak.value
 
     def _unresolved(self) -> np.ndarray:
         """Numbers of contacts around which the mesh is too coarse to know anything."""

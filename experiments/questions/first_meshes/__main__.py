@@ -183,12 +183,13 @@ Less is claimed of {"; ".join(map(told, small)) or "none"}. More is claimed of
 Outside their claims are: {"; ".join(missed) or "none"}. No answer came from:
 {"; ".join(refused) or "none"}.
 
-Energies are claimed too small where few meshes show an order that they do not keep. In the lug
-three of them fall with order 3 and pass the limit. The energy of the pin in the bush falls with an
-order below 1 on even meshes, and a search that refines locally ends after two of them, because the
-target is far above what it claims. Claims are too large where they hold what the value changed on
-the last mesh, or the scatter of its reading. The largest stress of the lug is at the edge of
-contact, where its reading is uncertain on every mesh, also on that of the reference.
+Nodes that do not match let the pressure of linear elements scatter from node to node, and the claim
+holds this scatter, which may be several times the error, or what another local maximum may grow.
+Where the edge of contact moves through the elements, the error changes its sign from mesh to mesh,
+and a small last change may be luck: of three meshes the claim holds what order 2 leaves of the
+change before. A search that refines locally claims what refinement changed of the corrected value,
+too. The largest stress of the lug is at the edge of contact, where its reading is uncertain on
+every mesh, also on that of the reference.
 
 The pressure of the dovetail has no limit in the linearised model. Where the flank meets the
 rounding, the curvature of the surface jumps. The normals there turn, and a blade that slides by u
