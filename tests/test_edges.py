@@ -6,7 +6,9 @@ import pytest
 from contactopt import InterfaceProblem, Part, Rigid, Scene
 from contactopt.material import Material
 from contactopt.problem.chart import Chart
-from contactopt.readings.edges import contact_edge, stick_edge
+from contactopt.readings.edges import contact_edge, contact_zone, stick_edge
+from contactopt.scenes import make_scene
+from contactopt.solving.solve_scene import solve_scene
 
 PART = Part("body", None, Material(1.0, 0.3))
 
@@ -230,3 +232,16 @@ def test_slip_of_a_small_step_does_not_move_the_stick_edge():
     scene, problem, distance, r, slip = punch(c)
     step = (np.maximum(0.0, distance - c) ** 0.5)[:, None] * np.sign(slip)
     assert stick_edge(scene, problem, r, step)[0] == pytest.approx(c, rel=1e-9)
+
+
+def test_the_edge_of_a_flat_punch_is_that_of_the_surface():
+    """Every contact touches, and the pressure grows towards the corner: the half-width is exact.
+    Where it falls, contact may end within the last element.
+    """
+    scene = make_scene("rigid-punch-2d", mu=0.5)
+    solved = solve_scene(scene, 8)
+    problem, r = solved.reduction.problem, solved.solution.reactions
+    assert contact_zone(scene, problem, r) == (pytest.approx(20.0), 0.0)
+    falling = r.copy()
+    falling[np.argsort(problem.coordinates[0])[-1]] *= 1e-3
+    assert contact_zone(scene, problem, falling)[1] > 0.1

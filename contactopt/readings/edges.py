@@ -88,7 +88,8 @@ def contact_zone(
     touches, or where contact ends at a corner, the edge is that of the contact surface. A reading
     on a surface counts only where the disc of that radius has the area of the zone to within an
     element. The uncertainty is half of what the fit and the straight line differ, and a share of an
-    element at least. Where areas of nodes are counted, it is that of the nodes at the edge.
+    element at least. Where areas of nodes are counted, it is that of the nodes at the edge, and
+    nothing where the pressure does not fall towards the ends of a line.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
@@ -104,7 +105,19 @@ def contact_zone(
         return None if line is None else (line, end.step / 2)
 
     least = FITTED_WITHIN if problem.dim == 2 else WITHIN
-    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read, least)
+    width, doubt = _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read, least)
+    return width, 0.0 if touching.all() and _ends_at_corners(problem, pressure) else doubt
+
+
+def _ends_at_corners(problem: InterfaceProblem, pressure: np.ndarray) -> bool:
+    """Whether the pressure on a line does not fall towards its ends, so that it is the surface that
+    ends there, and not contact by itself.
+    """
+    if problem.dim == 3 or len(pressure) < 2:
+        return False
+    order = np.argsort(problem.coordinates[0])
+    ends = [order[-2:]] if problem.chart.mirrored[0] else [order[-2:], order[1::-1]]
+    return all(pressure[last] >= pressure[before] for before, last in ends)
 
 
 def stick_edge(
