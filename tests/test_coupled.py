@@ -26,7 +26,10 @@ from contactopt.coupling import costs
 from contactopt.linear.flexible_gmres import flexible_gmres
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.linear.stacked import Stacked, norm
+from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.coupled_newton import Coupled, State, in_equilibrium
+from contactopt.methods.kernels.krylov import model_of
+from contactopt.methods.kernels.linearised import Linearised
 from contactopt.problem.certificate import Moved
 from contactopt.problem.laws import LAWS
 from contactopt.problem.laws.coulomb import Coulomb
@@ -258,3 +261,15 @@ def test_who_asked_for_multigrid_gets_it(coupled_by_a_little):
     assert asked.reduction.problem.Q.coupled is not None and asked.turned is None
     problem = reduce(scene)  # nobody is there who could turn to another way
     assert problem.Q.coupled is not None and solve(problem).solved
+
+
+def test_a_step_with_every_contact_open_leaves_the_motions_alone():
+    """Nothing resists them then, and GMRES with an operator that is zero returns no numbers."""
+    problem = reduce_bodies(make_scene("punch-2d"), 4).problem.explicit()
+    equations = coulomb_equations(problem)
+    linearised = Linearised(equations, np.zeros((problem.contacts, problem.dim, problem.dim)))
+    error, balance = np.ones(problem.q.size), np.ones(len(problem.s))
+    rough = linearised.rough(model_of(problem, None))
+    dr, motions = linearised.solve(lambda x: problem.Q @ x, rough, error, balance, 1e-3)
+    assert np.array_equal(dr, error) and np.array_equal(motions, 0 * problem.s)
+    assert len(problem.s) > 0

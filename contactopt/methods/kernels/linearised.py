@@ -130,4 +130,7 @@ class Linearised:
 
 
 def _gmres(A: LinearOperator, b: np.ndarray, rtol: float, M: LinearOperator) -> np.ndarray:
-    return np.asarray(gmres(A, b, rtol=rtol, restart=min(len(b), RESTART), maxiter=CYCLES, M=M)[0])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x = gmres(A, b, rtol=rtol, restart=min(len(b), RESTART), maxiter=CYCLES, M=M)[0]
+    # where every contact is open, nothing resists the motions, and GMRES divides by zero
+    return np.asarray(x if np.all(np.isfinite(x)) else M @ b)
