@@ -14,17 +14,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 import skfem
-from scipy.sparse.linalg import splu
 
-from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.errors import InputError
 
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
 UNBALANCED = 1e-6  # of the force on a piece
-SOFT = 1e-12  # of the energy: rigid motions of a fan leave as many equations over
 
 
 def uneven_traction(scene: Any) -> float:
@@ -64,12 +60,9 @@ def uneven_traction(scene: Any) -> float:
                 rest.append(missing[i])
         if corners:
             mesh, moments = _fans(np.array(corners), np.array(outer), np.array(rest))
-            if isinstance(cells, EquilibriumElements):
-                fans = EquilibriumElements(mesh, cells.degree, cells.revolved)
-                energy = _least_in_balance(fans, moments, material)
-            else:
-                energy = _least_energy(Simplices(mesh), moments, material)
-            total += scene.factor * energy
+            degree = getattr(cells, "degree", 1)
+            fans = EquilibriumElements(mesh, degree, scene.revolved)
+            total += scene.factor * _least_energy(fans, moments, material)
     return float(np.sqrt(total))
 
 
@@ -99,7 +92,7 @@ def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, 
     return mesh, m
 
 
-def _least_in_balance(cells: EquilibriumElements, m: np.ndarray, material: Any) -> float:
+def _least_energy(cells: EquilibriumElements, m: np.ndarray, material: Any) -> float:
     """The least energy of stresses with these moments of tractions."""
     held = np.zeros(m.shape[:2], dtype=bool)
     none = np.zeros_like(cells.stress(material, np.zeros((2, len(m) + cells.mesh.nvertices))))
@@ -107,40 +100,3 @@ def _least_in_balance(cells: EquilibriumElements, m: np.ndarray, material: Any) 
     if missed > UNBALANCED:
         raise InputError("pieces of the facets in contact are too short for a bound.")
     return float(cells.products(material, stress, stress).sum())
-
-
-def _least_energy(cells: Simplices, m: np.ndarray, material: Any) -> float:
-    """The same of the composite stresses of contactopt.accuracy.equilibrated."""
-    mesh, count = cells.mesh, len(cells.volume)
-    centre = mesh.p[:, mesh.t].mean(axis=1)
-    metric = cells.metric(material, slice(None))
-    K = (cells.by_moments.T @ sp.block_diag(metric, format="csr") @ cells.by_moments).tocsr()
-    rows, columns, values = [], [], []
-    for o, others in enumerate(cells.others):
-        for a, slot in zip(others, cells.slots[o]):
-            x = mesh.p[:, mesh.t[a]]
-            for c in range(2):
-                column = (cells.opposite[o] * 2 + slot) * 2 + c
-                arm = cells.sign[o] * (x[0] - centre[0] if c else centre[1] - x[1])
-                for row, value in ((c, cells.sign[o]), (2, arm)):
-                    rows.append(3 * np.arange(count) + row)
-                    columns.append(column)
-                    values.append(value)
-    E = sp.csr_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
-        (3 * count, K.shape[0]),
-    )
-    inner = np.flatnonzero(np.repeat(mesh.f2t[1] >= 0, 4))
-    given = m.ravel()
-    Ki, Ei = K[inner][:, inner], E[:, inner]
-    size = Ki.diagonal().mean()
-    soft = sp.diags(-SOFT / size * np.ones(3 * count))
-    system = sp.bmat([[Ki, Ei.T], [Ei, soft]], format="csc")
-    try:
-        factors = splu(system)
-    except RuntimeError as error:  # triangles without a height
-        raise InputError("pieces of the facets in contact are too short for a bound.") from error
-    solved = factors.solve(np.concatenate([-(K @ given)[inner], -E @ given]))
-    given[inner] = solved[: len(inner)]
-    data = cells.data(cells.seen(given.reshape(m.shape)), np.zeros(2))
-    return float(cells.products(material, data, data).sum())
