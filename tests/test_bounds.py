@@ -13,6 +13,8 @@ from contactopt.accuracy.displaced_stress import halved
 from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.accuracy.loop import refine
+from contactopt.accuracy.nearest_tractions import Answer, BalancedMoments
+from contactopt.accuracy.vertex_balance import Balance
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
@@ -107,6 +109,48 @@ def fine(scene, times=2):
     return solve_scene(replace(scene, degree=2))
 
 
+def clamped(mesh):
+    """Displacements of a body that is held all around, under nodal forces."""
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP1()))
+    K = linear_elasticity(*lame_parameters(MATERIAL.E, MATERIAL.nu)).assemble(basis)
+    inner = np.setdiff1d(np.arange(basis.N), basis.get_dofs().flatten())
+
+    def moved(forces):
+        U, table = np.zeros(basis.N), basis.nodal_dofs
+        own = np.zeros(basis.N)
+        own[table] = forces
+        U[inner] = np.linalg.solve(K[inner][:, inner].toarray(), own[inner])
+        return U[table]
+
+    return moved
+
+
+def test_tractions_in_space_become_those_of_elements_in_balance():
+    """Of random ones, whose map has the transpose that it says, and is the identity afterwards."""
+    random = np.random.default_rng(3)
+    cube = skfem.MeshTet.init_tensor(*[np.linspace(0, 1, 4)] * 3)
+    inner = np.all((cube.p > 1e-9) & (cube.p < 1 - 1e-9), axis=0)
+    p = cube.p + 0.05 * inner * random.standard_normal(cube.p.shape)
+    cells = Simplices(skfem.MeshTet(p, cube.t))
+    known = np.zeros((cube.facets.shape[1], 3), dtype=bool)
+    balance = Balance(cells.forces_of_moments, known)
+    space = BalancedMoments(cells, MATERIAL, balance, Answer(1, clamped(cells.mesh)))
+    m, other = random.standard_normal((2, 3 * len(known), 3))
+    made = space.of(m)
+    forces, torques = on_elements(cells, made)
+    assert np.abs(forces).max() < 1e-12 and np.abs(torques).max() < 1e-12
+    assert np.abs(on_elements(cells, m)[0]).max() > 1.0
+    assert np.allclose(space.of(made), made, atol=1e-12)
+    assert np.isclose(np.sum(other * made), np.sum(space.transposed(other) * m))
+
+
+def on_elements(cells, m):
+    """Forces and torques (e, 3) on elements by moments of the tractions of their facets."""
+    own = cells.seen(m.reshape(-1, 3, 3))  # (4, 3, e, 3)
+    x = np.moveaxis(cells.mesh.p[:, cells.mesh.t[cells.others]], 0, -1)
+    return own.sum(axis=(0, 1)), np.cross(x, own).sum(axis=(0, 1))
+
+
 @pytest.mark.parametrize("mesh", [skfem.MeshTri().refined(2), skfem.MeshTet().refined(1)])
 def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
     """With random facets, loads and a stress that balances them exactly, s* = s."""
@@ -121,7 +165,8 @@ def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
     held = np.zeros((mesh.facets.shape[1], d), dtype=bool)
     held[cells.mesh.f2t[1] < 0] = True
     load, none = -np.einsum("ijj->i", slopes), np.zeros((*held.shape, d))
-    made, unbalanced = cells.equilibrated(MATERIAL, stress, load, held, none)
+    answer = Answer(1, clamped(cells.mesh)) if d == 3 else None
+    made, unbalanced = cells.equilibrated(MATERIAL, stress, load, held, none, answer)
     assert np.allclose(made, cells.data_of(stress), atol=1e-12) and unbalanced < 1e-12
     data = cells.data_of(stress)
     E, nu = MATERIAL.E, MATERIAL.nu

@@ -25,8 +25,19 @@ factors that are there, and s* is made from that displacement. In bodies of revo
 quadrilaterals, s* comes from contactopt.accuracy.equilibrium_elements. In the former it is the
 pressure times the radius that is linear between the contacts. Plates and free motions stay in
 balance: the pressures are scaled by what is missing, which also makes the bound hold for a solver
-that stopped early. v is the solution, plus quadratic bubbles on the contact surface where it
-penetrates between contacts. The bound of the solution is that of v plus the norm of what was added.
+that stopped early.
+
+The solution u_h may penetrate between contacts. Let v = u_h + w be allowed, where w is made of
+quadratic bubbles on the contact surface. With u_h in place of v the left side of (*) has the term
+2 int p gap(u_h), which may be negative. But gap(v) >= 0, and by the equilibrium of both stresses
+
+    int p gap(u_h)  >=  -int p w_n  =  -int p* w_n - int (s(u) - s*) : C^-1 : s(w),
+
+whose last term is at most |s(u) - s*| |w|. Since 2 |s(u) - s*| |w| - |s(u) - s*|^2 <= |w|^2,
+
+    |u - u_h|^2  <=  |s* - s(u_h)|^2 + |w|^2 + 2 int p* gap(v) + the term of friction of u_h,
+
+to which that of w is added, which moves along a surface only where two surfaces meet in an edge.
 
 A quantity J, linear in contact forces and plates' motions, has an adjoint: displacements z, and a
 stress s_z in equilibrium with a unit of what J measures and with a pressure tau at the contact.
@@ -44,8 +55,9 @@ nothing. The energy is such a quantity with a(v, u - v) in its place, up to |u -
 Coulomb's law is treated as Tresca's with g = mu p*. What follows is that the error of p* changes g:
 the left side of (*) loses 2 int mu (p* - p) (|[u_t]| - |[v_t]|). If this is at most
 kappa (|u - v|^2 + |s(u) - s*|^2) with kappa < 1, small friction, the bound grows by
-1 / (1 - kappa)^1/2. On a mesh kappa is at most 2 mu / mu', where mu' is the friction coefficient
-below which `contactopt diagnose` says that the solution is unique.
+1 / (1 - kappa)^1/2, and its part |w| by 1 / (1 - kappa). On a mesh kappa is at most 2 mu / mu',
+where mu' is the friction coefficient below which `contactopt diagnose` says that the solution is
+unique.
 
 The bound is of the problem whose boundary is that of the mesh. It does not cover straight edges in
 place of a curve. Integrals over contact facets are taken over SPLIT parts of each; there
@@ -90,10 +102,10 @@ Data = list[Any]  # for every body what determines a composite stress; None for 
 class Bound:
     """A guaranteed bound of a solution; all norms are of energy [(force length)^1/2].
 
-    mesh      |s* - s(v)|, of which `joint` is what a mortar coupling adds
+    mesh      |s* - s(u_h)|, of which `joint` is what a mortar coupling adds
     contact   root of twice the work of p* in the gap;   friction  and of that of friction
     solver    root of what these works are at the contacts alone, which a solver could make zero
-    moved     |v - u_h|;   norm  |u_h|
+    moved     |w|, of what keeps the surfaces apart;   norm  |u_h|
     Raises InputError, one sentence, for a scene or a mesh for which there is no bound.
     """
 
@@ -106,22 +118,26 @@ class Bound:
         self.balanced = self._balanced(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
         self.joint = uneven_traction(scene)
-        self.mesh = self.size(self.missing) + self.joint
         added = [new - old for new, old in zip(self.displacement, before)]
-        self.moved = self.size(self._strained(added))
+        stretched = self._strained(added)
+        self.moved = self.size(stretched)
+        # s* - s(u_h), of the displacement that was solved for
+        self.mesh = self.size(_sum(self.missing, stretched)) + self.joint
         energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]
         self.norm = float(np.sqrt(2 * sum(energies)))
-        works = scene.works(self.displacement)
-        self.contact, self.friction = (float(np.sqrt(2 * max(work, 0.0))) for work in works)
+        gaps = scene.work(scene.tractions[:, 0], self.displacement)
+        slips = scene.slip_work(before) + scene.slip_work(added)
+        self.contact, self.friction = (float(np.sqrt(2 * max(w, 0.0))) for w in (gaps, slips))
         u, r = scene.reduction.seen(displaced), scene.forces(scene.tractions)
-        slips = scene.problem.law.bound(r[:, 0]) * np.linalg.norm(u[:, 1:], axis=1)
-        left = r[:, 0] * np.maximum(u[:, 0], 0.0) + slips + np.sum(r[:, 1:] * u[:, 1:], axis=1)
+        left = scene.problem.law.bound(r[:, 0]) * np.linalg.norm(u[:, 1:], axis=1)
+        left = left + r[:, 0] * np.maximum(u[:, 0], 0.0) + np.sum(r[:, 1:] * u[:, 1:], axis=1)
         self.solver = float(np.sqrt(2 * np.maximum(left, 0.0).sum()))
 
     @property
     def error(self) -> float:
         """The bound of |u - u_h|."""
-        return float(np.sqrt(self.mesh**2 + self.contact**2 + self.friction**2) + self.moved)
+        parts = self.mesh, self.contact, self.friction, self.moved
+        return float(np.linalg.norm(parts))
 
     @property
     def terms(self) -> dict[str, float]:
@@ -179,7 +195,8 @@ class Bound:
                 )
             stress = cells.stress(body.body.material, cells.quadratic(U[body.body.unknowns]))
             given = scene.boundary(i, tractions, forces is None)
-            made, unbalanced = cells.equilibrated(body.body.material, stress, *given)
+            answer = (scene.answer(i),) if scene.problem.dim == 3 else ()
+            made, unbalanced = cells.equilibrated(body.body.material, stress, *given, *answer)
             if unbalanced > UNBALANCED:
                 raise InputError(
                     f"body '{body.name}' is {unbalanced:.0e} out of balance, too much for a bound:"
@@ -201,8 +218,8 @@ class Bound:
         """
         scene, problem = self.scene, self.scene.problem
         kind = quantity.name.partition(":")[0]
-        if missing := without_interval(scene.reduction, quantity):
-            raise InputError(missing)
+        if reason := without_interval(scene.reduction, quantity):
+            raise InputError(reason)
         state = State(scene.reduction, scene.solution)
         seeds = quantity.slopes(state)
         duals = duals_of(state, seeds)
@@ -212,10 +229,11 @@ class Bound:
         if seeds.reactions is not None and not seeds.bodies:
             omega += seeds.reactions[:, 0]
         value = seeds.value - float(omega @ scene.solution.reactions[:, 0])
-        squares, unknown = self.mesh**2 + self.contact**2 + self.friction**2, 0.0
+        missing, unknown = self.size(self.missing), 0.0
+        squares = missing**2 + self.contact**2
         if kind == ENERGY:
             unknown, value = squares / 4, self.size(self.strained) ** 2 / 2 + squares / 4
-        rho = float(np.sqrt(squares / 2 - self.mesh**2 / 4))
+        rho = float(np.sqrt(squares / 2 - missing**2 / 4))
         limit, found = HUGE, []
         for _ in range(TRIED):
             stress, z, tau, c = self._adjoint(omega, duals, motions, limit)
@@ -303,3 +321,7 @@ def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
 
 def _minus(one: Data, other: Data) -> Data:
     return [None if a is None else a - b for a, b in zip(one, other)]
+
+
+def _sum(one: Data, other: Data) -> Data:
+    return [None if a is None else a + b for a, b in zip(one, other)]

@@ -26,8 +26,9 @@ steps.
    the data y of an element, its tractions and body force.
 3. A stress nearer to s(u). In the plane all stresses without loads derive from functions of Airy.
    Of these the one is added that makes the energy of s* - s(u) least, a sparse linear system. Long
-   thin elements, on which tractions bend, would be far from s(u) without it. In space a few steps
-   of conjugate gradients make that energy less with tractions that leave every vertex in balance.
+   thin elements, on which tractions bend, would be far from s(u) without it. In space conjugate
+   gradients make that energy less (contactopt.accuracy.nearest_tractions), from a stress that is
+   averaged at the vertices and brought into balance by one solve.
 
 Sources: Ladeveze, Leguillon (1983), Error estimate procedure in the finite element method and
 applications, SIAM J. Numer. Anal. 20, for the tractions; Johnson, Mercier (1978), Some equilibrium
@@ -37,7 +38,6 @@ Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -52,6 +52,7 @@ from contactopt.accuracy.composite_element import (
     reference_energy,
     reference_stress,
 )
+from contactopt.accuracy.nearest_tractions import Answer, BalancedMoments, Energy
 from contactopt.accuracy.vertex_balance import Balance
 from contactopt.material import Material, lame
 
@@ -179,14 +180,15 @@ class Simplices:
 
     @cached_property
     def by_moments(self) -> sp.bsr_array:
-        """(e inputs, facets dim dim) the data by the moments of facets."""
+        """(e inputs, facets dim dim) the data by the moments of facets, without the body force."""
         d, count = self.dim, len(self.volume)
-        n = (d + 1) * d  # vertices of facets; the last rows of an element are its body force's
+        n = (d + 1) * d  # vertices of facets
         column = (self.opposite[:, None] * d + self.slots).reshape(n, count).T
         value = np.repeat(self.sign.T, d, axis=1)[..., None, None] * self.back[:, None]
-        rows = np.append(0, np.cumsum(np.tile([*n * [1], 0], count)))
-        shape = (count * (n + 1) * d, self.mesh.facets.shape[1] * d * d)
-        return sp.bsr_array((value.reshape(-1, d, d), column.ravel(), rows), shape)
+        shape = (count * n * d, self.mesh.facets.shape[1] * d * d)
+        return sp.bsr_array(
+            (value.reshape(-1, d, d), column.ravel(), np.arange(count * n + 1)), shape
+        )
 
     def data_of(self, stress: np.ndarray) -> np.ndarray:
         """The same for a stress (e, dim + 1, dim, dim) that is linear on each element."""
@@ -255,6 +257,7 @@ class Simplices:
         force: np.ndarray,
         held: np.ndarray,
         moments: np.ndarray,
+        answer: Answer | None = None,
     ) -> tuple[np.ndarray, float]:
         """The data (e, inputs) of the stress s* of the head of this module.
 
@@ -266,6 +269,7 @@ class Simplices:
         held : (facets, dim) components in which a boundary facet is held, its traction unknown.
         moments : (facets, dim, dim) of the other boundary facets: vertex by vertex those of the
             traction with the hat functions [force per thickness].
+        answer : How the body answers forces; None in the plane.
 
         Returns
         -------
@@ -273,19 +277,28 @@ class Simplices:
         over that of an element.
         """
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
-        balance = Balance(self._at_vertices, known)
-        m, unbalanced = self._tractions(
-            stress, force, np.where(known[:, None], moments, np.nan), balance
-        )
+        balance = Balance(self.forces_of_moments, known)
+        near, mean = stress, stress.mean(axis=1)
+        if answer is not None:
+            space = BalancedMoments(self, material, balance, answer)
+            near, mean = space.smooth(stress)
+        given = np.where(known[:, None], moments, np.nan)
+        m, unbalanced = self._tractions(near, mean, force, given, balance)
         missing = self.data(self.seen(m), force) - self.data_of(stress)
-        if self.dim == 2:
+        if answer is None:
             m += least_by_airy(self, material, missing, known)
         else:
-            m += balance.least(*self._energy(material, missing)).reshape(m.shape)
+            m += space.nearest(self._energy(material, missing)).reshape(m.shape)
         return self.data(self.seen(m), force), unbalanced
 
     @cached_property
-    def _at_vertices(self) -> sp.csc_matrix:
+    def arms(self) -> np.ndarray:
+        """(e, dim, dim + 1) from the centroid to the vertices."""
+        x = self.mesh.p[:, self.mesh.t]
+        return np.ascontiguousarray(np.moveaxis(x - x.mean(axis=1, keepdims=True), 2, 0))
+
+    @cached_property
+    def forces_of_moments(self) -> sp.csc_matrix:
         """(e (dim + 1), facets dim) from the moments of one component of tractions to the forces at
         the vertices of the elements.
         """
@@ -303,28 +316,50 @@ class Simplices:
         """Moments (facets, dim, dim) as the elements see them."""
         return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
 
-    def _energy(
-        self, material: Material, missing: np.ndarray
-    ) -> tuple[Callable[[np.ndarray], np.ndarray], np.ndarray]:
-        """Products with the second derivative of the energy by the moments of facets, and the first
-        derivative at `missing`.
+    def _energy(self, material: Material, missing: np.ndarray) -> Energy:
+        """Of the stress with the data `missing` by the moments of facets. Single precision does for
+        it, since it says how far the energy can fall but not whether the stress is in balance.
         """
-        metrics = [(own, self.metric(material, own)) for own in self.blocks]
+        d, count, stress = self.dim, self.mesh.facets.shape[1], reference_stress(self.dim)
+        inputs, back = (d + 1) * d * d, self.by_moments.T.tobsr((d, d))  # without the body force
+        form = WEIGHT[d] * self._form(material, slice(None))
+        size = float(np.abs(form).max()) or 1.0
+        single = (form / size).astype(np.float32)
+        values = stress.reshape(-1, stress.shape[2]).astype(np.float32)
 
-        def forces(data: np.ndarray) -> np.ndarray:
-            turned = [H @ data[own, :, None] for own, H in metrics]
-            return np.asarray(self.by_moments.T @ np.concatenate(turned).ravel())
+        def forces(y: np.ndarray) -> np.ndarray:
+            turned = []
+            for own in self.blocks:
+                s = (y[own].astype(np.float32) @ values[:, : y.shape[1]].T).reshape(
+                    -1, *stress.shape[:2]
+                )
+                turned.append((s @ single[own]).reshape(len(s), -1) @ values[:, :inputs])
+            return size * np.asarray(back @ np.concatenate(turned).ravel()).reshape(-1, d)
 
         def product(m: np.ndarray) -> np.ndarray:
-            return forces((self.by_moments @ m).reshape(missing.shape))
+            return forces((self.by_moments @ m.ravel()).reshape(-1, inputs))
 
-        return product, forces(missing)
+        own = stress[:, :, :inputs].reshape(*stress.shape[:2], -1, d)
+        blocks = np.einsum("vani,vbnj->abnij", own, own, optimize=True)
+        H = (form.reshape(len(form), -1) @ blocks.reshape(form[0].size, -1)).reshape(-1, d, d)
+        B = np.repeat(self.back, inputs // d, axis=0)
+        share = np.sum(B * (H @ B), axis=1).reshape(-1, d + 1, d, d)
+        diagonal = np.zeros((count, d, d))
+        np.add.at(diagonal, (self.opposite[:, None], self.slots), np.moveaxis(share, 0, 2))
+        twice = float(self.products(material, missing, missing).sum())
+        return Energy(product, diagonal.reshape(-1, d), forces(missing), twice)
 
     def _tractions(
-        self, stress: np.ndarray, force: np.ndarray, given: np.ndarray, balance: Balance
+        self,
+        stress: np.ndarray,
+        mean: np.ndarray,
+        force: np.ndarray,
+        given: np.ndarray,
+        balance: Balance,
     ) -> tuple[np.ndarray, float]:
-        """Moments (facets, dim, dim) of tractions that hold all elements in balance, and by how
-        much they do not; nan where they are not given.
+        """Moments (facets, dim, dim) of tractions near those of a stress that hold all elements in
+        balance, with these `mean` stresses (e, dim, dim), and by how much they do not. Those that
+        are not `given` are nan there.
         """
         d, mesh = self.dim, self.mesh
         m = np.zeros(given.shape)
@@ -333,8 +368,8 @@ class Simplices:
             for slot, moment in zip(self.slots[o], own):
                 np.add.at(m, (self.opposite[o], slot), share[:, None] * moment)
         m = np.where(np.isnan(given), m, given)
-        needed = np.einsum("eij,eaj->eai", stress.mean(axis=1), self.slopes) - force / (d + 1)
-        needed = (needed * self.volume[:, None, None]).reshape(-1, d)
+        needed = self.volume[:, None, None] * (self.slopes @ mean - force / (d + 1))
+        needed = needed.reshape(-1, d)
         left = needed - balance.matrix @ m.reshape(-1, d)
         change = balance.made(left)
         left = left - balance.matrix @ change

@@ -20,6 +20,7 @@ from contactopt.accuracy.facing_facets import (
     measures,
     quadratic_shapes,
 )
+from contactopt.accuracy.nearest_tractions import Answer
 from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.rigid import RigidBody
 from contactopt.errors import InputError
@@ -166,6 +167,18 @@ class PressedScene:
         value, row, column = (np.concatenate(parts) for parts in zip(*entries))
         return sp.csr_matrix((value, (row, column)), shape)
 
+    def answer(self, number: int) -> Answer:
+        """How a body answers nodal forces."""
+        body = self.bodies[number]
+
+        def moved(forces: np.ndarray) -> np.ndarray:
+            own = np.zeros(len(body.at_rest))
+            own[body.body.unknowns] = self.factor * forces
+            U = body.displacement(own, np.zeros(len(body.resultants))) - body.at_rest
+            return np.asarray(U[body.body.unknowns])
+
+        return Answer(body.body.degree, moved)
+
     def balanced(self, t: np.ndarray, resultants: np.ndarray) -> np.ndarray:
         """Tractions (k, dim) that balance resultants (p,) in the free motions, each scaled by what
         it does there.
@@ -205,15 +218,15 @@ class PressedScene:
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out
 
-    def works(self, nodal: Sequence[np.ndarray]) -> tuple[float, float]:
-        """The works int p* gap and int (g |slip| + t* slip) over all contact surfaces."""
-        slips = 0.0
+    def slip_work(self, nodal: Sequence[np.ndarray]) -> float:
+        """The work int (g |slip| + t* slip) over all contact surfaces."""
+        total = 0.0
         for pair in self.pairs:
             u = pair.jump(nodal, pair.rule)[1:]
             t = np.stack([pair.at_points(own, pair.rule) for own in self.tractions.T[1:]])
             slip = pair.at_points(self.limit, pair.rule) * np.linalg.norm(u, axis=0)
-            slips += self.factor * float(np.sum(pair.rule.weights * (slip + np.sum(t * u, axis=0))))
-        return self.work(self.tractions[:, 0], nodal), slips
+            total += self.factor * float(np.sum(pair.rule.weights * (slip + np.sum(t * u, axis=0))))
+        return total
 
     def work(
         self, pressure: np.ndarray, nodal: Sequence[np.ndarray], change: bool = False

@@ -9,8 +9,6 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-STEPS = 8  # of conjugate gradients: more make a stress in space no nearer
-
 
 class Balance:
     """The equations of the balance of elements at their vertices.
@@ -38,26 +36,12 @@ class Balance:
             out[chosen, c] = own.T @ solve(forces[:, c])
         return out
 
-    def least(self, product: Callable[[np.ndarray], np.ndarray], slope: np.ndarray) -> np.ndarray:
-        """Moments m (facets dim dim,) that make no force, with m' K m / 2 + slope' m almost least,
-        from products with K: a few steps of conjugate gradients.
-        """
-
-        def kept(m: np.ndarray) -> np.ndarray:
-            own = np.where(self.open, m.reshape(self.open.shape), 0.0)
-            return np.asarray(own - self.made(self.matrix @ own)).ravel()
-
-        m, left = np.zeros(len(slope)), kept(-slope)
-        way, size = left, float(left @ left)
-        for _ in range(STEPS):
-            if size == 0:
-                break
-            turned = kept(product(way))
-            step = size / float(way @ turned)
-            m, left = m + step * way, left - step * turned
-            before, size = size, float(left @ left)
-            way = left + size / before * way
-        return m
+    def transposed(self, moments: np.ndarray) -> np.ndarray:
+        """The transpose of made(), (rows, dim) of (facets dim, dim)."""
+        out = np.empty((self.matrix.shape[0], moments.shape[1]))
+        for c, (chosen, own, solve) in enumerate(self.parts):
+            out[:, c] = solve(own @ moments[chosen, c])
+        return out
 
 
 def _inverse(balance: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
