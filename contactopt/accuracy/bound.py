@@ -195,8 +195,8 @@ class Bound:
                 )
             stress = cells.stress(body.body.material, cells.quadratic(U[body.body.unknowns]))
             given = scene.boundary(i, tractions, forces is None)
-            answer = (scene.answer(i),) if scene.problem.dim == 3 else ()
-            made, unbalanced = cells.equilibrated(body.body.material, stress, *given, *answer)
+            answer = scene.answer(i) if scene.problem.dim == 3 else None
+            made, unbalanced = cells.equilibrated(body.body.material, stress, *given, answer)
             if unbalanced > UNBALANCED:
                 raise InputError(
                     f"body '{body.name}' is {unbalanced:.0e} out of balance, too much for a bound:"

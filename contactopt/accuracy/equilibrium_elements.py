@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -123,6 +123,7 @@ class EquilibriumElements(Simplices):
         force: np.ndarray,
         held: np.ndarray,
         moments: np.ndarray,
+        answer: Any = None,
     ) -> tuple[np.ndarray, float]:
         """The stress of the head of this module that is nearest to `stress`.
 
@@ -131,6 +132,7 @@ class EquilibriumElements(Simplices):
         material, stress, force, held : As for Simplices.equilibrated().
         moments : (facets, 2, 2) of the tractions on the other boundary facets, vertex by vertex,
             with the hat functions of the edge; of r times them in bodies of revolution.
+        answer : Not needed in the plane.
 
         Returns
         -------
