@@ -343,8 +343,8 @@ def test_the_interval_of_a_quantity_holds_the_fine_value(make, degree, plate, na
     scene = make(degree, plate=plate)
     solved, best = solve_scene(scene), fine(scene)
     for quantity in (find_quantity(name, scene), find_quantity("energy", scene)):
-        middle, width = Bound(solved).of(quantity)
-        close, narrow = Bound(best).of(quantity)
+        middle, width = interval(Bound(solved), quantity)
+        close, narrow = interval(Bound(best), quantity)
         value = quantity.read(best.reduction, best.solution).value
         assert abs(middle - value) <= width and abs(close - value) <= narrow < width / 2
         assert abs(middle - close) <= width + narrow

@@ -39,18 +39,7 @@ whose last term is at most |s(u) - s*| |w|. Since 2 |s(u) - s*| |w| - |s(u) - s*
 
 to which that of w is added, which moves along a surface only where two surfaces meet in an edge.
 
-A quantity J, linear in contact forces and plates' motions, has an adjoint: displacements z, and a
-stress s_z in equilibrium with a unit of what J measures and with a pressure tau at the contact.
-Without friction, with weights omega of the pressure in J, s' = (s* + s(v)) / 2 and d = s* - s(v),
-
-    J(u) = J(v) + int omega p* + int (s_z + s(z)) : C^-1 : d / 2 - int p* z_n + int tau gap(v)
-           + int (s_z - s(z)) : C^-1 : (s(u) - s') + int p (omega + z_n) - int tau gap(u),
-
-whose first line is known. On the solution's own contact zone omega + z_n = 0, outside tau = 0; that
-the exact zone is another one is met by keeping |tau| <= c p* and |omega + z_n| <= c gap(v). Then
-by (*) the second line is at most |s_z - s(z)| x + c (rho^2 - x^2) with some x between 0 and rho,
-where rho^2 = |d|^2 / 4 + int p* gap(v). With c <= |s_z - s(z)| / (2 rho) another zone costs
-nothing. The energy is such a quantity with a(v, u - v) in its place, up to |u - v|^2 / 2.
+contactopt.accuracy.interval makes intervals of quantities from the same terms.
 
 Coulomb's law is treated as Tresca's with g = mu p*. What follows is that the error of p* changes g:
 the left side of (*) loses 2 int mu (p* - p) (|[u_t]| - |[v_t]|). If this is at most
@@ -71,31 +60,22 @@ for contact problems, Math. Comp. 78.
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 from skfem.refdom import RefQuad
 
 from contactopt.accuracy.estimate import Guarantee
-from contactopt.accuracy.facing_facets import facet_nodes
+from contactopt.accuracy.interval import interval, without_interval
 from contactopt.accuracy.pressed_scene import PressedScene
 from contactopt.accuracy.uneven_traction import uneven_traction
-from contactopt.coupling.reduction import Reduction
-from contactopt.derivatives.states import Duals, duals_of
 from contactopt.errors import InputError
 from contactopt.readings.quantities import Quantity
-from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
 
 UNBALANCED = 1e-6  # of the force of an element: so much a vertex may be out of balance
-ALL = 1e-9  # by how much shares that add up to one may miss it
-TINY, HUGE = 1e-200, 1e200
 MOST = {2: 150_000, 3: 25_000}  # elements of a search with a bound, some 1 GB of memory
 DEAR = 4  # times what a triangle in plane strain costs: elements of rings, and quadrilaterals
-TRIED = 3  # adjoints of a quantity, each with what the one before tells
-ENERGY = "energy"
-LINEAR = "approach", "shift", "normal_force", "resultant"
 Data = list[Any]  # for every body what determines a composite stress; None for a rigid one
 
 
@@ -114,12 +94,12 @@ class Bound:
         displaced = scene.reduction.displaced(scene.solution)
         before = scene.nodal(displaced)
         self.displacement = scene.admissible(before)
-        self.strained = self._strained(self.displacement)
-        self.balanced = self._balanced(scene.tractions, scene.solution.multipliers)
+        self.strained = self.strains(self.displacement)
+        self.balanced = self.balanced_with(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
         self.joint = uneven_traction(scene)
         added = [new - old for new, old in zip(self.displacement, before)]
-        stretched = self._strained(added)
+        stretched = self.strains(added)
         self.moved = self.size(stretched)
         # s* - s(u_h), of the displacement that was solved for
         self.mesh = self.size(_sum(self.missing, stretched)) + self.joint
@@ -164,7 +144,7 @@ class Bound:
             )
         return out
 
-    def _strained(self, nodal: list[np.ndarray]) -> Data:
+    def strains(self, nodal: list[np.ndarray]) -> Data:
         """The stresses of displacements."""
         scene = self.scene
         return [
@@ -172,7 +152,7 @@ class Bound:
             for body, cells, own in zip(scene.bodies, scene.cells, nodal)
         ]
 
-    def _balanced(
+    def balanced_with(
         self, tractions: np.ndarray, multipliers: np.ndarray, forces: tuple[Any, ...] | None = None
     ) -> Data:
         """Stresses in equilibrium with contact tractions and the loads of the scene; of an adjoint
@@ -205,95 +185,6 @@ class Bound:
             out.append(made + self.strained[i] if forces else made)
         return out
 
-    def of(self, quantity: Quantity) -> tuple[float, float]:
-        """The exact value of a quantity lies within an interval: its middle and half its width.
-
-        Parameters
-        ----------
-        quantity : One of LINEAR or the energy, in a scene without friction.
-
-        Returns
-        -------
-        Both in the unit of the quantity. InputError, one sentence, for another quantity.
-        """
-        scene, problem = self.scene, self.scene.problem
-        kind = quantity.name.partition(":")[0]
-        if reason := without_interval(scene.reduction, quantity):
-            raise InputError(reason)
-        state = State(scene.reduction, scene.solution)
-        seeds = quantity.slopes(state)
-        duals = duals_of(state, seeds)
-        omega, motions = np.zeros(len(problem.q)), np.zeros(len(problem.s))
-        if seeds.multipliers is not None:
-            motions += seeds.multipliers
-        if seeds.reactions is not None and not seeds.bodies:
-            omega += seeds.reactions[:, 0]
-        value = seeds.value - float(omega @ scene.solution.reactions[:, 0])
-        missing, unknown = self.size(self.missing), 0.0
-        squares = missing**2 + self.contact**2
-        if kind == ENERGY:
-            unknown, value = squares / 4, self.size(self.strained) ** 2 / 2 + squares / 4
-        rho = float(np.sqrt(squares / 2 - missing**2 / 4))
-        limit, found = HUGE, []
-        for _ in range(TRIED):
-            stress, z, tau, c = self._adjoint(omega, duals, motions, limit)
-            strained = self._strained(z)
-            gap = self.size(_minus(stress, strained))
-            both = zip(self.products(stress, self.missing), self.products(strained, self.missing))
-            middle = value + sum(one.sum() + other.sum() for one, other in both) / 2
-            middle += scene.work(tau, self.displacement)
-            middle -= scene.work(scene.tractions[:, 0], z, change=True)
-            x = min(rho, gap / (2 * c)) if c > 0 else rho
-            found.append((gap * x + c * (rho**2 - x**2) + unknown, float(middle)))
-            limit = gap / (2 * rho) if rho > 0 else HUGE
-        width, middle = min(found)
-        return middle, width
-
-    def _adjoint(
-        self, omega: np.ndarray, duals: Duals, motions: np.ndarray, limit: float
-    ) -> tuple[Data, list[np.ndarray], np.ndarray, float]:
-        """The adjoint's stress, displacements z and pressure tau (k,), with the c of the head of
-        this module. Both are cut off where c would be more than `limit`.
-        """
-        scene, d = self.scene, self.scene.problem.dim
-        nodes, p = facet_nodes(d), scene.tractions[:, 0]
-        t = scene.share[:, None] * duals.dual.q
-        t[:, 0] = np.clip(t[:, 0], -limit * p, limit * p)
-        t = scene.balanced(t, motions)
-        c = float(np.max(np.abs(t[p > 0, 0]) / p[p > 0], initial=0.0))
-        z = [own.copy() for own in scene.nodal(duals.fields)]
-        for pair in scene.pairs:
-            pressed = (pair.of_contacts(scene.pressed) > 0).T  # (f, v)
-            gap = np.maximum(pair.jump(self.displacement, pair.nodes)[0], 0.0)
-            value = pair.jump(z, pair.nodes, True)[0] + pair.at_points(omega, pair.nodes)
-            most = np.where(pressed @ nodes > 1 - ALL, 0.0, limit * gap)
-            wanted = np.clip(value, -most, most)
-            for node, ends in enumerate(combinations(range(d), 2), d):
-                for end, other in (ends, ends[::-1]):  # next to the pressure in proportion
-                    share = gap[:, node] / np.maximum(gap[:, end], TINY)
-                    beside = pressed[:, other] & ~pressed[:, end]
-                    wanted[beside, node] = (share * wanted[:, end])[beside]
-            pair.lift(z, wanted - value)
-            away = ~pressed.all(axis=1)
-            value = (pair.jump(z, pair.rule, True)[0] + pair.at_points(omega, pair.rule))[away]
-            gap = pair.jump(self.displacement, pair.rule)[0][away]
-            c = max(c, float(np.max(np.abs(value) / np.maximum(gap, TINY), initial=0.0)))
-        return self._balanced(t, duals.dual.s, duals.bodies), z, t[:, 0], c
-
-
-def without_interval(reduction: Reduction, quantity: Quantity) -> str:
-    """Why no interval holds the exact value of a quantity; empty if one may."""
-    kind, law = quantity.name.partition(":")[0], reduction.problem.law
-    if kind not in (*LINEAR, ENERGY):
-        return f"there is no bound of the {kind}, only of {', '.join(LINEAR)}, energy."
-    if np.any(law.rough):
-        small = "; it assumes small friction, which contactopt diagnose tests"
-        small = small if law.proportional else ""
-        return f"with friction there is no bound of the {kind}, only of the energy norm{small}."
-    if any(own.kind == "mortar" for own in reduction.couplings):
-        return f"with mortar there is no bound of the {kind}, only of the energy norm."
-    return ""
-
 
 def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
     """What is guaranteed of a quantity with this value, and of the displacement."""
@@ -313,7 +204,7 @@ def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
         return Guarantee(missing=str(error))
     terms = bound.terms if bound.norm > 0 else {}
     try:
-        middle, width = bound.of(quantity)
+        middle, width = interval(bound, quantity)
     except InputError as error:
         return Guarantee(energy=terms, missing=str(error))
     return Guarantee((abs(middle - value) + width) / (abs(value) or 1.0), terms)

@@ -157,13 +157,15 @@ class FacingFacets:
             out[0] += np.einsum("vS,vSs->Ss", own, points.at[0])
         return out
 
-    def lift(self, nodal: Sequence[np.ndarray], height: np.ndarray) -> None:
-        """Add to the gap (f, q) at the nodes of facets, at shared nodes the largest."""
+    def lift(self, nodal: Sequence[np.ndarray], height: np.ndarray, component: int = 0) -> None:
+        """Add to the gap, or to a component of the slip, (f, q) at the nodes of facets, at shared
+        nodes the largest.
+        """
         side = self.sides[0]
         added = np.full(nodal[side.body].shape[1], -np.inf)
         np.maximum.at(added, side.nodes, height.T)
         added[np.isinf(added)] = 0.0
-        nodal[side.body][:] += side.sign * self.frame[0][:, None] * added
+        nodal[side.body][:] += side.sign * self.frame[component][:, None] * added
 
     def moments(self, number: int, tractions: np.ndarray) -> np.ndarray:
         """(v, f, dim) of tractions (k, dim) on one of the sides with the hat functions. Next to an

@@ -229,14 +229,20 @@ class PressedScene:
         return total
 
     def work(
-        self, pressure: np.ndarray, nodal: Sequence[np.ndarray], change: bool = False
+        self,
+        traction: np.ndarray,
+        nodal: Sequence[np.ndarray],
+        component: int = 0,
+        change: bool = False,
     ) -> float:
-        """The work of a pressure (k,) in the gap, or in what displacements change of it."""
+        """The work of a component of tractions, (k,), in the gap or the slip, or in what
+        displacements change of them.
+        """
         total = 0.0
         for pair in self.pairs:
-            own = pair.at_points(pressure, pair.rule) * pair.jump(nodal, pair.rule, change)[0]
-            total += self.factor * float(np.sum(pair.rule.weights * own))
-        return total
+            jump = pair.jump(nodal, pair.rule, change)[component]
+            total += float(np.sum(pair.rule.weights * pair.at_points(traction, pair.rule) * jump))
+        return self.factor * total
 
     def boundary(
         self, number: int, tractions: np.ndarray, loaded: bool = True

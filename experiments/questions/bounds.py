@@ -26,6 +26,7 @@ from contactopt.accuracy.bound import Bound
 from contactopt.accuracy.displaced_stress import bilinear, halved
 from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.equilibrium_elements import EquilibriumElements
+from contactopt.accuracy.interval import interval
 from contactopt.accuracy.loop import refine
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
@@ -270,7 +271,7 @@ def case(scene: Scene, exact: Callable[..., Any] | None = None) -> dict[str, Any
     row |= {"quantity": "", "its error": "", "its bound": "", "its ratio": ""}
     quantity = find_quantity("approach" if plate else "normal_force", scene)
     try:
-        middle, width = bound.of(quantity)
+        middle, width = interval(bound, quantity)
     except InputError:
         return row
     values = [quantity.read(own.reduction, own.solution).value for own in (solved, fine)]
