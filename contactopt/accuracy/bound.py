@@ -76,6 +76,7 @@ from contactopt.solving.solve_scene import Solved
 UNBALANCED = 1e-6  # of the force of an element: so much a vertex may be out of balance
 MOST = {2: 150_000, 3: 25_000}  # elements of a search with a bound, some 1 GB of memory
 DEAR = 4  # times what a triangle in plane strain costs: elements of rings, and quadrilaterals
+SMALL = "if friction is small, which contactopt diagnose tests"
 Data = list[Any]  # for every body what determines a composite stress; None for a rigid one
 
 
@@ -203,11 +204,14 @@ def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
     except InputError as error:
         return Guarantee(missing=str(error))
     terms = bound.terms if bound.norm > 0 else {}
+    law = solved.reduction.problem.law
+    assumed = SMALL if law.proportional and np.any(law.rough) else ""
     try:
         middle, width = interval(bound, quantity)
     except InputError as error:
-        return Guarantee(energy=terms, missing=str(error))
-    return Guarantee((abs(middle - value) + width) / (abs(value) or 1.0), terms)
+        return Guarantee(energy=terms, missing=str(error), assumed=assumed)
+    relative = (abs(middle - value) + width) / (abs(value) or 1.0)
+    return Guarantee(relative, terms, assumed=assumed)
 
 
 def _minus(one: Data, other: Data) -> Data:

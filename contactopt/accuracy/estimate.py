@@ -59,11 +59,13 @@ class Guarantee:
     energy   `error`, the bound of the error of the displacement in the energy norm over its norm
              [-], and its parts `mesh`, `contact`, `friction`, `moved` and `solver`; empty where
              there is none
+    assumed  under which condition both hold; empty if under none
     """
 
     bound: float | None = None
     energy: Mapping[str, float] = field(default_factory=dict)
     missing: str = ""
+    assumed: str = ""
 
     @property
     def sentence(self) -> str:
@@ -72,6 +74,8 @@ class Guarantee:
         energy = ""
         if self.energy:
             energy = f" Bound in the energy norm: {self.energy['error']:.1e} ({', '.join(parts)})."
+        if self.assumed and (energy or self.bound is not None):
+            energy += f" This holds {self.assumed}."
         if self.bound is None:
             return f"estimate, no bound: {self.missing}{energy}"
         return f"bound: the relative error is at most {self.bound:.1e}.{energy}"
