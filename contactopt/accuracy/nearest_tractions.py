@@ -40,7 +40,7 @@ import scipy.sparse as sp
 from contactopt.accuracy.vertex_balance import Balance
 from contactopt.material import Material, lame
 
-GAIN = 0.1  # of the energy: a step that makes it less by a smaller share is the last one
+GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is the last one
 STEPS = 30  # at most
 
 
