@@ -105,8 +105,11 @@ class Bound:
         self.strained = self._strained(self.displacement)
         self.balanced = self._balanced(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
-        self.joint = uneven_traction(scene)
-        self.mesh = self.size(self.missing) + self.joint
+        size, added = self.size(self.missing), np.concatenate(uneven_traction(scene))
+        self.joint = float(np.linalg.norm(added))
+        own = np.concatenate(self.products(self.missing, self.missing))
+        crossed = 2 * float(added @ np.sqrt(np.maximum(own, 0.0)))
+        self.mesh = float(np.sqrt(size**2 + crossed + self.joint**2))
         added = [new - old for new, old in zip(self.displacement, before)]
         self.moved = self.size(self._strained(added))
         energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]

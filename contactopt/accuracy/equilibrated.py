@@ -201,7 +201,7 @@ class Simplices:
             found.append((t + t.sum(axis=0)) / (self.dim * (self.dim + 1)))
         return np.array(found)
 
-    def _form(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
+    def form(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
         """(e, component, component) the energy of some elements by the integrals of the products of
         the components of their stresses on the reference element.
         """
@@ -230,7 +230,7 @@ class Simplices:
         parts = reference_energy(self.dim)
         i, j = np.triu_indices(len(parts))  # both factors are symmetric in their components
         twice = parts[i, j] + np.where(i < j, 1.0, 0.0)[:, None, None] * parts[j, i]
-        flat = self._form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
+        flat = self.form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
         return np.asarray(flat.reshape(-1, *parts.shape[2:]))
 
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -240,7 +240,7 @@ class Simplices:
         there = np.flatnonzero(np.any(one != 0, axis=1) & np.any(other != 0, axis=1))
         for own in np.split(there, range(BLOCK, len(there), BLOCK)):
             a, b = ((y[own] @ by_inputs).reshape(shape) for y in (one, other))
-            out[own] = np.sum(self._form(material, own) * (a.swapaxes(1, 2) @ b), axis=(1, 2))
+            out[own] = np.sum(self.form(material, own) * (a.swapaxes(1, 2) @ b), axis=(1, 2))
         return out * WEIGHT[self.dim]
 
     @property
