@@ -105,11 +105,11 @@ class Bound:
         self.strained = self._strained(self.displacement)
         self.balanced = self._balanced(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
-        size, added = self.size(self.missing), np.concatenate(uneven_traction(scene))
-        self.joint = float(np.linalg.norm(added))
-        own = np.concatenate(self.products(self.missing, self.missing))
-        crossed = 2 * float(added @ np.sqrt(np.maximum(own, 0.0)))
-        self.mesh = float(np.sqrt(size**2 + crossed + self.joint**2))
+        uneven = np.concatenate(uneven_traction(scene))
+        squares = np.concatenate(self.products(self.missing, self.missing))
+        self.joint = float(np.linalg.norm(uneven))
+        both = 2 * float(uneven @ np.sqrt(np.maximum(squares, 0.0)))  # in each element norms add
+        self.mesh = float(np.sqrt(self.size(self.missing) ** 2 + both + self.joint**2))
         added = [new - old for new, old in zip(self.displacement, before)]
         self.moved = self.size(self._strained(added))
         energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]

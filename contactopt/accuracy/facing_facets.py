@@ -98,8 +98,6 @@ class FacingFacets:
         own = self.sides[0].contacts
         self.contacts = np.where(own < 0, -1, own + first)
         self.points = [mesh.p[:, side.vertices] for mesh, side in zip(meshes, self.sides)]
-        across = in_plane(self.points, self.frame)
-        self.slopes = [measures(x) / measures(own) for x, own in zip(self.points, across)]
         (at, weights), nodes = facet_rule(scene.dim, SPLIT[scene.dim]), facet_nodes(scene.dim)
         if self.joined:
             self.rule, self.nodes, self.ends = joined_points(self.points, self.frame)
@@ -187,18 +185,16 @@ class FacingFacets:
         return out
 
 
-def joined_points(
-    points: Sequence[np.ndarray], frame: np.ndarray
-) -> tuple[Points, Points, Points]:
+def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Points, Points, Points]:
     """Points for integrals over the pieces, common to a facet of each, of two plane surfaces (dim,
     v, f) that face each other along frame[0]; the nodes of the first one's facets; and the corners
     of the pieces, which are intervals or triangles.
     """
-    d, flat = len(frame), in_plane(points, frame)
-    own, other = (x.T for x in flat)  # (f, v, dim - 1)
+    d = len(frame)
+    own, other = (np.einsum("ad,dvf->fva", frame[1:], x) for x in points)
     first, second = _meeting(own, other)
     corners, number = _common(own[first], other[second])
-    size, whole = measures(corners.T), measures(flat[0])
+    size, whole = _sizes(corners), _sizes(own)
     there = size > NEAR ** (d - 1) * whole[first[number]]
     corners, facets = corners[there], np.stack([first, second])[:, number[there]]
     area = size[there] * (measures(points[0]) / whole)[facets[0]]
@@ -218,12 +214,13 @@ def joined_points(
     shares = [_shares(own[every], x), _shares(other[found.ravel()], x)]
     faced = (best.reshape(-1, 1) >= -NEAR).astype(float)
     nodes = Points(np.stack([every, found.ravel()]), np.stack(shares), faced)
-    return pieces(*facet_rule(d, PARTS[d])), nodes, pieces(np.eye(d), np.ones(d))
+    return pieces(*facet_rule(d, PARTS[d])), nodes, pieces(facet_nodes(d), np.ones(d * (d + 1) // 2))
 
 
-def in_plane(points: Sequence[np.ndarray], frame: np.ndarray) -> list[np.ndarray]:
-    """Coordinates (dim - 1, v, f) of the vertices of facets across frame[0]."""
-    return [np.einsum("ad,dvf->avf", frame[1:], own) for own in points]
+def _sizes(corners: np.ndarray) -> np.ndarray:
+    """Lengths or areas (S,) of facets (S, v, dim - 1) in their plane."""
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.abs(np.linalg.det(edges)) / edges.shape[2])  # of one or two factorial
 
 
 def _meeting(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -235,7 +232,7 @@ def _meeting(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray
         axis = np.zeros((centre.shape[1] + 1, len(centre)))
         axis[-1] = up
         balls.append(Facets(np.vstack([centre.T, 0 * radius]), radius, axis, 0 * radius))
-    return facing_pairs(*balls, FACING)
+    return facing_pairs(balls[0], balls[1], FACING)
 
 
 def _common(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -197,10 +197,12 @@ class PressedScene:
             closed = (pair.of_contacts(self.pressed) > 0).T @ nodes > 1 - NEAR
             least = np.maximum(missing[:, :d], 0.0) @ nodes
             pair.lift(out, np.where(closed, missing, np.maximum(missing, least)))
-            bubble = quadratic_shapes(pair.rule.at[0])[d:].sum(axis=0)
             more = np.zeros(len(missing))
-            found = np.max(-pair.jump(out, pair.rule)[0] / bubble, axis=1)
-            np.maximum.at(more, pair.rule.facets[0], found)
+            for points in (pair.rule, pair.ends) if pair.joined else (pair.rule,):
+                bubble = quadratic_shapes(points.at[0])[d:].sum(axis=0)
+                gap = pair.jump(out, points)[0]
+                found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > NEAR)
+                np.maximum.at(more, points.facets[0], found.max(axis=1))
             more[~closed.all(axis=1)] *= CLEAR
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out

@@ -1,12 +1,38 @@
 """What an equilibrated stress lacks where a mortar coupling joins facets that do not match.
 
-The contact traction t is linear between the contacts of one side. On a facet of the other side it
-bends wherever a contact lies within it, and the stress of contactopt.accuracy.equilibrated bears
-only the linear traction with the same moments. The element there is cut into a fan of triangles
-whose outer edges lie between the bends. A stress of composite elements on the fan, with the rest of
-t on these edges and none on the others, makes up for it: it is in equilibrium, since the moments of
-the rest are zero. Of all such stresses that of least energy is taken; its norm adds to that of
-s* - s(v).
+The contact traction t is linear between the contacts of one side. On a facet F of the other side it
+bends wherever a contact lies within it, and ends where the surface of the first side does. The
+stress of contactopt.accuracy.equilibrated bears only the linear traction with the same moments. A
+stress s in the element T behind F makes up for it, with the rest d of t as traction on F and none
+on the other facets: it is in equilibrium, since the moments of d are zero. Its norm adds to that of
+s* - s(v) in T. Let T be the image x = B x^ + b of the regular simplex, whose edges have length one.
+Then
+
+    s = B s^ B' / |det B|,    s n |F| = B (s^ n^) |F^|,
+
+is in equilibrium with d if s^ is with d^ = B^-1 d |F| / |F^|. So one constant c serves all:
+
+    least int_T s : C^-1 : s  <=  L c int_F^ |d^|^2,    c = sup over d^ of the least int_T^ |s^|^2,
+
+where d^ has zero moments and int_F^ |d^|^2 = 1, and L is the largest ratio of s : C^-1 : s over T
+to |s^|^2 over T^. The integral is that of |t^|^2 less that of its linear part, so nothing is cut.
+
+The constant is proved as follows. Divide the edges of F^ into n parts, and so F^ into n^(dim - 1)
+facets. Let d' be linear on each, with the moments of d^ there. Composite stresses on a mesh of T^
+give an upper bound c_n for such d', by an eigenvalue. The rest d^ - d' has zero moments on each of
+the facets. Upon these stand regular simplices that lie in T^ side by side, and a simplex of size
+1 / n has the constant c / n. Since the norms of d' and d^ - d' add up in squares, c is at most
+c_n + c / n, and
+
+    c <= c_n / (1 - 1 / n).
+
+`python -m experiments.questions.bounds constants` computes CONSTANT so, and shows how near it is.
+It is finite, by the inequalities of Korn and of traces. The bound is close where the simplex is
+nearly regular and larger for others.
+
+In bodies of revolution r s takes the place of s, and r is zero on the axis. There the element is
+cut into a fan of triangles whose outer edges lie between the bends. Of all stresses of composite
+elements on the fan, with d on these edges and none on the others, that of least energy is taken.
 """
 
 from __future__ import annotations
@@ -22,75 +48,82 @@ from contactopt.accuracy.facing_facets import measures
 from contactopt.errors import InputError
 from contactopt.material import Material
 
+CONSTANT = {2: 0.93, 3: 1.73}  # c by the dimension, from 16 and from 8 parts of an edge
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
 UNBALANCED = 1e-6  # of the force on a piece
-# of the head of this module, and the vertices of the regular tetrahedron with edges of length one
-CONSTANT = 1.73
-REGULAR = np.array([[0.0, 1.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]]) / np.sqrt(2)
 
 
 def uneven_traction(scene: Any) -> list[np.ndarray]:
-    """For every body (e,) the energy norm of what is missing in its elements."""
-    d = scene.problem.dim
+    """For every body (e,) an upper bound of the energy norm of what is missing in its elements."""
     out = [np.zeros(0 if own is None else len(own.volume)) for own in scene.cells]
     for pair in (own for own in scene.pairs if own.joined):
         body, facets = pair.sides[1].body, pair.sides[1].facets
-        energy = (_in_plane if d == 2 else _in_space)(scene, pair)
+        energy = (_by_fans if scene.revolved else _by_constant)(scene, pair)
         elements = scene.cells[body].mesh.f2t[0, facets]
         np.add.at(out[body], elements, np.sqrt(scene.factor * energy))
     return out
 
 
-def _in_space(scene: Any, pair: Any) -> np.ndarray:
+def _by_constant(scene: Any, pair: Any) -> np.ndarray:
     """An upper bound of the least energy behind each facet (f,)."""
-    side, points = pair.sides[1], pair.rule
+    side, points, d = pair.sides[1], pair.rule, scene.problem.dim
     cells, material = scene.cells[side.body], scene.bodies[side.body].body.material
-    area, facets = measures(pair.points[1]), points.facets[1]
+    size, facets = measures(pair.points[1]), points.facets[1]
     t = pair.of_contacts(scene.tractions)[:, points.facets[0]] @ pair.frame  # (v, S, dim)
     t = np.einsum("vSs,vSd->Ssd", points.at[0], t)
-    turn = pair.slopes[0][points.facets[0]] / pair.slopes[1][facets]
-    square = np.zeros((len(area), 3, 3))
-    weights = points.weights * turn[:, None]
-    np.add.at(square, facets, np.einsum("Ss,Ssd,Sse->Sde", weights, t, t, optimize=True))
+    # d by the area of this side, which may be inclined to the other
+    there = size[facets] * np.abs(np.linalg.det(np.moveaxis(pair.ends.at[1, ..., :d], 1, 0)))
+    weights = points.weights * (points.weights.sum(axis=1) / there)[:, None]
+    square = np.zeros((len(size), d, d))
+    own = np.einsum("Ss,Ssd,Sse->Sde", weights, t, t, optimize=True)
+    np.add.at(square, facets, own)
     m = pair.moments(1, scene.tractions)
-    even = 12 / area[:, None] * (m - m.sum(axis=0) / 4)
+    even = d * (d + 1) / size[:, None] * (m - m.sum(axis=0) / (d + 1))
     square -= np.einsum("vfd,vfe->fde", even, m)
     elements = cells.mesh.f2t[0, side.facets]
-    return uneven_energy(cells, material, elements, area, square)
+    return least_energy(cells, material, elements, size, square)
 
 
-def uneven_energy(
-    cells: Any, material: Any, elements: np.ndarray, area: np.ndarray, square: np.ndarray
+def least_energy(
+    cells: Simplices, material: Material, elements: np.ndarray, size: np.ndarray, square: np.ndarray
 ) -> np.ndarray:
-    """An upper bound (f,) of the least energies of stresses in some tetrahedra (f,), without a
-    divergence and with tractions on one facet alone, whose moments are zero.
+    """An upper bound (f,) of the least energies of stresses in f elements, without divergence, with
+    tractions d on one facet whose moments are zero, and with none on the others.
 
     Parameters
     ----------
-    cells, material, elements : The elements of the body, what it is made of, and the tetrahedra.
-    area : (f,) of the facets.
-    square : (f, dim, dim) integrals over the facets of t t' for the tractions t.
+    cells, material, elements : The elements of a body, what it is made of, and f of the elements.
+    size : (f,) length or area of the facets.
+    square : (f, dim, dim) integrals of d d' over the facets.
     """
-    regular = Simplices(skfem.MeshTet(REGULAR, np.arange(4)[:, None]))
-    every = np.zeros(1, dtype=int)
-    unit = np.linalg.inv(np.linalg.cholesky(regular.form(Material(1.0, 0.0), every)[0]))
-    most = np.linalg.eigvalsh(unit @ cells.form(material, elements) @ unit.T)[:, -1]
-    back = np.linalg.inv(regular.back) @ cells.back[elements]  # to the regular one
-    size = np.einsum("fai,fij,faj->f", back, square, back) * area / (np.sqrt(3) / 4)
-    return CONSTANT * most * np.maximum(size, 0.0)
+    d, regular = cells.dim, regular_simplex(cells.dim)
+    points = regular.mesh.p
+    form = regular.form(Material(1.0, 0.0), np.zeros(1, dtype=int))[0]
+    unit = np.linalg.inv(np.linalg.cholesky(form))
+    largest = np.linalg.eigvalsh(unit @ cells.form(material, elements) @ unit.T)[:, -1]
+    back = points[:, 1:] @ cells.back[elements]
+    own = np.einsum("fai,fij,faj->f", back, square, back) * size / measures(points[:, :d, None])
+    return np.asarray(CONSTANT[d] * largest * np.maximum(own, 0.0))
 
 
-def _in_plane(scene: Any, pair: Any) -> np.ndarray:
+def regular_simplex(d: int) -> Simplices:
+    """The regular simplex with a vertex at the origin, whose edges have length one."""
+    points = np.column_stack([np.zeros(d), np.linalg.cholesky((np.eye(d) + 1) / 2).T])
+    kind = skfem.MeshTri if d == 2 else skfem.MeshTet
+    return Simplices(kind(points, np.arange(d + 1)[:, None]))
+
+
+def _by_fans(scene: Any, pair: Any) -> np.ndarray:
     """The least energy behind each facet (f,)."""
     side = pair.sides[1]
     cells, material = scene.cells[side.body], scene.bodies[side.body].body.material
     t = pair.of_contacts(scene.tractions)[:, pair.ends.facets[0]] @ pair.frame  # (v, S, dim)
-    ends = np.einsum("vSs,vSd->Ssd", pair.ends.at[0], t) * side.sign
+    ends = np.einsum("vSs,vSd->Ssd", pair.ends.at[0, ..., :2], t) * side.sign
     moments = pair.moments(1, scene.tractions)
     corners, outer, rest = [], [], []
     for f in np.unique(pair.rule.facets[1]):
         own = pair.rule.facets[1] == f
-        x = pair.ends.at[1][1, own]  # (pieces, 2)
+        x = pair.ends.at[1, 1, own, :2]  # (pieces, 2)
         a, b = pair.points[1][..., f].T
         length = float(np.linalg.norm(b - a))
         ratio = pair.rule.weights[own].sum(axis=1) / (length * np.abs(np.diff(x))[:, 0])
@@ -116,7 +149,7 @@ def _in_plane(scene: Any, pair: Any) -> np.ndarray:
     if not corners:
         return np.zeros(len(side.facets))
     mesh, moments = _fans(np.array(corners), np.array(outer), np.array(rest))
-    fans = EquilibriumElements(mesh, getattr(cells, "degree", 1), scene.revolved)
+    fans = EquilibriumElements(mesh, cells.degree, True)
     return np.bincount(outer, _least_energies(fans, moments, material), len(side.facets))
 
 
