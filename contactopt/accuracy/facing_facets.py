@@ -214,7 +214,11 @@ def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Poin
     shares = [_shares(own[every], x), _shares(other[found.ravel()], x)]
     faced = (best.reshape(-1, 1) >= -NEAR).astype(float)
     nodes = Points(np.stack([every, found.ravel()]), np.stack(shares), faced)
-    return pieces(*facet_rule(d, PARTS[d])), nodes, pieces(facet_nodes(d), np.ones(d * (d + 1) // 2))
+    return (
+        pieces(*facet_rule(d, PARTS[d])),
+        nodes,
+        pieces(facet_nodes(d), np.ones(d * (d + 1) // 2)),
+    )
 
 
 def _sizes(corners: np.ndarray) -> np.ndarray:
@@ -305,6 +309,13 @@ def quadratic_shapes(at: np.ndarray) -> np.ndarray:
     """The quadratic shape functions (q, s) of a facet, those of its vertices first."""
     both = [4 * at[i] * at[j] for i, j in combinations(range(len(at)), 2)]
     return np.concatenate([at * (2 * at - 1), both])
+
+
+def control_points(values: np.ndarray, d: int) -> np.ndarray:
+    """Those of Bernstein (S, q) of quadratic functions with values (S, q) at nodes of facets."""
+    ends = np.array(list(combinations(range(d), 2)))
+    between = 2 * values[:, d:] - values[:, ends].mean(axis=2)
+    return np.concatenate([values[:, :d], between], axis=1)
 
 
 @cache
