@@ -334,10 +334,10 @@ def constants() -> list[dict[str, Any]]:
 
 def _halved(points: np.ndarray, halvings: int) -> tuple[Any, np.ndarray]:
     """A mesh of a simplex with vertices (dim, dim + 1), and the facets opposite the last one."""
-    dim = len(points)
-    mesh = (skfem.MeshTri if dim == 2 else skfem.MeshTet).init_refdom().refined(halvings)
-    on = np.flatnonzero(np.all(mesh.p[-1, mesh.facets] < 1e-9, axis=0))
-    return replace(mesh, doflocs=points[:, 1:] @ mesh.p + points[:, :1]), on
+    kind = skfem.MeshTri if len(points) == 2 else skfem.MeshTet
+    plain = kind.init_refdom().refined(halvings)
+    mesh = kind(points[:, 1:] @ plain.p + points[:, :1], plain.t)  # may number facets anew
+    return mesh, np.flatnonzero(np.all(plain.p[-1, mesh.facets] < 1e-9, axis=0))
 
 
 def composite(dim: int, halvings: int) -> float:
