@@ -12,9 +12,14 @@ from contactopt.accuracy.bound import Bound, bounded
 from contactopt.accuracy.displaced_stress import halved
 from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.equilibrium_elements import EquilibriumElements
-from contactopt.accuracy.facing_facets import measures
+from contactopt.accuracy.facing_facets import facet_rule, measures
 from contactopt.accuracy.loop import refine
-from contactopt.accuracy.uneven_traction import CONSTANT, least_energy, regular_simplex
+from contactopt.accuracy.uneven_traction import (
+    CONSTANT,
+    least_energy,
+    regular_simplex,
+    uneven_squares,
+)
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
@@ -369,6 +374,34 @@ def weight_of(points, material):
 
     units = np.eye(dim)
     return np.array([[(energy(a + b) - energy(a - b)) / 4 for a in units] for b in units])
+
+
+@pytest.mark.parametrize(
+    "scene", [two_blocks(1, below=4), narrower(), cubes(1, below=2), cubes(1, wide=0.63)]
+)
+def test_what_is_uneven_is_the_traction_less_its_linear_part(scene):
+    """By the places of one side alone, where each finds the facet of the other one about it."""
+    scene = Bound(solve_scene(scene)).scene
+    pair, d = scene.pairs[0], scene.problem.dim
+    (lead, other), frame = pair.points, pair.frame[1:]
+    at, weights = facet_rule(d, {2: 2000, 3: 40}[d])
+    t = pair.of_contacts(scene.tractions) @ pair.frame  # at the vertices of the first side
+    inverse = np.linalg.inv(
+        np.concatenate([np.ones((1, d, lead.shape[2])), np.einsum("ad,dvf->avf", frame, lead)]).T
+    )
+    for f in range(other.shape[2]):
+        x = frame @ (other[..., f] @ at)
+        shares = np.einsum("fav,as->fvs", inverse, np.concatenate([np.ones((1, x.shape[1])), x]))
+        inside = shares.min(axis=1)  # (f, s)
+        place, there = inside.argmax(axis=0), inside.max(axis=0) > -1e-9
+        own = np.einsum("vs,vsd->ds", shares[place, :, np.arange(len(place))].T, t[:, place])
+        own *= there
+        gram = np.einsum("s,vs,ws->vw", weights, at, at)
+        linear = np.linalg.solve(gram, np.einsum("s,vs,ds->vd", weights, at, own))
+        rest = own - np.einsum("vd,vs->ds", linear, at)
+        wanted = measures(other)[f] * np.einsum("s,ds,es->de", weights, rest, rest)
+        found = uneven_squares(scene, pair)[f]
+        assert np.allclose(found, wanted, atol=0.03 * np.trace(wanted) + 1e-12)
 
 
 @pytest.mark.parametrize("degree", [1, 2])

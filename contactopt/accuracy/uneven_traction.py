@@ -66,22 +66,27 @@ def uneven_traction(scene: Any) -> list[np.ndarray]:
 
 def _by_constant(scene: Any, pair: Any) -> np.ndarray:
     """An upper bound of the least energy behind each facet (f,)."""
-    side, points, d = pair.sides[1], pair.rule, scene.problem.dim
+    side = pair.sides[1]
     cells, material = scene.cells[side.body], scene.bodies[side.body].body.material
-    size, facets = measures(pair.points[1]), points.facets[1]
+    elements = cells.mesh.f2t[0, side.facets]
+    size = measures(pair.points[1])
+    return least_energy(cells, material, elements, size, uneven_squares(scene, pair))
+
+
+def uneven_squares(scene: Any, pair: Any) -> np.ndarray:
+    """(f, dim, dim) integrals of d d' over the facets of the second side, d by their area."""
+    points, d, size = pair.rule, scene.problem.dim, measures(pair.points[1])
+    facets = points.facets[1]
     t = pair.of_contacts(scene.tractions)[:, points.facets[0]] @ pair.frame  # (v, S, dim)
-    t = np.einsum("vSs,vSd->Ssd", points.at[0], t)
-    # d by the area of this side, which may be inclined to the other
-    there = size[facets] * np.abs(np.linalg.det(np.moveaxis(pair.ends.at[1, ..., :d], 1, 0)))
-    weights = points.weights * (points.weights.sum(axis=1) / there)[:, None]
+    t = np.einsum("vSs,vSd->Ssd", points.at[0], t)  # by the area of the first side
+    area = size[facets] * np.abs(np.linalg.det(np.moveaxis(pair.ends.at[1, ..., :d], 1, 0)))
+    weights = points.weights * (points.weights.sum(axis=1) / area)[:, None]
     square = np.zeros((len(size), d, d))
     own = np.einsum("Ss,Ssd,Sse->Sde", weights, t, t, optimize=True)
     np.add.at(square, facets, own)
     m = pair.moments(1, scene.tractions)
-    even = d * (d + 1) / size[:, None] * (m - m.sum(axis=0) / (d + 1))
-    square -= np.einsum("vfd,vfe->fde", even, m)
-    elements = cells.mesh.f2t[0, side.facets]
-    return least_energy(cells, material, elements, size, square)
+    even = d * (d + 1) / size[:, None] * (m - m.sum(axis=0) / (d + 1))  # at the vertices
+    return np.asarray(square - np.einsum("vfd,vfe->fde", even, m))
 
 
 def least_energy(
