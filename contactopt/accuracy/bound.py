@@ -49,7 +49,8 @@ below which `contactopt diagnose` says that the solution is unique.
 
 The bound is of the problem whose boundary is that of the mesh. It does not cover straight edges in
 place of a curve. Integrals over contact facets are taken over SPLIT parts of each; there
-penetration is looked for as well.
+penetration is looked for as well. Where a mortar coupling joins facets that do not match, what s*
+lacks is bounded by contactopt.accuracy.uneven_traction, and nothing penetrates anywhere.
 
 Sources: Prager, Synge (1947); Ladeveze, Leguillon (1983); Coorevits, Hild, Pelle (2000), A
 posteriori error estimation for unilateral contact with matching and non-matching meshes, Comput.
@@ -90,7 +91,7 @@ Data = list[Any]  # for every body what determines a composite stress; None for 
 class Bound:
     """A guaranteed bound of a solution; all norms are of energy [(force length)^1/2].
 
-    mesh      |s* - s(v)|, of which `joint` is what a mortar coupling adds
+    mesh      |s* - s(v)|;   joint  what a mortar coupling adds to it, element by element
     contact   root of twice the work of p* in the gap;   friction  and of that of friction
     solver    root of what these works are at the contacts alone, which a solver could make zero
     moved     |v - u_h|;   norm  |u_h|

@@ -1,5 +1,7 @@
 """The contact surfaces of a solved scene as a guaranteed bound (contactopt.accuracy.bound) sees
-them: flat, facet facing facet, or piece of a facet facing piece of a facet.
+them: flat, facet facing facet, or piece of a facet facing piece of a facet. The pieces are
+intervals in the plane. In space they are triangles, of which polygons are made up that
+contactopt.coupling.segments cuts.
 """
 
 from __future__ import annotations
@@ -59,7 +61,7 @@ class FacingFacets:
               and sign of a rigid body
     contacts  (dim, f) at the vertices of the first side's facets;   joined  whether facets differ
     rule      points and weights of integrals;   nodes  those of quadratic displacements, where a
-              node that faces nothing has no weight
+              node that faces nothing has no weight;   ends  the nodes of pieces, corners first
     """
 
     def __init__(self, solved: Solved, number: int, cells: Sequence[Any]):
@@ -187,8 +189,8 @@ class FacingFacets:
 
 def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Points, Points, Points]:
     """Points for integrals over the pieces, common to a facet of each, of two plane surfaces (dim,
-    v, f) that face each other along frame[0]; the nodes of the first one's facets; and the corners
-    of the pieces, which are intervals or triangles.
+    v, f) that face each other along frame[0]; the nodes of the first one's facets; and those of the
+    pieces, which are intervals or triangles.
     """
     d = len(frame)
     own, other = (np.einsum("ad,dvf->fva", frame[1:], x) for x in points)
