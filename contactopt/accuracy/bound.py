@@ -50,7 +50,8 @@ unique.
 
 The bound is of the problem whose boundary is that of the mesh. It does not cover straight edges in
 place of a curve. Integrals over contact facets are taken over SPLIT parts of each; there
-penetration is looked for as well.
+penetration is looked for as well. Where a mortar coupling joins facets that do not match, what s*
+lacks is bounded by contactopt.accuracy.uneven_traction, and nothing penetrates anywhere.
 
 Sources: Prager, Synge (1947); Ladeveze, Leguillon (1983); Coorevits, Hild, Pelle (2000), A
 posteriori error estimation for unilateral contact with matching and non-matching meshes, Comput.
@@ -83,7 +84,7 @@ Data = list[Any]  # for every body what determines a composite stress; None for 
 class Bound:
     """A guaranteed bound of a solution; all norms are of energy [(force length)^1/2].
 
-    mesh      |s* - s(u_h)|, of which `joint` is what a mortar coupling adds
+    mesh      |s* - s(u_h)|;   joint  what a mortar coupling adds to it, element by element
     contact   root of twice the work of p* in the gap;   friction  and of that of friction
     solver    root of what these works are at the contacts alone, which a solver could make zero
     moved     |w|, of what keeps the surfaces apart;   norm  |u_h|
@@ -98,12 +99,15 @@ class Bound:
         self.strained = self.strains(self.displacement)
         self.balanced = self.balanced_with(scene.tractions, scene.solution.multipliers)
         self.missing = _minus(self.balanced, self.strained)
-        self.joint = uneven_traction(scene)
         added = [new - old for new, old in zip(self.displacement, before)]
         stretched = self.strains(added)
         self.moved = self.size(stretched)
-        # s* - s(u_h), of the displacement that was solved for
-        self.mesh = self.size(_sum(self.missing, stretched)) + self.joint
+        left = _sum(self.missing, stretched)  # s* - s(u_h), of the displacement solved for
+        uneven = np.concatenate(uneven_traction(scene))
+        squares = np.concatenate(self.products(left, left))
+        self.joint = float(np.linalg.norm(uneven))
+        both = 2 * float(uneven @ np.sqrt(np.maximum(squares, 0.0)))  # in each element norms add
+        self.mesh = float(np.sqrt(self.size(left) ** 2 + both + self.joint**2))
         energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]
         self.norm = float(np.sqrt(2 * sum(energies)))
         gaps = scene.work(scene.tractions[:, 0], self.displacement)

@@ -203,7 +203,7 @@ class Simplices:
             found.append((t + t.sum(axis=0)) / (self.dim * (self.dim + 1)))
         return np.array(found)
 
-    def _form(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
+    def form(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
         """(e, component, component) the energy of some elements by the integrals of the products of
         the components of their stresses on the reference element.
         """
@@ -232,7 +232,7 @@ class Simplices:
         parts = reference_energy(self.dim)
         i, j = np.triu_indices(len(parts))  # both factors are symmetric in their components
         twice = parts[i, j] + np.where(i < j, 1.0, 0.0)[:, None, None] * parts[j, i]
-        flat = self._form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
+        flat = self.form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
         return np.asarray(flat.reshape(-1, *parts.shape[2:]))
 
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -242,7 +242,7 @@ class Simplices:
         there = np.flatnonzero(np.any(one != 0, axis=1) & np.any(other != 0, axis=1))
         for own in np.split(there, range(BLOCK, len(there), BLOCK)):
             a, b = ((y[own] @ by_inputs).reshape(shape) for y in (one, other))
-            out[own] = np.sum(self._form(material, own) * (a.swapaxes(1, 2) @ b), axis=(1, 2))
+            out[own] = np.sum(self.form(material, own) * (a.swapaxes(1, 2) @ b), axis=(1, 2))
         return out * WEIGHT[self.dim]
 
     @property
@@ -322,7 +322,7 @@ class Simplices:
         """
         d, count, stress = self.dim, self.mesh.facets.shape[1], reference_stress(self.dim)
         inputs, back = (d + 1) * d * d, self.by_moments.T.tobsr((d, d))  # without the body force
-        form = WEIGHT[d] * self._form(material, slice(None))
+        form = WEIGHT[d] * self.form(material, slice(None))
         size = float(np.abs(form).max()) or 1.0
         single = (form / size).astype(np.float32)
         values = stress.reshape(-1, stress.shape[2]).astype(np.float32)
@@ -343,11 +343,11 @@ class Simplices:
         blocks = np.einsum("vani,vbnj->abnij", own, own, optimize=True)
         H = (form.reshape(len(form), -1) @ blocks.reshape(form[0].size, -1)).reshape(-1, d, d)
         B = np.repeat(self.back, inputs // d, axis=0)
-        share = np.sum(B * (H @ B), axis=1).reshape(-1, d + 1, d, d)
-        diagonal = np.zeros((count, d, d))
+        share = np.sum(B * (H @ B), axis=(1, 2)).reshape(-1, d + 1, d) / d
+        diagonal = np.zeros((count, d))
         np.add.at(diagonal, (self.opposite[:, None], self.slots), np.moveaxis(share, 0, 2))
         twice = float(self.products(material, missing, missing).sum())
-        return Energy(product, diagonal.reshape(-1, d), forces(missing), twice)
+        return Energy(product, diagonal.reshape(-1, 1), forces(missing), twice)
 
     def _tractions(
         self,

@@ -1,5 +1,7 @@
 """The contact surfaces of a solved scene as a guaranteed bound (contactopt.accuracy.bound) sees
-them: flat, facet facing facet, or piece of a facet facing piece of a facet.
+them: flat, facet facing facet, or piece of a facet facing piece of a facet. The pieces are
+intervals in the plane. In space they are triangles, of which polygons are made up that
+contactopt.coupling.segments cuts.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from scipy.spatial import cKDTree
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTri
 
+from contactopt.coupling.facing import Facets, facing_pairs
+from contactopt.coupling.segments import areas, clip
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Part
 from contactopt.solving.solve_scene import Solved
@@ -22,6 +26,8 @@ LAWS = "frictionless", "tresca", "coulomb"
 NEAR = 1e-6  # vertices and contacts coincide within this fraction of the surface
 FLAT = 1e-9  # by how much the normals of a flat contact surface differ
 SPLIT = {2: 16, 3: 4}  # parts of an edge of a contact facet for integrals over it
+PARTS = {2: 16, 3: 2}  # and of an edge of a piece of one
+FACING = -0.5  # the cosine between opposite normals is below this
 
 
 class Points(NamedTuple):
@@ -55,7 +61,7 @@ class FacingFacets:
               and sign of a rigid body
     contacts  (dim, f) at the vertices of the first side's facets;   joined  whether facets differ
     rule      points and weights of integrals;   nodes  those of quadratic displacements, where a
-              node that faces nothing has no weight
+              node that faces nothing has no weight;   ends  the nodes of pieces, corners first
     """
 
     def __init__(self, solved: Solved, number: int, cells: Sequence[Any]):
@@ -65,10 +71,6 @@ class FacingFacets:
         name, self.joined = f"contact '{pair.name}'", coupling.kind == "mortar"
         if pair.law not in LAWS:
             raise InputError(f"{name} has the law '{pair.law}'; a bound knows {', '.join(LAWS)}.")
-        if self.joined and scene.dim == 3:
-            raise InputError(
-                f"{name} joins surfaces by mortar; in space a bound needs matching ones."
-            )
         if np.ptp(coupling.frames, axis=0).max() > FLAT:
             raise InputError(f"{name} has a curved surface; a bound needs a flat one.")
         names = [part.name for part in scene.parts]
@@ -98,9 +100,9 @@ class FacingFacets:
         own = self.sides[0].contacts
         self.contacts = np.where(own < 0, -1, own + first)
         self.points = [mesh.p[:, side.vertices] for mesh, side in zip(meshes, self.sides)]
-        (at, weights), nodes = facet_rule(scene.dim), facet_nodes(scene.dim)
+        (at, weights), nodes = facet_rule(scene.dim, SPLIT[scene.dim]), facet_nodes(scene.dim)
         if self.joined:
-            self.rule, self.nodes, self.ends = joined_points(self.points, self.frame[1])
+            self.rule, self.nodes, self.ends = joined_points(self.points, self.frame)
         else:
             every = np.arange(own.shape[1])
             self.rule, self.nodes = (
@@ -187,57 +189,88 @@ class FacingFacets:
         return out
 
 
-def joined_points(points: Sequence[np.ndarray], t: np.ndarray) -> tuple[Points, Points, Points]:
-    """Points for integrals over the pieces, between the vertices of both, of facets of two plane
-    surfaces (dim, v, f) that face each other along t; the nodes of the first one's facets; and the
-    ends of the pieces.
+def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Points, Points, Points]:
+    """Points for integrals over the pieces, common to a facet of each, of two plane surfaces (dim,
+    v, f) that face each other along frame[0]; the nodes of the first one's facets; and those of the
+    pieces, which are intervals or triangles.
     """
-    along = [np.einsum("d,dvf->vf", t, own) for own in points]
-    size = np.ptp(along[0])
-    ends = np.unique(np.concatenate([own.ravel() for own in along]))
-    ends = ends[np.concatenate([[True], np.diff(ends) > NEAR * size])]
-    middles = (ends[1:] + ends[:-1]) / 2
-    facets = np.stack([_found(own, middles) for own in along])
-    there = np.all(facets >= 0, axis=0)
-    facets, steps = facets[:, there], np.diff(ends)[there, None]
-    lead = facets[0]
-    stretch = measures(points[0])[lead] / np.abs(along[0][1] - along[0][0])[lead]
+    d = len(frame)
+    own, other = (np.einsum("ad,dvf->fva", frame[1:], x) for x in points)
+    first, second = _meeting(own, other)
+    corners, number = _common(own[first], other[second])
+    size, whole = _sizes(corners), _sizes(own)
+    there = size > NEAR ** (d - 1) * whole[first[number]]
+    corners, facets = corners[there], np.stack([first, second])[:, number[there]]
+    area = size[there] * (measures(points[0]) / whole)[facets[0]]
 
     def pieces(at: np.ndarray, weights: np.ndarray) -> Points:
-        x = ends[:-1][there, None] + steps * at[1]
-        own = [_shares(ends_of[:, of], x) for ends_of, of in zip(along, facets)]
-        return Points(facets, np.stack(own), stretch[:, None] * steps * weights)
+        x = np.einsum("Sva,vs->Ssa", corners, at)
+        shares = [_shares(side[of], x) for side, of in zip((own, other), facets)]
+        return Points(facets, np.stack(shares), area[:, None] * weights)
 
-    x = np.einsum("vf,vq->fq", along[0], facet_nodes(2))
-    every = np.repeat(np.arange(len(x)), x.shape[1])
-    other = _found(along[1], x.ravel())
-    own = [_shares(own[:, of], x.reshape(-1, 1)) for own, of in zip(along, (every, other))]
-    faced = (other >= 0)[:, None].astype(float)
-    nodes = Points(np.stack([every, other]), np.stack(own), faced)
-    return pieces(*facet_rule(2)), nodes, pieces(np.eye(2), np.ones(2))
-
-
-def _found(along: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The facet between whose ends (2, f) each place lies, or -1."""
-    low, high = along.min(axis=0), along.max(axis=0)
-    order = np.argsort(low)
-    place = order[np.clip(np.searchsorted(low[order], x, "right") - 1, 0, None)]
-    near = NEAR * np.ptp(along)
-    inside = (x >= low[place] - near) & (x <= high[place] + near)
-    return np.where(inside, place, -1)
+    x = np.einsum("fva,vq->fqa", own, facet_nodes(d))
+    inside = _shares(other[second], x[first]).min(axis=0)  # (j, q)
+    order, each = np.argsort(inside, axis=0), np.arange(x.shape[1])
+    found, best = np.zeros(x.shape[:2], dtype=int), np.full(x.shape[:2], -np.inf)
+    found[first[order], each] = second[order]  # the last of several counts: the innermost
+    np.maximum.at(best, first, inside)
+    every, x = np.repeat(np.arange(len(x)), x.shape[1]), x.reshape(-1, 1, d - 1)
+    shares = [_shares(own[every], x), _shares(other[found.ravel()], x)]
+    faced = (best.reshape(-1, 1) >= -NEAR).astype(float)
+    nodes = Points(np.stack([every, found.ravel()]), np.stack(shares), faced)
+    return (
+        pieces(*facet_rule(d, PARTS[d])),
+        nodes,
+        pieces(facet_nodes(d), np.ones(d * (d + 1) // 2)),
+    )
 
 
-def _shares(ends: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Shares (2, S, s) of the ends (2, S) at places (S, s)."""
-    second = (x - ends[0][:, None]) / (ends[1] - ends[0])[:, None]
-    return np.stack([1 - second, second])
+def _sizes(corners: np.ndarray) -> np.ndarray:
+    """Lengths or areas (S,) of facets (S, v, dim - 1) in their plane."""
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.abs(np.linalg.det(edges)) / edges.shape[2])  # of one or two factorial
+
+
+def _meeting(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs (j,) of facets (f, v, dim - 1) of two sides that may have a common part."""
+    balls = []
+    for plane, up in ((own, 1.0), (other, -1.0)):
+        centre = plane.mean(axis=1)
+        radius = np.linalg.norm(plane - centre[:, None], axis=2).max(axis=1)
+        axis = np.zeros((centre.shape[1] + 1, len(centre)))
+        axis[-1] = up
+        balls.append(Facets(np.vstack([centre.T, 0 * radius]), radius, axis, 0 * radius))
+    return facing_pairs(balls[0], balls[1], FACING)
+
+
+def _common(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The common parts (S, v, dim - 1) of pairs of facets, some empty, and the pair of each (S,).
+    In space a fan of triangles makes up each.
+    """
+    if own.shape[2] == 1:
+        low = np.maximum(own.min(axis=1), other.min(axis=1))
+        high = np.minimum(own.max(axis=1), other.max(axis=1))
+        return np.stack([low, np.maximum(low, high)], axis=1), np.arange(len(own))
+    area = areas(own)
+    window = np.where((area < 0)[:, None, None], own[:, ::-1], own)  # counterclockwise
+    polygon = clip(other, window, np.sqrt(np.abs(area)))
+    hub = np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1)
+    triangles = np.stack([hub, polygon[:, 1:-1], polygon[:, 2:]], axis=2)
+    return triangles.reshape(-1, 3, 2), np.repeat(np.arange(len(own)), hub.shape[1])
+
+
+def _shares(corners: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Shares (v, S, s) of the vertices (S, v, dim - 1) of facets at places (S, s, dim - 1)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    others = np.moveaxis((x - corners[:, :1]) @ np.linalg.inv(edges), 2, 0)
+    return np.concatenate([1 - others.sum(axis=0, keepdims=True), others])
 
 
 def measures(points: np.ndarray) -> np.ndarray:
     """Lengths or areas (f,) of simplices with vertices (dim, v, f)."""
     edges = points[:, 1:] - points[:, :1]
     gram = np.einsum("dav,dbv->vab", edges, edges)
-    return np.asarray(np.sqrt(np.linalg.det(gram)) / (1 if len(points) == 2 else 2))
+    return np.asarray(np.sqrt(np.linalg.det(gram)) / (1 if points.shape[1] == 2 else 2))
 
 
 def _side(
@@ -282,6 +315,13 @@ def quadratic_shapes(at: np.ndarray) -> np.ndarray:
     return np.concatenate([at * (2 * at - 1), both])
 
 
+def control_points(values: np.ndarray, d: int) -> np.ndarray:
+    """Those of Bernstein (S, q) of quadratic functions with values (S, q) at nodes of facets."""
+    ends = np.array(list(combinations(range(d), 2)))
+    between = 2 * values[:, d:] - values[:, ends].mean(axis=2)
+    return np.concatenate([values[:, :d], between], axis=1)
+
+
 @cache
 def facet_nodes(d: int) -> np.ndarray:
     """Shares (dim, q) of the vertices of a facet at the nodes of a quadratic displacement."""
@@ -290,10 +330,12 @@ def facet_nodes(d: int) -> np.ndarray:
 
 
 @cache
-def facet_rule(d: int) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (dim, s) of the vertices of a facet, and weights (s,) that add up to one."""
+def facet_rule(d: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (dim, s) of the vertices of a facet, and weights (s,) that add up to one, from n parts
+    of every edge.
+    """
     x, w = get_quadrature(RefLine if d == 2 else RefTri, 4)
-    local, n = np.concatenate([1 - x.sum(axis=0, keepdims=True), x]), SPLIT[d]
+    local = np.concatenate([1 - x.sum(axis=0, keepdims=True), x])
     if d == 2:
         corners = [np.array([[i], [i + 1]]) for i in range(n)]
     else:

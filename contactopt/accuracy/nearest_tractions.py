@@ -19,8 +19,9 @@ Any moments m become those of elements in balance in three steps, written P m:
    found vertex by vertex (contactopt.accuracy.vertex_balance).
 
 The energy of the stress is minimised over balanced moments by conjugate gradients, preconditioned
-by P D^-1 P' with the diagonal D of its second derivative. An L2 norm is minimised, so the number of
-steps does not grow with the number of elements.
+by P D^-1 P' with the diagonal D of its second derivative, averaged over the components. An L2 norm
+is minimised, so the number of steps does not grow with the number of elements, but with how long
+they are.
 
 Source: Ladeveze, Rougeot (1997), New advances on a posteriori error on constitutive relation in
 f.e. analysis, Comput. Methods Appl. Mech. Eng. 150, for tractions of which not every force at a
@@ -58,7 +59,9 @@ class Answer(NamedTuple):
 class Energy(NamedTuple):
     """Half the energy by moments (facets dim, dim).
 
-    product   products with its second derivative, whose `diagonal` has this form
+    product   products with its second derivative
+    diagonal  (facets dim, 1) of the second derivative, the mean of all components, so that the
+              answer does not depend on the axes
     slope     its first derivative where the moments are zero;   twice  the energy there
     """
 

@@ -16,6 +16,7 @@ from contactopt.accuracy.equilibrium_elements import EquilibriumElements
 from contactopt.accuracy.facing_facets import (
     NEAR,
     FacingFacets,
+    control_points,
     facet_nodes,
     measures,
     quadratic_shapes,
@@ -210,10 +211,14 @@ class PressedScene:
             closed = (pair.of_contacts(self.pressed) > 0).T @ nodes > 1 - NEAR
             least = np.maximum(missing[:, :d], 0.0) @ nodes
             pair.lift(out, np.where(closed, missing, np.maximum(missing, least)))
-            bubble = quadratic_shapes(pair.rule.at[0])[d:].sum(axis=0)
             more = np.zeros(len(missing))
-            found = np.max(-pair.jump(out, pair.rule)[0] / bubble, axis=1)
-            np.maximum.at(more, pair.rule.facets[0], found)
+            points = pair.ends if pair.joined else pair.rule
+            gap = pair.jump(out, points)[0]
+            bubble = quadratic_shapes(points.at[0])[d:].sum(axis=0)
+            if pair.joined:  # on pieces both are quadratic, and no less than their control points
+                gap, bubble = control_points(gap, d), control_points(bubble, d)
+            found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > NEAR)
+            np.maximum.at(more, points.facets[0], found.max(axis=1))
             more[~closed.all(axis=1)] *= CLEAR
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out

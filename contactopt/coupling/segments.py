@@ -270,18 +270,18 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     first, second = _facing(mine, theirs, np.zeros(len(mine.face)))
     axes = _axes(mine)
     frame = _in_plane(axes, mine.vertices - mine.centre[:, :, None])
-    area = _areas(frame)
+    area = areas(frame)
     frame = np.where((area < 0)[:, None, None], frame[:, ::-1], frame)  # counterclockwise
     size = np.sqrt(np.abs(area))
     subject = _in_plane(axes[first], theirs.vertices[:, second] - mine.centre[:, first, None])
     low, high = frame.min(axis=1)[first], frame.max(axis=1)[first]
     meets = np.all((subject.max(axis=1) > low) & (subject.min(axis=1) < high), axis=1)
     first, second = first[meets], second[meets]
-    polygon = _clip(subject[meets], frame[first], size[first])
+    polygon = clip(subject[meets], frame[first], size[first])
     # a fan of triangles around the first vertex
     hub = np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1)
     triangles = np.stack([hub, polygon[:, 1:-1], polygon[:, 2:]], 2)
-    content = np.abs(_areas(triangles.reshape(-1, 3, 2))).reshape(triangles.shape[:2])
+    content = np.abs(areas(triangles.reshape(-1, 3, 2))).reshape(triangles.shape[:2])
     full = np.bincount(mine.cell, np.abs(area), len(own.faces) * len(own.cells))
     part = content.sum(axis=1) / full[mine.cell[first]]
     middle = _in_space(mine, axes, first, polygon.mean(axis=1))
@@ -312,13 +312,13 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     return Overlap(cell, here, face, there, E, measure, window)
 
 
-def _areas(polygons: np.ndarray) -> np.ndarray:
+def areas(polygons: np.ndarray) -> np.ndarray:
     """Signed areas (p,) of polygons (p, v, 2)."""
     x, y = polygons[..., 0], polygons[..., 1]
     return np.asarray(np.sum(x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1), axis=1) / 2)
 
 
-def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarray:
+def clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Parts (p, v', 2) of polygons (p, v, 2) in convex counterclockwise windows (p, w, 2) of `size`
     (p,), padded by the last vertex; zero if empty.
     """

@@ -15,10 +15,15 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 import skfem
+from scipy.linalg import eigh, null_space
+from scipy.sparse.linalg import splu
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem.refdom import RefQuad
 
 from contactopt import Material
@@ -26,8 +31,10 @@ from contactopt.accuracy.bound import Bound
 from contactopt.accuracy.displaced_stress import bilinear, halved
 from contactopt.accuracy.equilibrated import Simplices
 from contactopt.accuracy.equilibrium_elements import EquilibriumElements
+from contactopt.accuracy.facing_facets import measures
 from contactopt.accuracy.interval import interval
 from contactopt.accuracy.loop import refine
+from contactopt.accuracy.uneven_traction import CONSTANT, regular_simplex
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.figures.style import COLOURS, LETTERS, MARKS, add_legend, paper_axes
@@ -100,10 +107,16 @@ def rounded(x: np.ndarray) -> np.ndarray:
 
 
 def two_blocks(
-    load: str, degree: int, law: str, mu: float, dim: int = 2, below: int | None = None
+    load: str,
+    degree: int,
+    law: str,
+    mu: float,
+    dim: int = 2,
+    below: int | None = None,
+    wide: float = 1.0,
 ) -> Scene:
     """Two blocks, the upper one with a lower side that is bent upwards (in space flat), joined by
-    mortar if a number of elements `below` is given.
+    mortar if a number of elements `below` is given; in space the upper one may be less `wide`.
     """
     up, number = "xyz"[dim - 1], (COARSE[dim], below or COARSE[dim])
     upper, lower = (box(dim, n, sign, seed) for n, sign, seed in zip(number, (1.0, -1.0), (1, 2)))
@@ -111,13 +124,19 @@ def two_blocks(
         p = upper.p.copy()
         p[1] += 0.05 * p[0] ** 2 * (1 - p[1])
         upper = replace(upper, doflocs=p)
+    elif wide < 1:
+        upper = replace(upper, doflocs=upper.p * np.array([[wide], [wide], [1.0]]))
     planes = (Support("left", {"x": 0.0}), Support("front", {"y": 0.0}))[: dim - 1]
     top = Part("upper", upper, Material(SOFT, 0.3), **held(dim, load, up))
     free = load == "sheared"
     bottom = Part("lower", lower, Material(STIFF, 0.3), ((), planes)[not free] + (Support("far"),))
     kind = "plane-strain" if dim == 2 else "solid"
-    contact = Contact("upper", "lower", mu, law, coupling="mortar" if below else "auto")
+    carrier = "upper" if wide < 1 else None
+    contact = Contact(
+        "upper", "lower", mu, law, coupling="mortar" if below else "auto", carrier=carrier
+    )
     name = f"{load}, " + (f"mortar {number[0]} on {below}" if below else "two blocks")
+    name += (", narrower" if wide < 1 else "") + (", space" if dim == 3 else "")
     return Scene(name, kind=kind, bodies=(top, bottom), contacts=(contact,), degree=degree)
 
 
@@ -134,7 +153,10 @@ def scenes() -> Iterator[Scene]:
             yield replace(on_floor("pressed", degree, *law, nu=0.48), name="nu = 0.48, floor")
             yield replace(on_floor("pushed", degree, *law, across=4), name="long elements, floor")
             yield replace(on_floor("plate", degree, *law, dim=3), name="plate, floor, space")
-        yield replace(two_blocks("pushed", degree, *LAWS[1], dim=3), name="pushed, blocks, space")
+            yield two_blocks("pushed", degree, *law, dim=3, below=4)
+            yield two_blocks("plate", degree, *law, dim=3, below=2)
+            yield two_blocks("pushed", degree, *law, dim=3, below=4, wide=0.63)
+        yield two_blocks("pushed", degree, *LAWS[1], dim=3)
         for law in LAWS:
             for load in ("pushed", "plate", "pressed", "heavy"):
                 yield revolved(on_floor(load, degree, *law), "disc")
@@ -299,6 +321,99 @@ def _seconds(work: Callable[[], Any]) -> float:
     return float(np.median(spent))
 
 
+def constants() -> list[dict[str, Any]]:
+    """The constant c of contactopt.accuracy.uneven_traction, from above and from below."""
+    rows = []
+    for dim, halvings in (*((2, k) for k in range(1, 5)), *((3, k) for k in range(1, 4))):
+        n, found = 2**halvings, composite(dim, halvings)
+        points = regular_simplex(dim).mesh.p
+        least = compatible(points, Material(1.0, 0.0), np.eye(dim), halvings)
+        rows.append({"dimension": dim, "n": n, "c_n": found, "c is at most": found / (1 - 1 / n),
+                     "c is at least": least, "in use": CONSTANT[dim]})  # fmt: skip
+    return rows
+
+
+def _halved(points: np.ndarray, halvings: int) -> tuple[Any, np.ndarray]:
+    """A mesh of a simplex with vertices (dim, dim + 1), and the facets opposite the last one."""
+    kind = skfem.MeshTri if len(points) == 2 else skfem.MeshTet
+    plain = kind.init_refdom().refined(halvings)
+    mesh = kind(points[:, 1:] @ plain.p + points[:, :1], plain.t)  # may number facets anew
+    return mesh, np.flatnonzero(np.all(plain.p[-1, mesh.facets] < 1e-9, axis=0))
+
+
+def composite(dim: int, halvings: int) -> float:
+    """The largest least energy of composite stresses in a regular simplex under tractions d that
+    are linear on each of its facets, over int |d|^2, where the moments of d are zero.
+    """
+    mesh, on = _halved(regular_simplex(dim).mesh.p, halvings)
+    cells, x = Simplices(mesh), mesh.p[:, mesh.t]  # (dim, v, e)
+    inputs = dim * dim * (dim + 1)  # without the body force
+    H = cells.metric(Material(1.0, 0.0), slice(None))[:, :inputs, :inputs]
+    energy = cells.by_moments.T @ sp.block_diag(list(H), "csr") @ cells.by_moments
+    motions = [np.broadcast_to(one[:, None, None], x.shape) for one in np.eye(dim)]
+    for i, j in combinations(range(dim), 2):
+        motions.append(np.zeros(x.shape))
+        motions[-1][i], motions[-1][j] = x[j], -x[i]
+    entries = []
+    for number, motion in enumerate(motions):
+        for o, own in enumerate(cells.others):
+            for (slot, a), c in product(enumerate(own), range(dim)):
+                column = (cells.opposite[o] * dim + cells.slots[o, slot]) * dim + c
+                row = np.arange(len(H)) * len(motions) + number
+                entries.append((cells.sign[o] * motion[c, a], row, column))
+    value, row, column = (np.concatenate(parts) for parts in zip(*entries))
+    balance = sp.csr_matrix((value, (row, column)), (len(H) * len(motions), energy.shape[0]))
+    balance = balance[len(motions) :]  # the first element is in balance if all others are
+    inner, outer = (
+        (own[:, None] * dim**2 + np.arange(dim**2)).ravel()
+        for own in (np.flatnonzero(mesh.f2t[1] >= 0), on)
+    )
+    energy, held = energy.tocsr(), balance[:, inner]
+    whole = sp.bmat([[energy[inner][:, inner], held.T], [held, None]], "csc")
+    given = sp.vstack([energy[inner][:, outer], balance[:, outer]]).toarray()
+    form = energy[outer][:, outer].toarray() - given.T @ splu(whole).solve(given)
+    # moments of the traction whose coefficients are orthonormal, and those of linear functions
+    size = float(measures(mesh.p[:, mesh.facets[:, on[:1]]])[0])
+    root = np.linalg.cholesky(size / (dim * (dim + 1)) * (np.eye(dim) + 1))
+    moments = np.kron(np.eye(len(on)), np.kron(root, np.eye(dim)))
+    linear = np.concatenate([np.ones((1, dim, len(on))), mesh.p[: dim - 1, mesh.facets[:, on]]])
+    tested = np.einsum("lvf,ij->fvilj", linear, np.eye(dim)).reshape(len(outer), -1)
+    free = null_space((moments.T @ tested).T)
+    return float(np.linalg.eigvalsh(free.T @ moments.T @ form @ moments @ free)[-1])
+
+
+def compatible(points: np.ndarray, material: Material, weight: np.ndarray, halvings: int) -> float:
+    """The same over int d' W d in any simplex, from below: the energy of stresses with tractions d
+    is the largest 2 int d . w - |w|^2 of all displacements w, and here of quadratic ones.
+    """
+    mesh, on = _halved(points, halvings)
+    dim, element = len(points), skfem.ElementTriP2() if len(points) == 2 else skfem.ElementTetP2()
+    basis = skfem.CellBasis(mesh, skfem.ElementVector(element), intorder=4)
+    facet = skfem.FacetBasis(mesh, skfem.ElementVector(element), facets=on, intorder=4)
+    energy = linear_elasticity(*lame_parameters(material.E, material.nu)).assemble(basis).tocsc()
+    inverse = np.linalg.inv(weight)
+    square = skfem.BilinearForm(
+        lambda u, v, _: sum(inverse[i, j] * u[i] * v[j] for i, j in np.ndindex(inverse.shape))
+    ).assemble(facet)
+
+    touched = np.unique(basis.get_dofs(on).all())
+    others = np.setdiff1d(np.arange(basis.N), touched)
+    inner, across = energy[others][:, others], energy[others][:, touched].toarray()
+    stiff = energy[touched][:, touched] - across.T @ splu(inner.tocsc()).solve(across)
+    x, component = basis.doflocs[:, touched], np.eye(dim)[touched % dim]
+    turns = [
+        x[j] * component[:, i] - x[i] * component[:, j] for i, j in combinations(range(dim), 2)
+    ]
+    motions = np.column_stack([component, *turns])
+    motions *= np.sqrt(np.trace(stiff)) / np.linalg.norm(motions, axis=0)  # cost nothing else
+    shares = np.linalg.solve(points[:, 1:] - points[:, :1], x - points[:, :1])[: dim - 1]
+    linear = np.column_stack([component, *(share[:, None] * component for share in shares)])
+    square = square[touched][:, touched].toarray()
+    tested = square @ linear
+    square -= tested @ np.linalg.solve(linear.T @ tested, tested.T)
+    return float(eigh(square, stiff + motions @ motions.T, eigvals_only=True)[-1])
+
+
 def costs() -> list[dict[str, Any]]:
     """What the bound costs beside the solve, CPU time."""
     made: list[tuple[str, Scene, int]] = []
@@ -390,5 +505,5 @@ TEXT = template(__file__)
 TITLE = "Guaranteed bounds of the error"
 
 if __name__ == "__main__":
-    tables = {"bounds": bounds, "costs": costs, "stopping": stopping}
+    tables = {"bounds": bounds, "constants": constants, "costs": costs, "stopping": stopping}
     measure("bounds", TITLE, TEXT, tables, figures)
