@@ -75,17 +75,16 @@ def _element_matrices(
     """
     lam, shear = constants
     mapping, places, shape = basis.mapping, basis.X, basis.elem.elem
-    fields = [
-        shape.gbasis(mapping, places, i, tind=elements)[0]
-        for i in range(basis.Nbfun // len(basis.mesh.p))
-    ]
+    values, slopes = zip(
+        *(shape.lbasis(places, i) for i in range(basis.Nbfun // len(basis.mesh.p)))
+    )
+    inverse = mapping.invDF(places, tind=elements)  # (b, a, element, point)
     x = mapping.F(places, tind=elements)
     measure = np.abs(mapping.detDF(places, tind=elements)) * basis.W * weight_at(weight, x)
-    g = np.stack([np.asarray(f.grad) for f in fields])  # (i, a, element, point)
-    g = np.ascontiguousarray(np.moveaxis(g, (2, 0, 1, 3), (0, 1, 2, 3)))  # (element, i, a, point)
+    g = np.einsum("baeq,ibq->eiaq", inverse, np.stack(slopes), optimize=True)
     divergence = g
     if weight[1]:
-        hoop = np.stack([np.asarray(f) for f in fields], axis=1) / x[0][:, None]
+        hoop = np.stack(values) / x[0][:, None]
         divergence = g.copy()
         divergence[:, :, 0] += hoop
     K = lam * _pairs(divergence, measure)
