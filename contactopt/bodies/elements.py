@@ -21,6 +21,7 @@ SIAM J. Sci. Comput. 34, B421-B446.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
@@ -90,9 +91,26 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
     return LeanBasis(mesh, skfem.ElementVector(element), order)
 
 
-def forget(mapping: skfem.mapping.Mapping) -> None:
-    """Free the Jacobians that scikit-fem keeps: a quarter of the stiffness's memory."""
-    getattr(mapping, "_cache", {}).clear()
+def with_jacobians(
+    mapping: skfem.mapping.Mapping, X: np.ndarray, elements: Any
+) -> skfem.mapping.Mapping:
+    """The mapping that knows its Jacobians at places X, (dim, q) or (dim, element, q), of elements.
+
+    scikit-fem makes one entry after the other, evaluates all shape functions for each, and keeps
+    them in the mesh, where they take a quarter of the memory of the stiffness.
+    """
+    if isinstance(mapping, skfem.MappingAffine):
+        return mapping
+    mesh = mapping.mesh
+    corners = mesh.doflocs[:, mesh.dofs.element_dofs[:, elements]]  # (a, i, element)
+    slopes = np.stack([mapping.elem.lbasis(X, i)[1] for i in range(corners.shape[1])])
+    if X.ndim == 2:
+        J = np.tensordot(corners, slopes, (1, 0)).swapaxes(1, 2)  # (a, b, element, q)
+    else:
+        J = np.einsum("aie,ibeq->abeq", corners, slopes)
+    mapping = copy(mapping)  # the mesh keeps its own
+    mapping.J = lambda a, b, *_, **__: J[a, b]
+    return mapping
 
 
 class LeanBasis(skfem.CellBasis):
@@ -111,7 +129,8 @@ class LeanBasis(skfem.CellBasis):
         bad = np.zeros(self.nelems, dtype=bool)
         with np.errstate(all="ignore"):
             try:
-                ratio = np.broadcast_to(self.mapping.detDF(self.X), (self.nelems, len(self.W)))
+                mapping = with_jacobians(self.mapping, self.X, slice(None))
+                ratio = np.broadcast_to(mapping.detDF(self.X), (self.nelems, len(self.W)))
                 bad = ~((ratio.min(axis=1) > 0) | (ratio.max(axis=1) < 0))
             except Exception as error:  # scikit-fem has no name for it
                 raise InputError(
@@ -123,7 +142,6 @@ class LeanBasis(skfem.CellBasis):
             raise InputError(
                 f"the mesh has an element without volume, or one that folds over, at ({place})."
             )
-        forget(self.mapping)
         return np.asarray(np.abs(ratio))
 
 
@@ -268,9 +286,9 @@ class Faces:
     @property
     def normals(self) -> np.ndarray:
         """(dim, f, q) outward unit normals."""
-        mesh = self.mesh
-        normals = mesh._mapping().normals(self.inside, self.owner, self.facets, mesh.t2f)
-        return np.asarray(normals)
+        mapping = with_jacobians(self.mesh._mapping(), self.inside, self.owner)
+        known = self.inside, self.owner, self.facets, self.mesh.t2f
+        return np.asarray(mapping.normals(*known))
 
     def values(self, shape: skfem.Element) -> np.ndarray:
         """(f, i, q) values of the shape functions of the elements."""
