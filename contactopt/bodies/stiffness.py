@@ -20,16 +20,7 @@ class Stiffness(sp.bsr_matrix):
     """
 
     def __getitem__(self, key: Any) -> Any:
-        if not isinstance(key, slice):
-            return self.tocsr()[key]
-        height = self.blocksize[0]
-        first, stop, _ = key.indices(self.shape[0])
-        top, bottom = first // height, -(-stop // height)
-        entries = slice(int(self.indptr[top]), int(self.indptr[bottom]))
-        starts = self.indptr[top : bottom + 1] - self.indptr[top]
-        rows = (bottom - top) * height, self.shape[1]
-        part = sp.bsr_matrix((self.data[entries], self.indices[entries], starts), rows)
-        return part.tocsr()[first - top * height : stop - top * height]
+        return self.tocsr()[key]
 
 
 def isotropic_stiffness(
