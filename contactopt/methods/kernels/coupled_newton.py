@@ -19,7 +19,7 @@ systems; Murphy, Golub, Wathen (2000), A note on preconditioning for indefinite 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -80,6 +80,11 @@ class Coupled:
         """The relative displacements u (k, d)."""
         u = self.form.moved(at.X, at.r.ravel()) + self.equations.V @ at.multipliers
         return np.asarray(u.reshape(at.r.shape) + self.equations.q)
+
+    def misfit(self, at: State) -> float:
+        """The energy that belongs to the residual of the contact equations."""
+        P, _ = self.equations.project(at.r - self.equations.rho[:, None] * self.moved(at))
+        return float(np.sum((P - at.r) ** 2 / self.equations.rho[:, None]))
 
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
         """The right side of Newton's step in parts for X, r, the balance; its contact equations."""
@@ -156,7 +161,7 @@ def coupled_steps(
         at = (
             _bonded(problem, coupled, constants.COUPLED_FIRST)
             if start is None
-            else State(in_equilibrium(form, start[0], constants.GIVEN_BALANCE), *start)
+            else State(_given(coupled, *start), *start)
         )
         if start is None:
             expect(slower=(spent() - before) / (USUAL * form.size))
@@ -220,8 +225,28 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
-    """X close to A^-1 T' r for forces r (k, dim), by CG with one V-cycle, to rtol in energy."""
+def _given(coupled: Coupled, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
+    """Displacements under given forces. Newton's step improves forces and displacements together,
+    so that these need not be much more accurate than those.
+    """
+    share = constants.COUPLED_FIRST**2
+    return in_equilibrium(
+        coupled.form,
+        r,
+        constants.GIVEN_BALANCE,
+        lambda X: share * coupled.misfit(State(X, r, multipliers)),
+    )
+
+
+def in_equilibrium(
+    form: CoupledForm,
+    r: np.ndarray,
+    rtol: float,
+    allowed: Callable[[Stacked], float] = lambda X: 0.0,
+) -> Stacked:
+    """X close to A^-1 T' r for forces r (k, dim), by CG with one V-cycle, to rtol in energy, or
+    until the energy of the error is as small as is `allowed` at X.
+    """
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X
@@ -230,7 +255,7 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
         z = form.approximate(residual)
         size, previous = residual.dot(z), size
         goal = goal if step else rtol**2 * size
-        if not size > goal:
+        if not size > max(goal, allowed(X)):
             break
         p = z + (size / previous if step else 0.0) * p
         Ap = form.stiffness(p)
