@@ -10,9 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.linear.counter import Counter
+from contactopt.linear.deadline import check_time
 from contactopt.linear.stacked import Stacked, in_turn
 
 Act = Callable[[np.ndarray], np.ndarray]
+MOST_ITERATIONS = 60  # conjugate gradient iterations towards equilibrium
 
 
 class BodyTerm(Protocol):
@@ -145,3 +147,32 @@ class CoupledForm:
         return replace(
             self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor
         )
+
+
+def in_equilibrium(
+    form: CoupledForm,
+    r: np.ndarray,
+    rtol: float,
+    allowed: Callable[[Stacked], float] = lambda X: 0.0,
+    first: Stacked | None = None,
+) -> Stacked:
+    """X close to A^-1 T' r for forces r, by conjugate gradients with one V-cycle from `first` on,
+    to rtol in energy, or until the energy of the error is as small as is `allowed` at X.
+    """
+    pulled = form.pulled(r.ravel())
+    X = 0.0 * pulled if first is None else first
+    residual = pulled if first is None else pulled - form.stiffness(first)
+    size, goal, p = 1.0, 0.0 if first is None else rtol**2 * first.dot(pulled), X
+    for step in range(MOST_ITERATIONS):
+        check_time()
+        z = form.approximate(residual)
+        size, previous = residual.dot(z), size
+        goal = goal if step or first is not None else rtol**2 * size
+        if not size > max(goal, allowed(X)):
+            break
+        p = z + (size / previous if step else 0.0) * p
+        Ap = form.stiffness(p)
+        alpha = size / p.dot(Ap)
+        X = X + alpha * p
+        residual = residual - alpha * Ap
+    return X

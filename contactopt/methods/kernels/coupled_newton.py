@@ -19,7 +19,7 @@ systems; Murphy, Golub, Wathen (2000), A note on preconditioning for indefinite 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -27,9 +27,8 @@ import numpy as np
 
 from contactopt.linear.budget import expect, spent
 from contactopt.linear.concurrency import one_blas_thread
-from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
-from contactopt.linear.saddle_point import CoupledForm
+from contactopt.linear.saddle_point import CoupledForm, in_equilibrium
 from contactopt.linear.stacked import Stacked, norm
 from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
@@ -48,7 +47,6 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
-MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
 USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
 IDLE = 3  # steps without progress after which it begins anew
 
@@ -229,40 +227,11 @@ def _given(coupled: Coupled, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
     """Displacements under given forces. Newton's step improves forces and displacements together,
     so that these need not be much more accurate than those.
     """
-    share = constants.COUPLED_FIRST**2
-    return in_equilibrium(
-        coupled.form,
-        r,
-        constants.GIVEN_BALANCE,
-        lambda X: share * coupled.misfit(State(X, r, multipliers)),
-    )
 
+    def allowed(X: Stacked) -> float:
+        return constants.COUPLED_FIRST**2 * coupled.misfit(State(X, r, multipliers))
 
-def in_equilibrium(
-    form: CoupledForm,
-    r: np.ndarray,
-    rtol: float,
-    allowed: Callable[[Stacked], float] = lambda X: 0.0,
-) -> Stacked:
-    """X close to A^-1 T' r for forces r (k, dim), by CG with one V-cycle, to rtol in energy, or
-    until the energy of the error is as small as is `allowed` at X.
-    """
-    residual = form.pulled(r.ravel())
-    X, size, goal = 0.0 * residual, 1.0, 0.0
-    p = X
-    for step in range(MOST_ITERATIONS):
-        check_time()
-        z = form.approximate(residual)
-        size, previous = residual.dot(z), size
-        goal = goal if step else rtol**2 * size
-        if not size > max(goal, allowed(X)):
-            break
-        p = z + (size / previous if step else 0.0) * p
-        Ap = form.stiffness(p)
-        alpha = size / p.dot(Ap)
-        X = X + alpha * p
-        residual = residual - alpha * Ap
-    return X
+    return in_equilibrium(coupled.form, r, constants.GIVEN_BALANCE, allowed)
 
 
 def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
