@@ -150,25 +150,21 @@ class CoupledForm:
 
 
 def in_equilibrium(
-    form: CoupledForm,
-    r: np.ndarray,
-    rtol: float,
-    allowed: Callable[[Stacked], float] = lambda X: 0.0,
-    first: Stacked | None = None,
+    form: CoupledForm, r: np.ndarray, rtol: float, first: Stacked | None = None
 ) -> Stacked:
     """X close to A^-1 T' r for forces r, by conjugate gradients with one V-cycle from `first` on,
-    to rtol in energy, or until the energy of the error is as small as is `allowed` at X.
+    to rtol in energy.
     """
     pulled = form.pulled(r.ravel())
     X = 0.0 * pulled if first is None else first
     residual = pulled if first is None else pulled - form.stiffness(first)
-    size, goal, p = 1.0, 0.0 if first is None else rtol**2 * first.dot(pulled), X
+    size, p, whole = 1.0, X, X.dot(pulled)
     for step in range(MOST_ITERATIONS):
         check_time()
         z = form.approximate(residual)
         size, previous = residual.dot(z), size
-        goal = goal if step or first is not None else rtol**2 * size
-        if not size > max(goal, allowed(X)):
+        whole = whole if step or first is not None else size
+        if not size > rtol**2 * whole:
             break
         p = z + (size / previous if step else 0.0) * p
         Ap = form.stiffness(p)

@@ -79,11 +79,6 @@ class Coupled:
         u = self.form.moved(at.X, at.r.ravel()) + self.equations.V @ at.multipliers
         return np.asarray(u.reshape(at.r.shape) + self.equations.q)
 
-    def misfit(self, at: State) -> float:
-        """The energy that belongs to the residual of the contact equations."""
-        P, _ = self.equations.project(at.r - self.equations.rho[:, None] * self.moved(at))
-        return float(np.sum((P - at.r) ** 2 / self.equations.rho[:, None]))
-
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
         """The right side of Newton's step in parts for X, r, the balance; its contact equations."""
         equations = self.equations
@@ -159,7 +154,7 @@ def coupled_steps(
         at = (
             _bonded(problem, coupled, constants.COUPLED_FIRST)
             if start is None
-            else State(_given(coupled, *start), *start)
+            else State(in_equilibrium(form, start[0], constants.GIVEN_BALANCE), *start)
         )
         if start is None:
             expect(slower=(spent() - before) / (USUAL * form.size))
@@ -221,17 +216,6 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
     factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / constants.SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
-
-
-def _given(coupled: Coupled, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
-    """Displacements under given forces. Newton's step improves forces and displacements together,
-    so that these need not be much more accurate than those.
-    """
-
-    def allowed(X: Stacked) -> float:
-        return constants.COUPLED_FIRST**2 * coupled.misfit(State(X, r, multipliers))
-
-    return in_equilibrium(coupled.form, r, constants.GIVEN_BALANCE, allowed)
 
 
 def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
