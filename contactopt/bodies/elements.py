@@ -218,20 +218,20 @@ def contact_trace(
 
 def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:
     """Nodes (f, j) of a boundary's faces, corners first and cyclic."""
-    return _numbered(basis, Faces(basis.mesh, boundary, _node_places(basis, degree)))[1]
+    if degree == 1:
+        return np.asarray(basis.mesh.facets[:, boundary].T)
+    places = FACES[basis.mesh.refdom.__name__][2]
+    return _numbered(basis, Faces(basis.mesh, boundary, places))[1]
 
 
 def face_nodes(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same, and the mean outward normals (dim, f)."""
-    at = Faces(basis.mesh, boundary, _node_places(basis, degree))
-    return _numbered(basis, at)[1], at.normals.mean(axis=2)
-
-
-def _node_places(basis: skfem.CellBasis, degree: int) -> np.ndarray:
     _, hat, places, _ = FACES[basis.mesh.refdom.__name__]
-    return places if degree == 2 else places[:, : hat.doflocs.shape[0]]
+    places = places if degree == 2 else places[:, : hat.doflocs.shape[0]]
+    normals = Faces(basis.mesh, boundary, places).normals
+    return nodes_on(basis, degree, boundary), normals.mean(axis=2)
 
 
 def _cell_rule(
