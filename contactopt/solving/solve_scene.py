@@ -45,7 +45,8 @@ class Options:
     Q : form of the interface operator, as for contactopt.reduce
     solver : of the bodies' linear systems, as for contactopt.reduce
     method : as for contactopt.solve
-    tol : bound on the natural-map residual
+    tol : bound on the natural-map residual; above the usual one the last step comes no further, and
+        what is read off the bodies is as accurate
     settings : further arguments of contactopt.solve: limits, and settings of a method that is given
         by its name
     note : receives one short sentence before every step that takes time, and in long solves one
