@@ -3,6 +3,7 @@ few solves.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from contactopt import (
 )
 from contactopt.bodies.solvers.multigrid import MultigridSolver, conjugate_gradients
 from contactopt.coupling import costs
+from contactopt.linear.deadline import enough
 from contactopt.linear.flexible_gmres import flexible_gmres
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.linear.stacked import Stacked, norm
@@ -37,6 +39,7 @@ from contactopt.scenes import make_scene
 from contactopt.solving import progress
 from contactopt.solving.solve_scene import Options, solve_scene
 
+ON_BODIES = partial(Options, "auto", "multigrid", "newton")
 SMALL = {"punch-2d": 16, "punch-3d": 4, "sphere": 8, "cattaneo-3d": 3, "cylinder-2d": 8}
 
 
@@ -111,6 +114,44 @@ def test_the_form_is_the_operator_before_condensation():
     before = form.cycles
     scaled.approximate(form.pulled(r))
     assert form.cycles == scaled.cycles == before + 1  # scaled forms count together
+
+
+def test_products_with_forces_whose_displacements_are_known_begin_there():
+    problem = reduce(scenes.flat_punch(3), 4, solver="multigrid")
+    form, r = problem.Q.coupled, np.random.default_rng(0).normal(size=problem.q.size)
+    Q = problem.Q.knowing(r, in_equilibrium(form, r, 1e-6))
+    full, before = problem.Q @ r, form.cycles
+    size = np.linalg.norm(full)
+    for own, error, cycles in ((Q, 1e-9, 9), (Q.loosened(1e-5), 1e-5, 1)):
+        before = form.cycles
+        assert np.linalg.norm(own @ r - full) < error * size and form.cycles - before <= cycles
+    assert np.linalg.norm(Q @ (2 * r) - 2 * full) < 1e-9 * size  # other forces are unknown
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-5, 1e-3])
+def test_a_solve_that_stops_in_time_is_what_it_says(tol):
+    """By entries of Q; and what is read off it is as accurate as it is."""
+    scene = make_scene("cattaneo-3d")
+    dense, solved = reduce(scene, 4, Q="explicit"), solve_scene(scene, 4, None, ON_BODIES(tol))
+    found, problem = solved.solution, solved.reduction.problem
+    assert found.solved and found.residual <= tol
+    assert natural_map_residual(dense, found.reactions, found.multipliers) <= 1.1 * tol
+    before = problem.Q.coupled.cycles
+    u = problem.displacements(found.reactions, found.multipliers)
+    assert problem.Q.coupled.cycles - before <= 4
+    exact = dense.displacements(found.reactions, found.multipliers)
+    assert np.abs(u - exact).max() < tol * np.abs(exact).max()
+
+
+def test_the_last_step_of_a_solve_that_stops_in_time_is_short():
+    """It takes fewer V-cycles than the same step of a solve that goes on, from the same point."""
+    scene = make_scene("cattaneo-3d")
+    rows = [solve_scene(scene, 6, None, ON_BODIES(tol)).solution.history for tol in (1e-8, 1e-5)]
+    spent = [np.diff([row["cycles"] for row in own]) for own in rows]
+    last = len(rows[1]) - 1
+    assert rows[0][last - 1]["residual"] == rows[1][last - 1]["residual"] > 1e-5
+    assert spent[1][last - 1] < spent[0][last - 1]
+    assert enough() == 0.0
 
 
 def test_the_certificate_counts_what_is_missing_to_equilibrium():

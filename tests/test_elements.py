@@ -28,9 +28,11 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.body import build_body
-from contactopt.bodies.elements import contact_trace, make_basis, weight_at
+from contactopt.bodies.elements import Faces, contact_trace, make_basis, weight_at
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.material import lame
+from contactopt.meshes.cells import CURVED
+from contactopt.meshes.cells import SHAPES as CELLS
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
 from contactopt.scenes.common import with_elements
 
@@ -42,6 +44,28 @@ SHAPES = [(kind, degree, cut) for kind in KINDS for degree in (1, 2) for cut in 
 def body_of(kind: str, degree: int, cut: bool, **part):
     scene = with_elements(two_blocks(kind), degree, cut)
     return build_body(scene, replace(scene.lower, **part), 1, None)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("name", CELLS)
+def test_places_on_facets_are_known_in_the_elements(name, curved):
+    """The element's own map takes them back to the facet, and the facet's normals point outwards:
+    with the divergence theorem the integral of x . n is dim times the volume.
+    """
+    kind, elements = CELLS[name]
+    dim = kind().p.shape[0]
+    random = np.random.default_rng(0)
+    mesh = kind.init_tensor(*[np.linspace(0, 1, 4)] * dim)
+    mesh = kind(mesh.p + 0.05 * random.uniform(-1, 1, mesh.p.shape), mesh.t)
+    if curved:
+        places = skfem.Basis(mesh, elements[2]()).doflocs
+        mesh = CURVED[name](places + 0.01 * random.uniform(-1, 1, places.shape), mesh.t)
+    points, weights = skfem.quadrature.get_quadrature(mesh.brefdom, 6)
+    at = Faces(mesh, mesh.boundary_facets(), points)
+    assert np.abs(mesh.mapping().F(at.inside, at.owner) - at.places).max() < 1e-14
+    flux = np.sum(at.places * at.normals * at.scale * weights)
+    volume = skfem.Basis(mesh, elements[2](), intorder=6).dx.sum()
+    assert flux == pytest.approx(dim * volume, rel=1e-12)
 
 
 @pytest.mark.parametrize("kind,degree,cut", SHAPES)

@@ -18,7 +18,12 @@ from contactopt.bodies.body import build_body
 from contactopt.bodies.solvers import SOLVERS, choose, make_solver, multigrid, solver_type
 from contactopt.bodies.solvers import sparse_products as products
 from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM, RTOL
-from contactopt.bodies.solvers.multigrid import conjugate_gradients, near_neighbours, rigid_motions
+from contactopt.bodies.solvers.multigrid import (
+    conjugate_gradients,
+    near_neighbours,
+    nodal_blocks,
+    rigid_motions,
+)
 from contactopt.bodies.solvers.ordering import elimination_order, minimum_degree, nested_dissection
 from contactopt.bodies.solvers.sparse_products import SparseProduct
 from contactopt.bodies.solvers.system import Block, System
@@ -352,6 +357,22 @@ def test_a_block_is_the_matrix_without_the_other_rows():
     assert np.array_equal(
         made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b)
     )
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_blocks_of_the_stiffness_are_those_of_its_rows(degree):
+    """Of a body with held components at some nodes and others that are held altogether."""
+    scene = scenes.make_scene("punch-3d", degree=degree)
+    body = build_body(scene, scene.lower, 3, scene.zone)
+    dofs, free = body.unknowns, body.free
+    node, component = np.empty((2, dofs.size), dtype=int)
+    node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
+    known = node[free], component[free], len(dofs)
+    fast, place, present = nodal_blocks(Block(body.A, free), *known)
+    slow, *others = nodal_blocks(body.A[free][:, free], *known)
+    assert len(present) < dofs.shape[1] and len(place) < fast.shape[0]
+    assert fast.blocksize == (3, 3) and abs(fast - slow).max() == 0
+    assert np.array_equal(place, others[0]) and np.array_equal(present, others[1])
 
 
 def test_names_that_do_not_exist():

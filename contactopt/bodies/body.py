@@ -19,9 +19,9 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import (
     Weight,
     contact_trace,
-    face_nodes,
     make_basis,
     node_unknowns,
+    nodes_on,
     weight_at,
 )
 from contactopt.bodies.motions import check_free, free_motions
@@ -174,7 +174,7 @@ def _mirrored_nodes(
     facets = facets[np.any(np.all(fixed[:, mesh.facets[:, facets]], axis=1), axis=0)]
     if scene.copies == 1 or not len(facets):
         return made
-    nodes = face_nodes(basis, scene.degree, facets)[0].T  # (nodes of a facet, facets)
+    nodes = nodes_on(basis, scene.degree, facets).T  # (nodes of a facet, facets)
     places, fixed = basis.doflocs[:, unknowns[0]][:, nodes], fixed[:, nodes]
     size = float(np.ptp(mesh.p, axis=1).max())
     for axis in range(len(unknowns)):
@@ -211,7 +211,7 @@ class _Constraints:
         """Those of one component on a boundary."""
         facets = np.asarray(self.basis.mesh.boundaries[boundary])
         own = node_unknowns(self.basis)[self.scene.components.index(component)]
-        return np.intersect1d(self.basis.get_dofs(facets=facets).flatten(), own)
+        return np.unique(own[nodes_on(self.basis, self.scene.degree, facets)])
 
     def hold(self, name: str, where: np.ndarray) -> None:
         """Let the support or plate of that name hold unknowns that nobody else holds."""

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -57,7 +57,6 @@ TIED = {
     "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]),
 }
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
-Rule: TypeAlias = tuple[np.ndarray, np.ndarray]  # places and weights of a quadrature
 NOISE = 1e-14  # what rounding leaves of a zero
 
 
@@ -92,9 +91,26 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
     return LeanBasis(mesh, skfem.ElementVector(element), order)
 
 
-def forget(mapping: skfem.mapping.Mapping) -> None:
-    """Free the Jacobians that scikit-fem keeps: a quarter of the stiffness's memory."""
-    getattr(mapping, "_cache", {}).clear()
+def with_jacobians(
+    mapping: skfem.mapping.Mapping, X: np.ndarray, elements: Any
+) -> skfem.mapping.Mapping:
+    """The mapping that knows its Jacobians at places X, (dim, q) or (dim, element, q), of elements.
+
+    scikit-fem makes one entry after the other, evaluates all shape functions for each, and keeps
+    them in the mesh, where they take a quarter of the memory of the stiffness.
+    """
+    if isinstance(mapping, skfem.MappingAffine):
+        return mapping
+    mesh = mapping.mesh
+    corners = mesh.doflocs[:, mesh.dofs.element_dofs[:, elements]]  # (a, i, element)
+    slopes = np.stack([mapping.elem.lbasis(X, i)[1] for i in range(corners.shape[1])])
+    if X.ndim == 2:
+        J = np.tensordot(corners, slopes, (1, 0)).swapaxes(1, 2)  # (a, b, element, q)
+    else:
+        J = np.einsum("aie,ibeq->abeq", corners, slopes)
+    mapping = copy(mapping)  # the mesh keeps its own
+    mapping.J = lambda a, b, *_, **__: J[a, b]
+    return mapping
 
 
 class LeanBasis(skfem.CellBasis):
@@ -113,7 +129,8 @@ class LeanBasis(skfem.CellBasis):
         bad = np.zeros(self.nelems, dtype=bool)
         with np.errstate(all="ignore"):
             try:
-                ratio = np.broadcast_to(self.mapping.detDF(self.X), (self.nelems, len(self.W)))
+                mapping = with_jacobians(self.mapping, self.X, slice(None))
+                ratio = np.broadcast_to(mapping.detDF(self.X), (self.nelems, len(self.W)))
                 bad = ~((ratio.min(axis=1) > 0) | (ratio.max(axis=1) < 0))
             except Exception as error:  # scikit-fem has no name for it
                 raise InputError(
@@ -125,7 +142,6 @@ class LeanBasis(skfem.CellBasis):
             raise InputError(
                 f"the mesh has an element without volume, or one that folds over, at ({place})."
             )
-        forget(self.mapping)
         return np.asarray(np.abs(ratio))
 
 
@@ -158,7 +174,7 @@ def contact_trace(
     `tied`, every node of the boundary is a contact, as where it is tied to another body.
     """
     name = basis.mesh.refdom.__name__
-    shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
+    places, cells = FACES[name][2:]
     if degree == 1:
         cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
@@ -166,12 +182,13 @@ def contact_trace(
         cells = TIED.get(name, cells)
     # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape
     # functions at all of them.
-    phi, rule = _cell_rule(name, places, cells, degree)
-    at = face_basis(basis.mesh, shape, boundary, rule)
-    N, node = _face_shapes(at, shape, boundary, places)
+    phi, points, share = _cell_rule(name, places, cells, degree)
+    at = Faces(basis.mesh, boundary, points)
+    local, node = _numbered(basis, Faces(basis.mesh, boundary, places))
+    N = np.take_along_axis(at.values(basis.elem.elem), local[:, :, None], axis=1)
     split = (len(boundary), len(cells), phi.shape[1])  # face, cell, point
-    flat = np.asarray(at.dx)
-    measure = (flat * weight_at(weight, np.asarray(at.global_coordinates()))).reshape(split)
+    flat = at.scale * share
+    measure = (flat * weight_at(weight, at.places)).reshape(split)
     # For every face f and cell c: int phi_v, int phi_v phi_w and int phi_v N_j.
     area = np.einsum("vq,fcq->fcv", phi, measure)
     mass = np.einsum("vq,wq,fcq->fcvw", phi, phi, measure)
@@ -181,7 +198,7 @@ def contact_trace(
     dual = area[..., None] * np.linalg.solve(mass, mixed)  # int psi_v N_j
     # Normals are averaged with the hat functions, and areas summed, over the cells that meet in a
     # contact.
-    normal = np.einsum("vq,dfcq->dfcv", phi, (np.asarray(at.normals) * flat).reshape(-1, *split))
+    normal = np.einsum("vq,dfcq->dfcv", phi, (at.normals * flat).reshape(-1, *split))
     nodes, rows = np.unique(node[:, cells], return_inverse=True)
     rows = rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel())
@@ -199,58 +216,93 @@ def contact_trace(
     return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
 
 
+def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:
+    """Nodes (f, j) of a boundary's faces, corners first and cyclic."""
+    if degree == 1:
+        return np.asarray(basis.mesh.facets[:, boundary].T)
+    places = FACES[basis.mesh.refdom.__name__][2]
+    return _numbered(basis, Faces(basis.mesh, boundary, places))[1]
+
+
 def face_nodes(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (f, j) of a boundary's faces, corners first and cyclic; outward normals (dim, f)."""
-    name = basis.mesh.refdom.__name__
-    shape, places = SHAPES[name][1][degree](), FACES[name][2]
-    if degree == 1:
-        places = places[:, : FACES[name][1].doflocs.shape[0]]
-    at = face_basis(basis.mesh, shape, boundary, (places, np.ones(places.shape[1])))
-    return _face_shapes(at, shape, boundary, places)[1], np.asarray(at.normals).mean(axis=2)
+    """The same, and the mean outward normals (dim, f)."""
+    _, hat, places, _ = FACES[basis.mesh.refdom.__name__]
+    places = places if degree == 2 else places[:, : hat.doflocs.shape[0]]
+    normals = Faces(basis.mesh, boundary, places).normals
+    return nodes_on(basis, degree, boundary), normals.mean(axis=2)
 
 
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
-) -> tuple[np.ndarray, Rule]:
-    """Hat functions (v, point) on a cell, and the reference face's rule of one rule per cell."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Hat functions (v, point) on a cell, and the points (dim - 1, q) and weights (q,) of the
+    reference face's rule of one rule per cell.
+    """
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])
     everywhere = np.concatenate([places[:, cell] @ phi for cell in cells], axis=1)
-    return phi, (everywhere, np.tile(share / len(cells), len(cells)))
+    return phi, everywhere, np.tile(share / len(cells), len(cells))
 
 
-def face_basis(
-    mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: Rule
-) -> skfem.FacetBasis:
-    """FacetBasis that finds the places on elements to the rounding of the coordinates; scikit-fem
-    asks for 1e-12 of an element, out of reach for small elements far from the origin.
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Points (dim - 1, q) of the reference face, on every facet (f,) of a mesh.
+
+    Where they lie in the elements is known at once: on the face of the reference element that has
+    the same corners. (scikit-fem's FacetBasis looks for them by Newton's method, to 1e-12 of an
+    element, which is out of reach for small elements far from the origin.)
     """
-    mapping = mesh._mapping()
-    if not isinstance(mapping, skfem.MappingAffine):
-        corners = mesh.p[:, mesh.facets[:, boundary]]
-        least = np.ptp(corners, axis=1).max(axis=0).min()
-        rounding = np.finfo(float).eps * np.abs(corners).max() / least
-        tolerance = max(1e-12, 16 * rule[0].shape[1] * rounding)
-        mapping = copy(mapping)  # the mesh keeps its own
-        mapping.invF = partial(type(mapping).invF, mapping, newton_tol=tolerance)
-    return skfem.FacetBasis(mesh, shape, mapping, facets=boundary, quadrature=rule)
+
+    mesh: skfem.Mesh
+    facets: np.ndarray
+    points: np.ndarray
+
+    @cached_property
+    def owner(self) -> np.ndarray:
+        """(f,) the element of each facet."""
+        return np.asarray(self.mesh.f2t[0, self.facets])
+
+    @cached_property
+    def inside(self) -> np.ndarray:
+        """(dim, f, q) places in the reference element."""
+        corners, hat = self.mesh.facets[:, self.facets], FACES[self.mesh.refdom.__name__][1]
+        local = np.argmax(self.mesh.t[:, None, self.owner] == corners, axis=0)
+        hats = np.stack([hat.lbasis(self.points, v)[0] for v in range(len(corners))])
+        return np.einsum("dvf,vq->dfq", self.mesh.refdom.p[:, local], hats)
+
+    @property
+    def places(self) -> np.ndarray:
+        """(dim, f, q) places on the facets."""
+        return np.asarray(self.mesh._mapping().G(self.points, find=self.facets))
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(f, q) area per area of the reference face."""
+        return np.abs(self.mesh._mapping().detDG(self.points, find=self.facets))
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(dim, f, q) outward unit normals."""
+        mapping = with_jacobians(self.mesh._mapping(), self.inside, self.owner)
+        known = self.inside, self.owner, self.facets, self.mesh.t2f
+        return np.asarray(mapping.normals(*known))
+
+    def values(self, shape: skfem.Element) -> np.ndarray:
+        """(f, i, q) values of the shape functions of the elements."""
+        functions = range(shape.doflocs.shape[0])
+        return np.stack([shape.lbasis(self.inside, i)[0] for i in functions], axis=1)
 
 
-def _face_shapes(
-    at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Values (face, j, point) of the face's shape functions at `at`, and their nodes."""
-    nodal = face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
-    # Of the element's shape functions, the one of a node is that which is 1 there.
-    local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)
-    N = np.take_along_axis(
-        np.stack([np.asarray(f[0]) for f in at.basis], axis=1), local[:, :, None], axis=1
-    )
-    unknowns = np.take_along_axis(nodal.element_dofs.T, local, axis=1)
-    return N, np.argsort(node_unknowns(nodal)[0])[unknowns]
+def _numbered(basis: skfem.CellBasis, nodal: Faces) -> tuple[np.ndarray, np.ndarray]:
+    """Which of an element's shape functions, and which node of the mesh, is at each of the places
+    (f, j) of `nodal`: the one that is 1 there.
+    """
+    dim = len(basis.mesh.p)
+    local = np.argmax(nodal.values(basis.elem.elem), axis=1)
+    return local, basis.element_dofs[::dim][local, nodal.owner[:, None]] // dim
 
 
 def _clean(values: np.ndarray) -> np.ndarray:

@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import Weight, forget, weight_at
+from contactopt.bodies.elements import Weight, weight_at, with_jacobians
 
-PIECE = 2**20  # entries of element matrices that are held at the same time
+PIECE = 2**18  # entries of element matrices that are held at the same time; they stay in the cache
 
 
 class Stiffness(sp.bsr_matrix):
@@ -20,16 +20,7 @@ class Stiffness(sp.bsr_matrix):
     """
 
     def __getitem__(self, key: Any) -> Any:
-        if not isinstance(key, slice):
-            return self.tocsr()[key]
-        height = self.blocksize[0]
-        first, stop, _ = key.indices(self.shape[0])
-        top, bottom = first // height, -(-stop // height)
-        entries = slice(int(self.indptr[top]), int(self.indptr[bottom]))
-        starts = self.indptr[top : bottom + 1] - self.indptr[top]
-        rows = (bottom - top) * height, self.shape[1]
-        part = sp.bsr_matrix((self.data[entries], self.indices[entries], starts), rows)
-        return part.tocsr()[first - top * height : stop - top * height]
+        return self.tocsr()[key]
 
 
 def isotropic_stiffness(
@@ -60,42 +51,39 @@ def isotropic_stiffness(
         piece = np.arange(start, min(start + size, len(nodes)))
         own = nodes[piece].astype(np.int64)
         pair = np.searchsorted(known, own[:, :, None] * graph.shape[0] + own[:, None, :])
-        place = dim * dim * pair[:, :, None, :, None] + within[:, None, :]
-        K = _element_matrices(basis, piece, constants, weight)  # (element, i, a, j, b)
+        place = dim * dim * pair[:, None, :, None, :] + within[:, None, :, None]
+        K = _element_matrices(basis, piece, constants, weight)  # (element, a, i, b, j)
         np.add.at(data.reshape(-1), place.ravel(), K.ravel())
-        forget(basis.mapping)
     return Stiffness((data, graph.indices, graph.indptr), (basis.N, basis.N))
 
 
 def _element_matrices(
     basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: Weight
 ) -> np.ndarray:
-    """Element stiffness (element, i, a, j, b) as one product: the integral of lambda g_ia g_jb + G
+    """Element stiffness (element, a, i, b, j) as one product: the integral of lambda g_ia g_jb + G
     g_ib g_ja + G (g_i . g_j) delta_ab, with g_ia the derivative of N_i by a.
     """
     lam, shear = constants
-    mapping, places, shape = basis.mapping, basis.X, basis.elem.elem
-    fields = [
-        shape.gbasis(mapping, places, i, tind=elements)[0]
-        for i in range(basis.Nbfun // len(basis.mesh.p))
-    ]
-    x = mapping.F(places, tind=elements)
-    measure = np.abs(mapping.detDF(places, tind=elements)) * basis.W * weight_at(weight, x)
-    g = np.stack([np.asarray(f.grad) for f in fields])  # (i, a, element, point)
-    g = np.ascontiguousarray(np.moveaxis(g, (2, 0, 1, 3), (0, 1, 2, 3)))  # (element, i, a, point)
-    divergence = g
-    if weight[1]:
-        hoop = np.stack([np.asarray(f) for f in fields], axis=1) / x[0][:, None]
-        divergence = g.copy()
-        divergence[:, :, 0] += hoop
-    K = lam * _pairs(divergence, measure)
+    places, shape, dim = basis.X, basis.elem.elem, len(basis.mesh.p)
+    mapping = with_jacobians(basis.mapping, places, elements)
+    values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))
+    inverse = mapping.invDF(places, tind=elements)  # (b, a, element, point)
+    g = np.einsum("baeq,ibq->eaiq", inverse, np.stack(slopes), optimize=True)
+    x = mapping.F(places, tind=elements) if weight[1] else np.zeros(1)
+    measure = basis.dx[elements] * weight_at(weight, x)
     H = _pairs(g, measure)
-    K += shear * H.transpose(0, 1, 4, 3, 2)
-    gradients = np.einsum("eiaja->eij", H)
-    for a in range(g.shape[2]):
-        K[:, :, a, :, a] += shear * gradients
+    gradients = np.einsum("eaiaj->eij", H)
     if weight[1]:
-        K[:, :, 0, :, 0] += 2 * shear * _pairs(hoop[:, :, None], measure)[:, :, 0, :, 0]
+        hoop = np.stack(values) / x[0][:, None]
+        divergence = g.copy()
+        divergence[:, 0] += hoop
+        K = lam * _pairs(divergence, measure)
+        K[:, 0, :, 0, :] += 2 * shear * _pairs(hoop[:, None], measure)[:, 0, :, 0, :]
+    else:
+        K = lam * H
+    H *= shear
+    for a, b in np.ndindex(dim, dim):  # K += H.swapaxes(1, 3) takes three times as long
+        K[:, a, :, b, :] += H[:, b, :, a, :] + (shear * gradients if a == b else 0.0)
     return K
 
 
@@ -111,7 +99,7 @@ def _node_graph(nodes: np.ndarray, count: int) -> sp.csr_matrix:
 
 
 def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
-    """Integrals of f_ia f_jb (element, i, a, j, b), from f (element, i, a, point)."""
+    """Integrals of f_ia f_jb (element, a, i, b, j), from f (element, a, i, point)."""
     flat = f.reshape(len(f), -1, f.shape[3])
     return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(
         *f.shape[:3], *f.shape[1:3]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.bodies.elements import face_basis
+from contactopt.bodies.elements import Faces
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
@@ -70,8 +70,8 @@ def _shape(mesh: Any, facets: np.ndarray) -> str:
     """
     from skfem.quadrature import get_quadrature
 
-    basis = face_basis(mesh, mesh.elem(), facets, get_quadrature(mesh.brefdom, DEGREE))
-    x, n = (f.reshape(len(mesh.p), -1) for f in (basis.global_coordinates(), basis.normals))
+    at = Faces(mesh, facets, get_quadrature(mesh.brefdom, DEGREE)[0])
+    x, n = (f.reshape(len(mesh.p), -1) for f in (at.places, at.normals))
     mean = n.mean(axis=1, keepdims=True)
     if np.abs(n - mean).max() < SHAPE:
         return f", normal {_place(mesh, (mean / np.linalg.norm(mean)).ravel())}"

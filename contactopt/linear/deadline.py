@@ -1,5 +1,6 @@
-"""The moment at which the step of a method that runs must give up. The driver looks at its clock
-after each outer iteration; an inner loop that can last longer calls `check_time`.
+"""What the driver asks of the step of a method that runs: when it must give up, and how far it
+needs to come. The driver looks at its clock after each outer iteration; an inner loop that can last
+longer calls `check_time`, and one whose accuracy costs time asks `enough`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 _deadline: ContextVar[float] = ContextVar("deadline of the step that runs", default=float("inf"))
+_enough: ContextVar[float] = ContextVar("residual at which the solve that runs ends", default=0.0)
 
 
 class TimeUp(Exception):
@@ -32,11 +34,25 @@ def time_left() -> float:
     return max(_deadline.get() - time.perf_counter(), 0.0)
 
 
+def enough() -> float:
+    """Tell what share of its present residual the step that runs may leave.
+
+    Returns
+    -------
+    The residual at which the solve ends, over the present one; 0 where nobody asks for less than
+    all digits, and before the first residual is known.
+    """
+    return _enough.get()
+
+
 @contextmanager
-def until(moment: float) -> Iterator[None]:
-    """Set the deadline, a time.perf_counter() [s], in the block; an earlier one stays."""
-    token = _deadline.set(min(moment, _deadline.get()))
+def until(moment: float, enough: float = 0.0) -> Iterator[None]:
+    """Set the deadline, a time.perf_counter() [s], in the block, where an earlier one stays, and
+    the share of the present residual that is small enough.
+    """
+    tokens = _deadline.set(min(moment, _deadline.get())), _enough.set(enough)
     try:
         yield
     finally:
-        _deadline.reset(token)
+        _deadline.reset(tokens[0])
+        _enough.reset(tokens[1])

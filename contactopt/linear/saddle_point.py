@@ -10,9 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.linear.counter import Counter
+from contactopt.linear.deadline import check_time
 from contactopt.linear.stacked import Stacked, in_turn
 
 Act = Callable[[np.ndarray], np.ndarray]
+MOST_ITERATIONS = 60  # conjugate gradient iterations towards equilibrium
 
 
 class BodyTerm(Protocol):
@@ -145,3 +147,28 @@ class CoupledForm:
         return replace(
             self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor
         )
+
+
+def in_equilibrium(
+    form: CoupledForm, r: np.ndarray, rtol: float, first: Stacked | None = None
+) -> Stacked:
+    """X close to A^-1 T' r for forces r, by conjugate gradients with one V-cycle from `first` on,
+    to rtol in energy.
+    """
+    pulled = form.pulled(r.ravel())
+    X = 0.0 * pulled if first is None else first
+    residual = pulled if first is None else pulled - form.stiffness(first)
+    size, p, whole = 1.0, X, X.dot(pulled)
+    for step in range(MOST_ITERATIONS):
+        check_time()
+        z = form.approximate(residual)
+        size, previous = residual.dot(z), size
+        whole = whole if step or first is not None else size
+        if not size > rtol**2 * whole:
+            break
+        p = z + (size / previous if step else 0.0) * p
+        Ap = form.stiffness(p)
+        alpha = size / p.dot(Ap)
+        X = X + alpha * p
+        residual = residual - alpha * Ap
+    return X

@@ -75,6 +75,10 @@ CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
 CENTRAL_KEPT = 0.5  # share of this eigenvalue that a step keeps where it is less
 BACKTRACK = 0.8  # factor by which a step is shortened until it is so
 
+# The step that ends a solve which stops in time (contactopt.methods.kernels.alart_curnier).
+LAST_SHARE = 0.3  # accuracy of the step, over the share of the residual that may be left
+LAST_LOOSEST = 0.5  # bound of it
+
 # Newton's steps from products with Q (contactopt.methods.newton, contactopt.methods.kernels.krylov,
 # .linearised).
 KRYLOV_FIRST = 1e-2  # accuracy of the first step

@@ -192,7 +192,7 @@ def _follow(
     message, proof, doubt = "", None, DOUBT
     while ended is None and proof is None:
         begin = time.perf_counter()
-        iterate, ended, message = _next(steps, recorder.left(), repeated)
+        iterate, ended, message = _next(steps, recorder.left(), repeated, recorder.enough)
         recorder.clock += time.perf_counter() - begin
         repeated = None
         if iterate is not None:
@@ -205,14 +205,15 @@ def _follow(
 
 
 def _next(
-    steps: Iterator[Iterate | Known], left: float, repeated: Status | None
+    steps: Iterator[Iterate | Known], left: float, repeated: Status | None, enough: float
 ) -> tuple[Iterate | Known | None, Status | None, str]:
     """The next iterate with `left` seconds to go, or how and why the iteration ended; `repeated`
-    says how the last iterates repeat earlier ones, which ends a method without another way.
+    says how the last iterates repeat earlier ones, which ends a method without another way, and
+    `enough` what share of the residual may be left.
     """
     try:
         # what overflows is seen below
-        with np.errstate(all="ignore"), until(time.perf_counter() + left):
+        with np.errstate(all="ignore"), until(time.perf_counter() + left, enough):
             iterate = next(steps, None) if repeated is None else _turned(steps)
     except TimeUp:
         return None, Status.TIME_LIMIT, ""
@@ -352,6 +353,13 @@ class _Recorder:
         if len(self.history) >= limits.max_iterations:
             return Status.ITERATION_LIMIT
         return Status.TIME_LIMIT if self.left() <= 0 else None
+
+    @property
+    def enough(self) -> float:
+        """Share of the present residual that a step may leave. Who does not ask for less than the
+        usual tolerance gets all digits of the last step.
+        """
+        return self.limits.tol / self.residual if self.limits.tol > TOL else 0.0
 
     def left(self) -> float:
         """Seconds that the time limit leaves."""

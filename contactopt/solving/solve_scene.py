@@ -19,7 +19,7 @@ from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.errors import InputError
 from contactopt.linear.budget import NextBest, TooDear, open_budget
 from contactopt.linear.convolution import Convolution
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import InterfaceOperator, loosened
 from contactopt.methods.driver import TOL, solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution
@@ -45,7 +45,8 @@ class Options:
     Q : form of the interface operator, as for contactopt.reduce
     solver : of the bodies' linear systems, as for contactopt.reduce
     method : as for contactopt.solve
-    tol : bound on the natural-map residual
+    tol : bound on the natural-map residual; above the usual one the last step comes no further, and
+        what is read off the bodies is as accurate
     settings : further arguments of contactopt.solve: limits, and settings of a method that is given
         by its name
     note : receives one short sentence before every step that takes time, and in long solves one
@@ -230,7 +231,21 @@ def _solved(
     doubts = [0.0] if len(found) == 1 else [_doubt(*pair) for pair in found]
     ranks = range(len(found), 0, -1) if doubts[0] > BEARABLE else doubts
     reduction, solution = min(zip(ranks, found), key=lambda one: (not one[1][1].solved, one[0]))[1]
-    return Solved(reduction, replace(solution, seconds=dict(seconds)))
+    return Solved(
+        _knowing(reduction, solution, options.tol), replace(solution, seconds=dict(seconds))
+    )
+
+
+def _knowing(reduction: Reduction, solution: Solution, tol: float) -> Reduction:
+    """With a Q that need not look for the displacements again that came with the forces of the
+    solution. Where the solution was to be less accurate than usual, so are they.
+    """
+    problem = reduction.problem
+    if solution.displacements is None:
+        return reduction
+    Q = problem.Q.knowing(solution.reactions.ravel(), solution.displacements)
+    Q = loosened(Q, tol) if tol > TOL else Q
+    return replace(reduction, problem=problem.altered(Q=Q))
 
 
 def _doubt(reduction: Reduction, solution: Solution) -> float:

@@ -37,7 +37,6 @@ from contactopt.linear.concurrency import Crew, give_back
 
 SINGLE = np.float32
 IMPORTING = Lock()  # of two threads that import pyamg at once one may see half of it
-PIECES = 16  # in which the rows of a matrix are brought into blocks
 
 
 class MultigridSolver(BodySolver):
@@ -321,26 +320,38 @@ def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
-    their own, made some at a time; each unknown's place (n,) in it; the nodes (k,).
+    their own; each unknown's place (n,) in it; the nodes (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim
-    spread = sp.csr_matrix((np.ones(len(own)), (place, np.arange(len(own)))), (size, len(own)))
     held = np.full(size, np.median(A.diagonal()))
     held[place] = 0.0
-    own_rows, pieces = sp.csr_matrix(sp.diags(held)), []
-    for rows in np.array_split(np.arange(size).reshape(-1, dim), PIECES):
-        first, stop = rows.size and rows[0, 0], rows.size and rows[-1, -1] + 1
-        chosen = sp.csr_matrix(spread[first:stop] @ A)
-        wide = sp.csr_matrix(
-            (chosen.data, place[chosen.indices], chosen.indptr), (stop - first, size)
-        )
-        pieces.append((wide + own_rows[first:stop]).astype(SINGLE).tobsr((dim, dim)))
-    counts = np.concatenate([[0], *(np.diff(piece.indptr) for piece in pieces)])
-    indptr = np.cumsum(counts).astype(np.int32)
-    indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
-    data = np.concatenate([piece.data for piece in pieces])
-    return sp.bsr_matrix((data, indices, indptr), (size, size)), place, present
+    if isinstance(A, Block):
+        blocks = getattr(A.whole, "blocksize", ()) == (dim, dim)
+        if blocks and np.array_equal(A.kept, node * dim + component):
+            return _masked(A.whole, present, held), place, present
+        A = A.whole[A.kept][:, A.kept]
+    entries = sp.coo_matrix(A)
+    row, column = place[entries.row], place[entries.col]
+    wide = sp.coo_matrix((entries.data, (row, column)), (size, size)) + sp.diags(held)
+    return wide.astype(SINGLE).tobsr((dim, dim)), place, present
+
+
+def _masked(whole: sp.bsr_matrix, present: np.ndarray, held: np.ndarray) -> sp.bsr_matrix:
+    """The blocks of the nodes present (k,) of a matrix in blocks of all nodes, where unknowns have
+    rows of their own whose diagonal entry is given, and not zero.
+    """
+    dim = whole.blocksize[0]
+    there = np.zeros(whole.shape[0] // dim, dtype=bool)
+    there[present] = True
+    chosen = there[_rows_of(whole)] & there[whole.indices]
+    indptr = _starts(whole, chosen)[np.append(present, len(there))]
+    indices = (np.cumsum(there, dtype=np.int32) - 1)[whole.indices[chosen]]
+    blocks = sp.bsr_matrix((whole.data.astype(SINGLE)[chosen], indices, indptr), 2 * held.shape)
+    _scale(blocks, held == 0, held == 0)
+    own, c = np.flatnonzero(_rows_of(blocks) == indices), np.arange(dim)
+    blocks.data[own[:, None], c, c] += held.astype(SINGLE).reshape(-1, dim)
+    return blocks
 
 
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:

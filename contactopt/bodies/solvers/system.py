@@ -32,15 +32,6 @@ class Block:
     def diagonal(self) -> np.ndarray:
         return np.asarray(self.whole.diagonal()[self.kept])
 
-    def __rmatmul__(self, S: sp.csr_matrix) -> sp.csr_matrix:
-        """S A for a matrix S (m, n) with few rows."""
-        n, N = len(self.kept), self.whole.shape[0]
-        spread = sp.csr_matrix((np.ones(n), self.kept, np.arange(n + 1)), (n, N))
-        wide = sp.csr_matrix(S @ spread)
-        touched = wide.indices if wide.nnz else np.zeros(1, dtype=int)
-        rows = slice(int(touched.min()), int(touched.max()) + 1)
-        return sp.csr_matrix((wide[:, rows] @ self.whole[rows])[:, self.kept])
-
 
 class System(NamedTuple):
     """What the solvers of one body are made from; the matrix must not change afterwards.

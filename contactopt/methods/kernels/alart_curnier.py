@@ -17,8 +17,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from contactopt.linear.deadline import enough
 from contactopt.linear.operators import diagonal
-from contactopt.methods.constants import LOOSE
+from contactopt.methods.constants import LAST_LOOSEST, LAST_SHARE, LOOSE
 from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded
 from contactopt.methods.kernels.krylov import krylov_step
 from contactopt.methods.kernels.semismooth import RIDGE, Equations
@@ -41,14 +42,17 @@ Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate 
 def forcing(residual: float, last: float, first: float, loosest: float, tightest: float) -> float:
     """Choose the relative accuracy of the linear system of a Newton step that is worth its price,
     from the residual of the equations now and before the last step; `last` is infinite before the
-    first step, whose accuracy is given.
+    first step, whose accuracy is given. The step
+    that ends a solve need not come further than that asks.
 
     Source: Eisenstat, Walker (1996), Choosing the forcing terms in an inexact Newton method, SIAM
     J. Sci. Comput. 17, 16-32.
     """
     if last in (0.0, np.inf):
-        return first if last else tightest
-    return min(loosest, max(tightest, 0.5 * (residual / last) ** 2))
+        worth = first if last else tightest
+    else:
+        worth = min(loosest, max(tightest, 0.5 * (residual / last) ** 2))
+    return max(worth, min(LAST_LOOSEST, LAST_SHARE * enough()))
 
 
 def coulomb_equations(

@@ -27,9 +27,8 @@ import numpy as np
 
 from contactopt.linear.budget import expect, spent
 from contactopt.linear.concurrency import one_blas_thread
-from contactopt.linear.deadline import check_time
 from contactopt.linear.flexible_gmres import flexible_gmres
-from contactopt.linear.saddle_point import CoupledForm
+from contactopt.linear.saddle_point import CoupledForm, in_equilibrium
 from contactopt.linear.stacked import Stacked, norm
 from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
@@ -48,7 +47,6 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
-MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
 USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
 IDLE = 3  # steps without progress after which it begins anew
 
@@ -218,26 +216,6 @@ def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditione
     factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / constants.SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
-
-
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float) -> Stacked:
-    """X close to A^-1 T' r for forces r (k, dim), by CG with one V-cycle, to rtol in energy."""
-    residual = form.pulled(r.ravel())
-    X, size, goal = 0.0 * residual, 1.0, 0.0
-    p = X
-    for step in range(MOST_ITERATIONS):
-        check_time()
-        z = form.approximate(residual)
-        size, previous = residual.dot(z), size
-        goal = goal if step else rtol**2 * size
-        if not size > goal:
-            break
-        p = z + (size / previous if step else 0.0) * p
-        Ap = form.stiffness(p)
-        alpha = size / p.dot(Ap)
-        X = X + alpha * p
-        residual = residual - alpha * Ap
-    return X
 
 
 def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
