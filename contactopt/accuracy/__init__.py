@@ -25,24 +25,32 @@ load at each place, with the contact states of the solution kept (contactopt.der
 
 exactly so for a linear problem and a linear J. The unknown stresses s are replaced by recovered
 ones, averages at the vertices. The signed sum estimates the error of J; the absolute values say
-where to refine. Two terms are added.
+where to refine. More terms are added.
 
 The force at a contact is a mean of the pressure nearby. For a J that reads pressure the error of
 that mean (indicators.pressure_errors) is added. Without it a contact that is smaller than an
 element would seem exact, since then equilibrium alone says what the one closed contact carries.
+
+The energy is quadratic, so that what its slope at the solution gives is corrected by the energy of
+the error itself (indicators.element_errors). Its sign then agrees with the load: a mesh under given
+forces holds too little energy, one under given displacements or an interference too much.
+
+Linear elements have straight edges, and those far from the place that matters stay long. What lies
+between them and the curve for which they stand is estimated as well, by the derivative of J by the
+shape of the body: without it a disc under its own weight is too light for its contact.
 
 A stress at a place is recovered by a fit to the stresses of the elements near it
 (contactopt.bodies.stress_recovery). The stresses scatter about the fit, and the estimated error is
 at least two standard errors of the fit. For a largest stress this covers the places where it could
 be larger by as much; these are refined too.
 
-What is not estimated: the linearisation of a J that is not linear, what recovery does not see where
-the solution is not smooth, and that straight edges are chords of a curved boundary. Much of it
-shows in the corrected value, J_h and its estimated error together, which would be the same on every
-mesh if the estimates were exact. What the last two refinements changed of it is therefore added to
-the sum, which has a factor of safety of 1.25, unless the reading is more uncertain than that
-(indicators.misfit). So the estimate is not a bound. A guaranteed bound is made at the end, where
-there is one (contactopt.accuracy.bound).
+What is not estimated: the linearisation of a J that is neither linear nor the energy, and what
+recovery does not see where the solution is not smooth. Much of it shows in the corrected value, J_h
+and its estimated error together, which would be the same on every mesh if the estimates were exact.
+What the last two refinements changed of it is therefore added to the sum, which has a factor of
+safety of 1.25, unless the reading is more uncertain than that (indicators.misfit). So the estimate
+is not a bound. A guaranteed bound is made at the end, where there is one
+(contactopt.accuracy.bound).
 
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for

@@ -6,16 +6,19 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from contactopt.accuracy.estimate import read
 from contactopt.accuracy.marking import spread
+from contactopt.bodies.protocol import Body
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import duals_of
 from contactopt.errors import InputError
 from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
+from contactopt.scenes.scene import BodyForce
 from contactopt.solving.solve_scene import Solved
 
 log = logging.getLogger(__name__)
@@ -78,17 +81,29 @@ def misfit(found: Sequence[ElementErrors]) -> float:
     return float(np.max(changes, initial=0.0))
 
 
-def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:
+def element_errors(
+    solved: Solved,
+    quantity: Quantity | None,
+    value: float,
+    volumes: Sequence[np.ndarray] = (),
+) -> ElementErrors:
     """What each element adds to the error of a quantity with this value, estimated as in
     contactopt.accuracy.
 
-    For "energy" no adjoint is needed: the energy of the error itself is taken, without a sign. The
-    same serves, as a guide to the marking alone, for edges and where the adjoint problem has no
-    solution.
+    The energy J(U) = a(U, U) / 2 is quadratic. With the error e = U - U_h and its slope at U_h,
+
+        J - J_h = a(U_h, e) + a(e, e) / 2 = a(U, e) - a(e, e) / 2,
+
+    and a(U, e) is a(W - W_h, e) with the adjoint W. Under loads alone W is U, so that the energy is
+    too small by that of the error; where displacements or an interference are given W is zero, so
+    that it is too large by as much.
+
+    For edges, for no quantity at all, and where the adjoint problem has no solution, the energy of
+    the error serves as a guide to the marking alone, without a sign.
     """
     state = State(solved.reduction, solved.solution)
     bodies, displaced, found = solved.reduction.bodies, state.displaced, None
-    if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
+    if quantity is not None and not quantity.name.startswith(EDGES):
         try:
             seeds = quantity.slopes(state)
             found = duals_of(state, seeds).fields
@@ -99,15 +114,34 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     energy = sum(body.energy(U) for body, U in zip(bodies, displaced))
     missing = sum(own.sum() for own, _ in shares) / 2
     norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
-    if found is None:
-        own = tuple(own / 2 for own, _ in shares)
-        return ElementErrors(value, own, norm, unsigned=quantity.name != ENERGY)
-    errors, between = tuple(product for _, product in shares), 0.0
+    if quantity is None or found is None:
+        return ElementErrors(value, tuple(own / 2 for own, _ in shares), norm, unsigned=True)
+    curved = 0.5 if quantity.name == ENERGY else 0.0
+    errors, between = tuple(product - curved * own for own, product in shares), 0.0
+    if volumes:
+        parts = zip(errors, solved.reduction.scene.parts, bodies, volumes, displaced, fields)
+        errors = tuple(
+            one + _of_shape(part, state.problem.dim, body, volume, U, W, curved)
+            for one, part, body, volume, U, W in parts
+        )
     if seeds.reactions is not None and not seeds.bodies:
         added = between_contacts(solved, seeds.reactions[:, 0])
         errors = tuple(inside + share for inside, share in zip(errors, added))
         between = float(sum(share.sum() for share in added))
     return ElementErrors(value, errors, norm, between)
+
+
+def _of_shape(
+    part: Any, dim: int, body: Body, volume: np.ndarray, U: np.ndarray, W: np.ndarray, curved: float
+) -> np.ndarray:
+    """What volumes (elements,) between facets and their curves add to the error."""
+    if not np.any(volume):
+        return np.zeros(len(volume))
+    forces = [np.asarray(own.value) for own in part.loads if isinstance(own, BodyForce)]
+    load = np.sum([np.zeros(dim), *forces], axis=0)
+    (work,) = body.added_work(volume, load, U, W)
+    (energy,) = body.added_work(volume, 0 * load, U, U)
+    return np.asarray(work - curved * energy)
 
 
 def read_once(solved: Solved, name: str) -> dict[str, float | None]:
@@ -141,19 +175,20 @@ def read_once(solved: Solved, name: str) -> dict[str, float | None]:
     return {"value": reading.value, "error": size / abs(reading.value) if known else None}
 
 
-def along_path(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:
-    """What each element adds to the error of a quantity of a scene, or of a load path.
+def along_path(
+    solved: Solved, quantity: Quantity, value: float, volumes: Sequence[np.ndarray] = ()
+) -> ElementErrors:
+    """What each element adds to the error of a quantity of a scene, or of a load path, with the
+    `volumes` of element_errors.
 
     Friction remembers the slip of earlier states, so that their errors matter at the end of a path
     as well. No adjoint goes back over its steps: the elements are marked by the energy of the error
     of every state, in which the largest one counts for all.
     """
     if solved.path is None:
-        return element_errors(solved, quantity, value)
-    energy = replace(quantity, name=ENERGY)
-    found = []
-    for number in range(len(solved.path.states)):
-        found.append(element_errors(_state(solved, number), energy, value))
+        return element_errors(solved, quantity, value, volumes)
+    count = len(solved.path.states)
+    found = [element_errors(_state(solved, number), None, value) for number in range(count)]
     bodies = tuple(np.max(own, axis=0) for own in zip(*(each.bodies for each in found)))
     worst = max(each.energy for each in found)
     return ElementErrors(value, bodies, worst, unsigned=True)

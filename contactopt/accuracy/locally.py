@@ -17,6 +17,7 @@ from contactopt.accuracy.marking import (
     check_refinable,
     divisible,
     finer,
+    left_out,
     otherwise,
     plateau,
     unknowns,
@@ -73,7 +74,8 @@ class Locally:
             mesh, order = mesh_error(self.values, self.best)
             size = safety(len(self.values)) * abs(mesh) + reading.uncertainty
             return Judged(size, mesh, order=order)
-        last = along_path(solved, self.quantity, reading.value)
+        between = [left_out(part, self.shapes) for part in solved.reduction.scene.parts]
+        last = along_path(solved, self.quantity, reading.value, between)
         self.errors = [*self.errors[-2:], last]
         if not last.unsigned:
             size = SAFETY[3] * abs(last.total) + max(misfit(self.errors), reading.uncertainty)

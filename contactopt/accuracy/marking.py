@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 from contactopt.accuracy.polygon import Chords, chords_of, flatter
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
-from contactopt.meshes.cells import straight
+from contactopt.meshes.cells import is_curved, straight
 from contactopt.meshes.given_curves import Curve
-from contactopt.meshes.mesh_refinement import bent, divide, facets_of, split
+from contactopt.meshes.mesh_refinement import bent, divide, facets_of, slivers, split
 from contactopt.meshes.structured import simplices
 from contactopt.readings.peaks import Peak
 from contactopt.scenes.refined_scenes import part_curves
@@ -91,6 +91,16 @@ def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
     if scene.degree == 1:
         return scene
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
+
+
+def left_out(part: Any, shapes: Shapes) -> np.ndarray:
+    """The volumes (elements,) between the straight facets of a body and its curves; (0,) for a body
+    without a mesh, and zeros where edges follow the curves.
+    """
+    if not hasattr(part, "mesh"):
+        return np.zeros(0)
+    straight_edges = not is_curved(part.mesh)
+    return slivers(part.mesh, shapes.of(part)) if straight_edges else np.zeros(part.mesh.nelements)
 
 
 def otherwise(scene: Scene, shapes: Shapes) -> Scene:

@@ -29,7 +29,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import reload_body
-from contactopt.bodies.element_stress import fields_of, limits_of, recovery_errors
+from contactopt.bodies.element_stress import added_work, fields_of, limits_of, recovery_errors
 from contactopt.bodies.fields import Fields, Region, Validity
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import make_solver, solver_type
@@ -243,6 +243,11 @@ class ElasticBody(Body):
 
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
         return recovery_errors(self.body, U, *others)
+
+    def added_work(
+        self, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        return added_work(self.body, volumes, load, U, *others)
 
     def on_elements(self, values: np.ndarray) -> np.ndarray:
         dofs = self.body.basis.element_dofs

@@ -121,14 +121,36 @@ def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple
         )
         return np.asarray(smooth - stress)
 
-    E, nu = body.material.E, body.material.nu
     measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
     first, found = missing(U), []
     for W in others:
         second = first if W is U else missing(W)
-        traces = np.trace(first) * np.trace(second)
-        density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
-        found.append(np.asarray(np.sum(density * measure, axis=1)))
+        found.append(np.asarray(np.sum(_product(body, first, second) * measure, axis=1)))
+    return tuple(found)
+
+
+def _product(body: Assembly, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """first : C^-1 : second of two stresses (3, 3, ...)."""
+    E, nu = body.material.E, body.material.nu
+    traces = np.trace(first) * np.trace(second)
+    return np.asarray(((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E)
+
+
+def added_work(
+    body: Assembly, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """For each W of the others what volumes (elements,) [length^dim] with the force per volume
+    `load` (dim,), added to the elements of a body, would work (elements,) [force length]:
+    load . W - s(U) : C^-1 : s(W), by the means of the elements.
+    """
+    basis = body.basis
+    centre = np.asarray(basis.global_coordinates()).mean(axis=2)
+    measure, found = volumes * weight_at(body.weight, centre), []
+    own = stress_in(body, basis, U).mean(axis=3)
+    for W in others:
+        stress = own if W is U else stress_in(body, basis, W).mean(axis=3)
+        moved = np.tensordot(load, np.asarray(basis.interpolate(W)).mean(axis=2), 1)
+        found.append(np.asarray((moved - _product(body, own, stress)) * measure))
     return tuple(found)
 
 

@@ -177,6 +177,15 @@ class Body(ABC):
         """
         return (np.zeros(0),) * len(others)
 
+    def added_work(
+        self, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """For each of other displacements (n,) what volumes (elements,) [length^dim] with the force
+        per volume `load` (dim,), added to the elements, would work in it beside the stress of U,
+        (elements,) [force length] (contactopt.bodies.element_stress).
+        """
+        return (np.zeros(0),) * len(others)
+
     def on_elements(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) of the displacement unknowns, dealt out evenly to the elements (elements,)
         that have each; (0,) for a body without elements.

@@ -234,6 +234,7 @@ class RemoteBody(Remote, Body):
     energy = _fetched("energy")
     energy_change = _fetched("energy_change")
     recovery_errors = _fetched("recovery_errors")
+    added_work = _fetched("added_work")
     on_elements = _fetched("on_elements")
     held_by = _fetched("held_by")
     fields = _fetched("fields")

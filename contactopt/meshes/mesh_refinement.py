@@ -19,7 +19,14 @@ import skfem
 from scipy.spatial import cKDTree
 
 from contactopt.errors import InputError
-from contactopt.meshes.cells import CURVED, is_curved, straight, volumes
+from contactopt.meshes.cells import (
+    CURVED,
+    area_vectors,
+    is_curved,
+    outer_corners,
+    straight,
+    volumes,
+)
 from contactopt.meshes.curves import plane_curves
 from contactopt.meshes.facet_surfaces import barycentric, space_curves
 from contactopt.meshes.given_curves import Curve
@@ -160,6 +167,27 @@ def bent(mesh: Any, curves: Curves) -> Any:
         local = shift[:, within]
         shift[:, within[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
     return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
+
+
+def slivers(mesh: Any, curves: Curves) -> np.ndarray:
+    """The volumes (elements,) between the straight facets of simplices and the curves that these
+    stand for [length^dim], negative where the body lies beyond its curve.
+
+    A facet with the area vector n that leaves its curve by d at the middles of its edges encloses
+    2/3 n . d in the plane and 1/3 n . (the sum of d) in space, by the rule of its second order.
+    """
+    found, plane = np.zeros(mesh.t.shape[1]), len(mesh.p) == 2
+    for name, curve in _present(mesh, curves).items():
+        facets = facets_of(mesh, name)
+        corners = mesh.p[:, outer_corners(mesh, facets)]
+        normal = area_vectors(corners)
+        for i, j in combinations(range(len(mesh.p)), 2):
+            middle, size = (corners[:, i] + corners[:, j]) / 2, corners[:, i] - corners[:, j]
+            off = curve(middle) - middle
+            near = np.linalg.norm(off, axis=0) <= BENT * np.linalg.norm(size, axis=0)
+            share = np.where(near, np.sum(normal * off, axis=0), 0.0) * (2 if plane else 1) / 3
+            np.add.at(found, mesh.f2t[0, facets], share)
+    return found
 
 
 def _shift(

@@ -69,8 +69,8 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     maximum of the nodal pressures, with the nodal areas as weights. What the nodes scatter about
     the fit is the uncertainty, so that the reading agrees with the nodal values within its own
     error. Nodes on the axis of an axisymmetric mesh are left out: the strain u_r / r is poorly
-    resolved there, on a ring without area. At the rim of the contact surface the nodal value is
-    returned.
+    resolved there, on a ring without area; unless no other node is pressed. At the rim of the
+    contact surface the nodal value is returned.
     """
     problem = reduction.problem
     pressure = nodal_pressure(problem, solution)
@@ -79,7 +79,8 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     usable = problem.areas > 0
     if reduction.scene.kind == "axisymmetric":
         radius = np.abs(problem.coordinates[0])
-        usable &= radius > ON_PLANE * radius.max(initial=0.0)
+        beside = usable & (radius > ON_PLANE * radius.max(initial=0.0))
+        usable = beside if np.any(pressure[beside] > 0) else usable
     noise = solution.residual * float(np.linalg.norm(solution.reactions))
     found = []
     seen = np.where(usable, np.maximum(pressure, 0.0), 0.0)

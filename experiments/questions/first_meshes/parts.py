@@ -151,10 +151,15 @@ def dovetail(first: First, small: float = 0.3) -> Scene:
 
 
 def _round(
-    first: First, pin: float, hole: float, outer: float, drop: float, small: float
+    first: First, pin: float, hole: float, outer: float, drop: float, small: float, ends: str = ""
 ) -> tuple[Any, Any]:
-    """Meshes of a pin and of a ring around it."""
-    mesh = Mesher(first, outer / 6, f"abs(sqrt(x^2+y^2)-{hole})", small)
+    """Meshes of a pin and of a ring around it, a FINER-th as large at the distance 0 from `ends`, a
+    formula.
+    """
+    distance = f"abs(sqrt(x^2+y^2)-{hole})"
+    if ends:
+        distance = f"min({distance},{ends}-{(small - small / FINER) / 0.3})"
+    mesh = Mesher(first, outer / 6, distance, small)
 
     def side(centre: np.ndarray, kind: str, length: float) -> str:
         return "contact" if length < 2 * np.pi * (hole + outer) / 2 else "outer"
@@ -169,9 +174,15 @@ def _round(
     return disc, mesh("ring", ring, side)
 
 
-def lug(first: First, small: float = 0.5) -> Scene:
-    """A pin with some clearance in an eye, with friction."""
-    pin, eye = _round(first, 9.95, 10.0, 20.0, 0.05, small)
+FINER = 60
+ENDS_OF_CONTACT = "sqrt((abs(x)-4.793)^2+(y+8.777)^2)"  # of the lug
+
+
+def lug(first: First, small: float = 0.5, ends: bool = False) -> Scene:
+    """A pin with some clearance in an eye, with friction; with `ends` meshes are finer at the ends
+    of the contact, where the stress is largest.
+    """
+    pin, eye = _round(first, 9.95, 10.0, 20.0, 0.05, small, ENDS_OF_CONTACT if ends else "")
     weight = BodyForce((0.0, -1500.0 / (np.pi * 9.95**2)))
     bodies = Part("pin", pin, STEEL, (), (weight,)), Part("lug", eye, STEEL, (Support("outer"),))
     return Scene("lug", *bodies, 0.3, degree=first.order)
