@@ -19,7 +19,7 @@ from contactopt import (
     solve,
 )
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.derivatives import linear
+from contactopt.derivatives import factors
 from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
@@ -136,7 +136,7 @@ def test_adjoint_is_the_transpose_of_forward(kind, dim):
 def test_factors_of_sticking_components_give_what_lu_of_all_gives(dim, unsymmetric, monkeypatch):
     made, states = [], set()
     for most in (0, 10**9):  # unknowns up to which the system is factorised whole
-        monkeypatch.setattr(linear, "WHOLE", most)
+        monkeypatch.setattr(factors, "WHOLE", most)
         for seed in range(6):
             problem = random_problem(seed, dim, unsymmetric=unsymmetric, contacts=12)
             ours = contactopt.sensitivity(problem, solve(problem, tol=1e-12))

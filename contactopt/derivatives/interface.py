@@ -106,7 +106,7 @@ class Sensitivity:
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
         moves = ~immovable(problem).reshape(problem.q.shape)
         D *= moves[:, :, None] & moves[:, None, :]
-        return Tangent(problem.Q, without_rounding(problem.V), self._rho, D, problem)
+        return Tangent(problem, without_rounding(problem.V), self._rho, D)
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:
