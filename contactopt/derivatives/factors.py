@@ -32,6 +32,7 @@ from contactopt.linear.operators import asymmetry
 from contactopt.methods.kernels.bonded import LEAST_PIVOT
 
 SINGULAR = 1e-13  # reciprocal condition of a matrix below which it counts as singular
+DOUBT = 1e-6  # least pivot, over the largest, below which the condition is looked at
 UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
 SYMMETRIC = 1e-12  # |Q - Q'| / |Q| up to which Q counts as symmetric
 UNIQUE = (
@@ -68,8 +69,8 @@ class Whole(NamedTuple):
 
 
 class Square:
-    """LU of the transpose of a matrix S (m, m). To a singular S sigma W Z' is added, with W and Z
-    its null vectors from the left and the right.
+    """LU of the transpose of a matrix S (m, m), which is overwritten. To a singular S sigma W Z' is
+    added, with W and Z its null vectors from the left and the right.
     """
 
     def __init__(self, S: np.ndarray):
@@ -77,9 +78,13 @@ class Square:
         self.lu, self.swaps = S.T, np.arange(len(S))
         if not len(S):
             return
-        size = dlange("1", S.T)
-        self.lu, self.swaps, _ = dgetrf(S.T)
-        if not dgecon(self.lu, size)[0] > SINGULAR:
+        self.lu, self.swaps, _ = dgetrf(S.T, overwrite_a=True)
+        pivots = np.abs(self.lu.diagonal())
+        if pivots.min() > DOUBT * pivots.max():
+            return
+        S = np.empty(S.shape)
+        S[:, self.order] = (np.tril(self.lu, -1) @ np.triu(self.lu) + np.triu(self.lu)).T
+        if not dgecon(self.lu, dlange("1", S.T))[0] > SINGULAR:
             left, values, right = np.linalg.svd(S)
             null = values <= UNSEEN * values[0]
             self.W, self.sigma = left[:, null], float(values[0]) or 1.0
@@ -154,7 +159,7 @@ class DenseFactors:
         s = len(self.G)
         if not s:
             return schur(right)
-        y = _lower(self.G, right[:s, None])[:, 0]
+        y = dtrsm(1.0, self.G, right[:s, None], lower=1)[:, 0]
         z = schur(right[s:] - Y.T @ y)
         x = dtrsm(1.0, self.G, (y - X @ z)[:, None], lower=1, trans_a=1)[:, 0]
         return np.concatenate([x, z])
@@ -188,31 +193,37 @@ def dense_factors(Q: np.ndarray, V: np.ndarray, rho: np.ndarray, D: np.ndarray) 
     (k, d), (n, p), unit = D.shape[:2], V.shape, float(rho.mean())
     kept, rest = D.any(axis=2).ravel(), np.eye(d) - D
     stick, G = _sticking(Q, kept, kept & ~rest.any(axis=2).ravel())
-    loose, known, s = kept & ~stick, n - np.count_nonzero(kept), len(G)
-    parts = (part.nonzero()[0] for part in (~kept, stick, loose))
-    order = np.concatenate([*parts, np.arange(n, n + p)])
+    loose = kept & ~stick
+    first, second, third = (part.nonzero()[0] for part in (~kept, stick, loose))
+    scales = np.ones((2, n + p))
+    scales[0, :n] = np.where(loose, 1 / unit, 1.0)
+    if len(G):
+        scales[0, second] = 1 / np.repeat(rho, d)[second]
+    if p:
+        size = np.linalg.norm(V, axis=0)
+        scales[:, n:] = 1 / (unit * np.where(size > 0, size, 1.0))
+        V = V * scales[0, n:]
 
-    size = np.linalg.norm(V, axis=0)
-    motions = 1 / (unit * np.where(size > 0, size, 1.0))
-    scales = np.where(stick, 1 / np.repeat(rho, d), np.where(loose, 1 / unit, 1.0))
-    scales = np.stack([np.append(scales, motions), np.append(np.ones(n), motions)])
-
-    rows, V, steps = np.empty((n + p - known, n + p)), V * motions, (rho / unit)[:, None, None]
-    rows[:s, :n], rows[:s, n:] = Q[stick], V[stick]
-    touched = loose.reshape(k, d).any(axis=1)
-    left, mask = steps[touched] * D[touched], loose.reshape(k, d)[touched].ravel()
-    own = left @ Q.reshape(k, d, n)[touched]
-    own.reshape(-1, d, k, d)[np.arange(len(own)), :, touched.nonzero()[0]] += rest[touched] / unit
-    rows[s : n - known, :n] = own.reshape(-1, n)[mask]
-    rows[s : n - known, n:] = (left @ V.reshape(k, d, p)[touched]).reshape(len(mask), p)[mask]
-    rows[n - known :, :n], rows[n - known :, n:] = V.T, 0.0
-    if known or s:
-        rows = rows.take(order, axis=1)
-
-    inner = rows[:, known:]
-    X, Y = _lower(G, inner[:s, s:]), _lower(G, inner[s:, :s].T)
-    schur = Square(inner[s:, s:] - Y.T @ X if s else inner)
-    return DenseFactors(order, known, scales, rows[:, :known], G, X, Y, schur)
+    # the rows of the third unknowns
+    touched = loose.reshape(k, d).any(axis=1).nonzero()[0]
+    left, mask = (rho / unit)[touched, None, None] * D[touched], loose.reshape(k, d)[touched].ravel()
+    rows = left @ (Q.reshape(k, d, n)[touched] if len(touched) < k else Q.reshape(k, d, n))
+    rows.reshape(-1, d, k, d)[np.arange(len(rows)), :, touched] += rest[touched] / unit
+    rows = rows.reshape(-1, n) if len(third) == len(mask) else rows.reshape(-1, n)[mask]
+    S, A = rows if len(third) == n else rows.take(third, axis=1), rows.take(first, axis=1)
+    if p:
+        moved = (left @ V.reshape(k, d, p)[touched]).reshape(len(mask), p)[mask]
+        S = np.block([[S, moved], [V[third].T, np.zeros((p, p))]])
+        A = np.concatenate([A, V[first].T])
+    X = Y = G
+    if len(G):
+        B = np.concatenate([Q.take(third, axis=1)[second], V[second]], axis=1)
+        C = np.concatenate([rows.take(second, axis=1), V[second].T])
+        A = np.concatenate([Q.take(first, axis=1)[second], A])
+        X, Y = (dtrsm(1.0, G, border, lower=1) for border in (B, C.T))
+        S -= Y.T @ X
+    order = np.concatenate([first, second, third, np.arange(n, n + p)])
+    return DenseFactors(order, len(first), scales, A, G, X, Y, Square(S))
 
 
 def _sticking(
@@ -227,14 +238,9 @@ def _sticking(
     own = Q if stick.all() else Q[stick].take(stick.nonzero()[0], axis=1)
     if asymmetry(own) > SYMMETRIC:
         return none
-    G, failed = dpotrf(own.T, lower=True)
+    G, failed = dpotrf(own.T, lower=True, clean=False, overwrite_a=own is not Q)
     pivots = G.diagonal()
     return none if failed or not pivots.min() > LEAST_PIVOT * pivots.max() else (stick, G)
-
-
-def _lower(G: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """G^-1 right for a lower triangle G (s, s) and columns (s, j)."""
-    return np.asarray(dtrsm(1.0, G, right, lower=1)) if right.size else right
 
 
 class SparseFactors:

@@ -87,8 +87,10 @@ class Sensitivity:
     @cached_property
     def _rho(self) -> np.ndarray:
         """Steps (k,) of the natural map [force / length]."""
-        stiffest = self._scales.force / self._scales.length
-        return np.asarray(1 / np.maximum(self.problem.compliances, 1e-3 / stiffest))
+        own = self.problem.compliances
+        if not own.min(initial=np.inf) > 1e-3 * own.max(initial=0.0):
+            own = np.maximum(own, 1e-3 * self._scales.length / self._scales.force)
+        return np.asarray(1 / own)
 
     @cached_property
     def _point(self) -> np.ndarray:
@@ -104,8 +106,9 @@ class Sensitivity:
         D = problem.law.project(self._point)[1].copy()
         D[~problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
-        moves = ~immovable(problem).reshape(problem.q.shape)
-        D *= moves[:, :, None] & moves[:, None, :]
+        held = immovable(problem).reshape(problem.q.shape)
+        if held.any():
+            D[held[:, :, None] | held[:, None, :]] = 0.0
         return Tangent(problem, without_rounding(problem.V), self._rho, D)
 
     @cached_property
