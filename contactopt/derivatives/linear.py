@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,7 +28,6 @@ from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.derivatives.factors import UNIQUE, Factors, SparseFactors, dense_factors
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface, InterfaceOperator
-from contactopt.linear.saddle_point import CoupledForm
 from contactopt.linear.stacked import Stacked, norm
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.coupled_newton import Coupled, fitted
@@ -35,11 +35,13 @@ from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
 from contactopt.problem import InterfaceProblem, dimensionless
 
-ACCURACY = 1e-11  # relative residual of an iterative solve
+ACCURACY = 1e-11  # least relative residual of an iterative solve
 ROUNDS = 12  # of GMRES, which gain four digits each
 
-# error (k d,), balance (p,) -> dr and dlambda of these shapes
-Solve = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+# error (k d,), balance (p,) -> dr and dlambda of these shapes, and what gives Q dr
+Solve = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]]
+
+Inner = Callable[[Stacked], Stacked]  # the dimensionless solution for a right side
 
 
 def transposed(Q: Interface) -> Interface:
@@ -54,12 +56,14 @@ class Tangent:
     problem  the interface problem, and V its motions without rounding
     rho      (k,) steps of the natural map [force / length]
     D        (k, d, d) derivative of the map P
+    accuracy relative residual of an iterative solve: D is known to the certificate of the solution
     """
 
     problem: InterfaceProblem
     V: np.ndarray
     rho: np.ndarray
     D: np.ndarray
+    accuracy: float = ACCURACY
 
     def slope(self, moved: np.ndarray) -> np.ndarray:
         """D rho moved (k d,)."""
@@ -79,51 +83,54 @@ class Tangent:
 
     def solve_transposed(
         self, by_r: np.ndarray, by_multipliers: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """z (k d,) and b (p,) of M' (a, b) = (by_r, by_multipliers)."""
+    ) -> tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]:
+        """z (k d,) and b (p,) of M' (a, b) = (by_r, by_multipliers), and what gives a (k d,)."""
         back = self.transposed
         if isinstance(self.problem.Q, InterfaceOperator):
-            return back.solve(back.slope(by_r), by_multipliers)
+            z, b, moved = back.solve(back.slope(by_r), by_multipliers)
+            rho = np.repeat(self.rho, self.D.shape[1])
+            return z, b, lambda: z / rho + by_r - moved() - self.V @ b
         a, b = np.split(self.factors.back(np.append(by_r, by_multipliers)), [len(by_r)])
-        return back.slope(a), b
-
-    def multipliers(self, by_r: np.ndarray, z: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """a (k d,), for what solve_transposed returned; one product with Q'."""
-        rho = np.repeat(self.rho, self.D.shape[1])
-        return np.asarray(z / rho + by_r - transposed(self.problem.Q) @ z - self.V @ b)
+        return back.slope(a), b, lambda: a
 
     @cached_property
     def solve(self) -> Solve:
         """The solver of M (dr, dlambda) = (error, balance); InputError where M is singular."""
-        if not np.any(self.D) and not self.V.shape[1]:
-            return lambda error, balance: (error, balance)
-        if isinstance(self.problem.Q, InterfaceOperator):
+        Q = self.problem.Q
+        if isinstance(Q, InterfaceOperator):
             return _by_iteration(self)
 
-        def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def solve(error: np.ndarray, balance: np.ndarray) -> Any:
             dr, multipliers = np.split(self.factors.solve(np.append(error, balance)), [len(error)])
-            return dr, multipliers
+            return dr, multipliers, lambda: Q @ dr
 
         return solve
 
 
 def _by_iteration(tangent: Tangent) -> Solve:
     """In the dimensionless problem, where the methods know the sizes of things."""
-    scaled, scales = dimensionless(tangent.problem)
+    problem = tangent.problem
+    if not np.any(tangent.D) and not tangent.V.shape[1]:
+        return lambda error, balance: (error, balance, lambda: problem.Q @ error)
+    scaled, scales = dimensionless(problem)
     rho, form = tangent.rho * scales.length / scales.force, scaled.Q.coupled
     linearised = Linearised(replace(coulomb_equations(scaled), rho=rho), tangent.D)
-    inner = (
-        _by_products(scaled, linearised) if form is None else _with_bodies(scaled, linearised, form)
-    )
+    make = _by_products if form is None else _with_bodies
+    inner = make(scaled, linearised, tangent.accuracy)
 
-    def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def solve(error: np.ndarray, balance: np.ndarray) -> Any:
         unit = scales.multipliers / (scales.force * scales.length)
-        return scales.to_physical(*inner(error / scales.force, balance * unit))
+        *X, r, multipliers = inner(Stacked((error / scales.force, balance * unit))).parts
+        dr, dlam = scales.to_physical(r, multipliers)
+        if form is None:
+            return dr, dlam, lambda: problem.Q @ dr
+        moved = scales.length * Stacked(tuple(X))
+        return dr, dlam, lambda: problem.Q.coupled.moved(moved, dr)
 
     return solve
 
 
-def _by_products(problem: InterfaceProblem, linearised: Linearised) -> Solve:
+def _by_products(problem: InterfaceProblem, linearised: Linearised, accuracy: float) -> Inner:
     """By products with Q: GMRES, preconditioned by the system with the model of Q."""
     inverse = linearised.inverse(model_of(problem), INNER)
     Q, V = problem.Q, problem.V
@@ -132,55 +139,52 @@ def _by_products(problem: InterfaceProblem, linearised: Linearised) -> Solve:
         dr, multipliers = x.parts
         return Stacked((linearised.rows(dr, Q @ dr + V @ multipliers), V.T @ dr))
 
-    def approximate(rest: Stacked) -> Stacked:
+    def approximate(rest: Stacked, rtol: float) -> Stacked:
         error, balance = rest.parts
-        return Stacked(linearised.solve(lambda x: Q @ x, inverse, error, -balance, ROUND))
+        return Stacked(linearised.solve(lambda x: Q @ x, inverse, error, -balance, rtol))
 
-    def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        found = _refined(product, approximate, Stacked((error, balance)), 1.0)
-        return found.parts[0], found.parts[1]
-
-    return solve
+    return lambda right: _refined(product, approximate, right, 1.0, accuracy)
 
 
-def _with_bodies(problem: InterfaceProblem, linearised: Linearised, form: CoupledForm) -> Solve:
+def _with_bodies(problem: InterfaceProblem, linearised: Linearised, accuracy: float) -> Inner:
     """With the equilibrium of the bodies beside the contacts, without products with Q."""
+    form = problem.Q.coupled
     P = fitted(model_of(problem, deflate=False), form, problem.V)
     coupled, none = Coupled(linearised.equations, form, P), form.pulled(np.zeros(problem.q.size))
 
-    def solve(error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        right = Stacked((*none.parts, error, balance))
-        found = _refined(
-            lambda x: coupled.product(linearised, x),
-            lambda rest: coupled.change(rest, linearised, ROUND),
-            right,
-            coupled.weights,
-        )
-        return found.parts[-2], found.parts[-1]
+    def approximate(rest: Stacked, rtol: float) -> Stacked:
+        return coupled.change(rest, linearised, rtol)
 
-    return solve
+    def product(x: Stacked) -> Stacked:
+        return coupled.product(linearised, x)
+
+    return lambda right: _refined(
+        product, approximate, Stacked((*none.parts, *right.parts)), coupled.weights, accuracy
+    )
 
 
 def _refined(
     product: Callable[[Stacked], Stacked],
-    solve: Callable[[Stacked], Stacked],
+    solve: Callable[[Stacked, float], Stacked],
     right: Stacked,
     weights: Stacked | float,
+    accuracy: float,
 ) -> Stacked:
-    """Solve A x = b by `solve` again and again for what is left, until |W (b - A x)| / |W b| is
-    ACCURACY; InputError if that is out of reach, because the solution is not unique.
+    """Solve A x = b by `solve` again and again for what is left, to a reduction that it is told,
+    until |W (b - A x)| / |W b| is small enough; InputError if that is out of reach, because the
+    solution is not unique.
     """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)
     for _ in range(ROUNDS):
-        if last <= ACCURACY * size:
+        if last <= accuracy * size:
             return x
-        x = x + solve(rest)
+        x = x + solve(rest, max(ROUND, 0.5 * accuracy * size / last))
         rest = right - product(x)
         now = norm(weights * rest)
         if not now < 0.5 * last:
             break
         last = now
-    if last > 1e3 * ACCURACY * size:
+    if last > 1e3 * accuracy * size:
         raise InputError(UNIQUE)
     return x
