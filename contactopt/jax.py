@@ -116,7 +116,7 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
 
     def rule(data: Any, changes: Any) -> Any:
         _, q, mu, _, s = data
-        k, d, m = *q.shape, q.size + s.size
+        (k, d), m = q.shape, q.size + s.size
         numbers = jnp.zeros(m, int)
         whole = jnp.zeros((m, m)), numbers, numbers, jnp.zeros((2, m)), jnp.array(True)
         like = q, s, mu, jnp.zeros((k, d, d)), q, *whole

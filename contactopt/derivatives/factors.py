@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.linalg.blas import dtrsm
 from scipy.linalg.lapack import dgecon, dgetrf, dgetrs, dlange, dlaswp, dpotrf
@@ -109,7 +108,9 @@ class Square:
         return x
 
     def _applied(self, right: np.ndarray, trans: int) -> np.ndarray:
-        return np.asarray(dgetrs(self.lu, self.swaps, right, trans=trans)[0]) if len(right) else right
+        return (
+            np.asarray(dgetrs(self.lu, self.swaps, right, trans=trans)[0]) if len(right) else right
+        )
 
     @property
     def order(self) -> np.ndarray:
@@ -206,7 +207,10 @@ def dense_factors(Q: np.ndarray, V: np.ndarray, rho: np.ndarray, D: np.ndarray) 
 
     # the rows of the third unknowns
     touched = loose.reshape(k, d).any(axis=1).nonzero()[0]
-    left, mask = (rho / unit)[touched, None, None] * D[touched], loose.reshape(k, d)[touched].ravel()
+    left, mask = (
+        (rho / unit)[touched, None, None] * D[touched],
+        loose.reshape(k, d)[touched].ravel(),
+    )
     rows = left @ (Q.reshape(k, d, n)[touched] if len(touched) < k else Q.reshape(k, d, n))
     rows.reshape(-1, d, k, d)[np.arange(len(rows)), :, touched] += rest[touched] / unit
     rows = rows.reshape(-1, n) if len(third) == len(mask) else rows.reshape(-1, n)[mask]
@@ -226,9 +230,7 @@ def dense_factors(Q: np.ndarray, V: np.ndarray, rho: np.ndarray, D: np.ndarray) 
     return DenseFactors(order, len(first), scales, A, G, X, Y, Square(S))
 
 
-def _sticking(
-    Q: np.ndarray, kept: np.ndarray, stick: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _sticking(Q: np.ndarray, kept: np.ndarray, stick: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The components (n,) that Cholesky's factor serves, and this factor: `stick`, or none if the
     `kept` ones are few, or Q is not symmetric and safely positive definite.
     """

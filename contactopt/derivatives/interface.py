@@ -169,13 +169,14 @@ class Sensitivity:
         error = -self.tangent.slope(du.ravel()).reshape(r.shape)
         if dmu is not None:
             error += self.by_parameter * dmu[:, None]
-        dr, dlam, turned = self._step(error, -ds)
+        dr, dlam, moves = self._step(error, -ds)
         if self.weak:
             direction = np.zeros(problem.contacts) if dmu is None else dmu
-            extra = self.onesided.step(dr - self._rho[:, None] * (turned() + du), direction)
+            extra = self.onesided.step(dr - self._rho[:, None] * (moves() + du), direction)
             dr, dlam = dr + extra[0], dlam + extra[1]
-            return Change(dr, dlam, problem.displacements(dr, dlam) - problem.q + du)
-        return Change(dr, dlam, turned() + du)
+            moved = problem.Q @ dr.ravel() + problem.V @ dlam
+            return Change(dr, dlam, moved.reshape(r.shape) + du)
+        return Change(dr, dlam, moves() + du)
 
     @cached_property
     def onesided(self) -> Onesided:
@@ -183,8 +184,8 @@ class Sensitivity:
         contacts = np.array([weak.contact for weak in self.weak], dtype=int)
 
         def response(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            dr, dlam, turned = self._step(error, 0 * self.problem.s)
-            return dr, dlam, dr - self._rho[:, None] * turned()
+            dr, dlam, moves = self._step(error, 0 * self.problem.s)
+            return dr, dlam, dr - self._rho[:, None] * moves()
 
         by_parameter = self.by_parameter if np.any(self.problem.law.rough) else 0 * self._point
         place = self.problem.law, self._point, contacts, self.tangent.D, by_parameter

@@ -16,12 +16,14 @@ it is small enough.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.derivatives.constants import INNER, ROUND
@@ -29,11 +31,14 @@ from contactopt.derivatives.factors import UNIQUE, Factors, SparseFactors, dense
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface, InterfaceOperator
 from contactopt.linear.stacked import Stacked, norm
+from contactopt.methods.constants import LOOSE
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.bonded import Bonded, last_bonded
 from contactopt.methods.kernels.coupled_newton import Coupled, fitted
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
 from contactopt.problem import InterfaceProblem, dimensionless
+from contactopt.problem.scaling import scales_of
 
 ACCURACY = 1e-11  # least relative residual of an iterative solve
 ROUNDS = 12  # of GMRES, which gain four digits each
@@ -81,12 +86,20 @@ class Tangent:
         """The system for z and b of this module's head, for a symmetric Q."""
         return replace(self, D=self.D.transpose(0, 2, 1))
 
+    @cached_property
+    def other(self) -> Solve | None:
+        """What solves the system without factors of M, and only for a symmetric Q."""
+        if isinstance(self.problem.Q, InterfaceOperator):
+            return _by_iteration(self)
+        made = last_bonded(self.problem)
+        return None if made is None else _by_bonded(self, made)
+
     def solve_transposed(
         self, by_r: np.ndarray, by_multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]:
         """z (k d,) and b (p,) of M' (a, b) = (by_r, by_multipliers), and what gives a (k d,)."""
         back = self.transposed
-        if isinstance(self.problem.Q, InterfaceOperator):
+        if self.other is not None:
             z, b, moved = back.solve(back.slope(by_r), by_multipliers)
             rho = np.repeat(self.rho, self.D.shape[1])
             return z, b, lambda: z / rho + by_r - moved() - self.V @ b
@@ -96,15 +109,37 @@ class Tangent:
     @cached_property
     def solve(self) -> Solve:
         """The solver of M (dr, dlambda) = (error, balance); InputError where M is singular."""
+        if self.other is not None:
+            return self.other
         Q = self.problem.Q
-        if isinstance(Q, InterfaceOperator):
-            return _by_iteration(self)
 
         def solve(error: np.ndarray, balance: np.ndarray) -> Any:
             dr, multipliers = np.split(self.factors.solve(np.append(error, balance)), [len(error)])
             return dr, multipliers, lambda: Q @ dr
 
         return solve
+
+
+def _by_bonded(tangent: Tangent, made: Bonded) -> Solve | None:
+    """By the factors that Newton's method has made, while few contacts are open or slip."""
+    problem, D = tangent.problem, tangent.D
+    scales, loose = scales_of(problem), np.any(np.eye(D.shape[1]) != D, axis=(1, 2))
+    if loose.sum() > LOOSE * len(loose):
+        return None
+    unit, rho = scales.multipliers / scales.length, tangent.rho * scales.length / scales.force
+
+    def solve(error: np.ndarray, balance: np.ndarray) -> Any:
+        right = error.reshape(problem.q.shape), -balance * unit
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", la.LinAlgWarning)
+            try:
+                dr, multipliers = made.step(rho, *right, D)
+            except (la.LinAlgError, la.LinAlgWarning) as failed:
+                raise InputError(UNIQUE) from failed
+        dr, dlam = dr.ravel(), multipliers * scales.multipliers / scales.force
+        return dr, dlam, lambda: problem.Q @ dr
+
+    return solve
 
 
 def _by_iteration(tangent: Tangent) -> Solve:
