@@ -207,18 +207,15 @@ def dense_factors(Q: np.ndarray, V: np.ndarray, rho: np.ndarray, D: np.ndarray) 
 
     # the rows of the third unknowns
     touched = loose.reshape(k, d).any(axis=1).nonzero()[0]
-    left, mask = (
-        (rho / unit)[touched, None, None] * D[touched],
-        loose.reshape(k, d)[touched].ravel(),
-    )
+    left, mask = (rho / unit)[:, None, None] * D, loose.reshape(k, d)[touched].ravel()
+    left, a = left[touched], len(third)
     rows = left @ (Q.reshape(k, d, n)[touched] if len(touched) < k else Q.reshape(k, d, n))
     rows.reshape(-1, d, k, d)[np.arange(len(rows)), :, touched] += rest[touched] / unit
-    rows = rows.reshape(-1, n) if len(third) == len(mask) else rows.reshape(-1, n)[mask]
-    S, A = rows if len(third) == n else rows.take(third, axis=1), rows.take(first, axis=1)
-    if p:
-        moved = (left @ V.reshape(k, d, p)[touched]).reshape(len(mask), p)[mask]
-        S = np.block([[S, moved], [V[third].T, np.zeros((p, p))]])
-        A = np.concatenate([A, V[first].T])
+    rows = rows.reshape(-1, n) if a == len(mask) else rows.reshape(-1, n)[mask]
+    S, A = np.zeros((a + p, a + p)), np.concatenate([rows.take(first, axis=1), V[first].T])
+    S[:a, :a] = rows if a == n else rows.take(third, axis=1)
+    S[:a, a:] = (left @ V.reshape(k, d, p)[touched]).reshape(len(mask), p)[mask]
+    S[a:, :a] = V[third].T
     X = Y = G
     if len(G):
         B = np.concatenate([Q.take(third, axis=1)[second], V[second]], axis=1)
