@@ -9,13 +9,14 @@
     >>> jax.value_and_grad(pressure)(jax.numpy.array([0.3, 5.0]))
 
 The problems are solved outside of JAX, one after the other under `vmap`. The derivative of `solve`
-is the linear system of contactopt.derivatives, with the matrix of Newton's last step; that of
-`quantity` is contactopt.gradient. So jax.jvp, jax.vjp, jax.grad, jax.jacfwd and
-jax.jacrev all work. There are no second derivatives.
+is the linear system of contactopt.derivatives, with the matrix of Newton's last step, whose factors
+come with the solution; that of `quantity` is contactopt.gradient. So jax.jvp, jax.vjp, jax.grad,
+jax.jacfwd and jax.jacrev all work. There are no second derivatives.
 
 Where a contact is on the edge between open and closed, or stick and slip, a solution has one-sided
 derivatives only. A Kink warning then names the contacts, and the derivative is that of the piece at
-which the solver ended. contactopt.sensitivity has the one-sided ones.
+which the solver ended. contactopt.sensitivity has the one-sided ones. Where forces or motions are
+not unique, a warning says so, and derivatives that depend on which they are have the value NaN.
 """
 
 from __future__ import annotations
