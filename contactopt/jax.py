@@ -9,13 +9,14 @@
     >>> jax.value_and_grad(pressure)(jax.numpy.array([0.3, 5.0]))
 
 The problems are solved outside of JAX, one after the other under `vmap`. The derivative of `solve`
-is the linear system of contactopt.derivatives, with the matrix of Newton's last step; that of
-`quantity` is contactopt.gradient. So jax.jvp, jax.vjp, jax.grad, jax.jacfwd and
-jax.jacrev all work. There are no second derivatives.
+is the linear system of contactopt.derivatives, with the matrix of Newton's last step, whose factors
+come with the solution; that of `quantity` is contactopt.gradient. So jax.jvp, jax.vjp, jax.grad,
+jax.jacfwd and jax.jacrev all work. There are no second derivatives.
 
 Where a contact is on the edge between open and closed, or stick and slip, a solution has one-sided
 derivatives only. A Kink warning then names the contacts, and the derivative is that of the piece at
-which the solver ended. contactopt.sensitivity has the one-sided ones.
+which the solver ended. contactopt.sensitivity has the one-sided ones. Where forces or motions are
+not unique, a warning says so, and derivatives that depend on which they are have the value NaN.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from contactopt.derivatives.factors import UNSEEN, Whole
 from contactopt.derivatives.gradient import gradient
 from contactopt.derivatives.interface import Sensitivity, told_apart
-from contactopt.derivatives.linear import Tangent
 from contactopt.derivatives.states import chain_of
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
@@ -45,7 +46,11 @@ from contactopt.scenes.parameters import parameters as parameters_of
 from contactopt.scenes.parameters import put_all
 from contactopt.scenes.scene import Scene
 
-Arrays = tuple[np.ndarray, ...]
+Arrays = tuple[Any, ...]
+UNDETERMINED = (
+    "forces or motions are not unique here: a derivative that depends on which they are is not a"
+    " number."
+)
 
 
 class Kink(UserWarning):
@@ -105,11 +110,17 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
     def linearised(*data: Any) -> Arrays:
         at = _smooth(found(data))
         tangent, by_mu = at.tangent, np.broadcast_to(at.by_parameter, at.problem.q.shape)
-        return at.solution.reactions, at.solution.multipliers, tangent.rho, tangent.D, by_mu
+        whole = tangent.factors.whole
+        if not whole.unique:
+            warnings.warn(UNDETERMINED, stacklevel=2)
+        return at.solution.reactions, at.solution.multipliers, tangent.rho, tangent.D, by_mu, *whole
 
     def rule(data: Any, changes: Any) -> Any:
         _, q, mu, _, s = data
-        like = q, s, mu, jnp.zeros((*q.shape, q.shape[1])), q
+        (k, d), m = q.shape, q.size + s.size
+        numbers = jnp.zeros(m, int)
+        whole = jnp.zeros((m, m)), numbers, numbers, jnp.zeros((2, m)), jnp.array(True)
+        like = q, s, mu, jnp.zeros((k, d, d)), q, *whole
         r, lam, *linear = _outside(linearised, like, "sequential", *data)
         return (r, lam), _change(data, changes, r, lam, *linear)
 
@@ -119,7 +130,7 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
 
 
 def _change(
-    data: Any, changes: Any, r: Any, lam: Any, rho: Any, D: Any, by_mu: Any
+    data: Any, changes: Any, r: Any, lam: Any, rho: Any, D: Any, by_mu: Any, *whole: Any
 ) -> tuple[jax.Array, jax.Array]:
     """dr and dlambda of contactopt.derivatives for changes of Q, q, mu, V and s, linear in them."""
     (Q, q, _, V, _), (dQ, dq, dmu, dV, ds) = data, changes
@@ -133,39 +144,33 @@ def _change(
         moved = dr.reshape(q.shape) - rho[:, None] * (Q @ dr + V @ dlam).reshape(q.shape)
         return jnp.concatenate([dr - jnp.einsum("kab,kb->ka", D, moved).ravel(), V.T @ dr])
 
-    def inverse(act: Callable[..., Any]) -> Callable[[Any, jax.Array], jax.Array]:
-        return lambda _, b: _outside(partial(_each, act), b, "expand_dims", b, Q, V, rho, D)
-
-    change = lax.custom_linear_solve(M, right, inverse(_step), inverse(_step_back))
-    dr, dlam = jnp.split(change, [q.size])
+    dr, dlam = jnp.split(lax.custom_linear_solve(M, right, *_inverse(Whole(*whole))), [q.size])
     return dr.reshape(q.shape), dlam
 
 
-def _each(act: Callable[..., Any], right: Any, *data: Any) -> np.ndarray:
-    """Act on right sides (..., n): at once on those that share Q, V, rho and D of the system."""
-    right, data = np.asarray(right), tuple(np.asarray(array) for array in data)
-    own = [array.shape[:-size] for array, size in zip(data, (2, 2, 1, 3))]
-    lead = np.broadcast_shapes(*own)
-    right = np.broadcast_to(right, np.broadcast_shapes(lead, right.shape[:-1]) + right.shape[-1:])
-    found = np.empty(right.shape)
-    for place in np.ndindex(lead):
-        here = tuple(slice(None) if most == 1 else i for i, most in zip(place, lead))
-        given = (array[tuple(i % n for i, n in zip(place, all))] for array, all in zip(data, own))
-        columns = right[here].reshape(-1, right.shape[-1]).T
-        found[here] = act(Tangent(*given), columns).T.reshape(found[here].shape)
-    return found
+def _inverse(whole: Whole) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """What solves M x = b and M' x = b from the factors. Where M is singular, x is no number; but
+    for a right side b of M' that does not see what is undetermined.
+    """
+    triangular = partial(lax.linalg.triangular_solve, whole.array.T, left_side=True)
 
+    def solved(b: jax.Array) -> jax.Array:
+        y = triangular((whole.scales[0] * b)[whole.rows][:, None], transpose_a=True)
+        x = triangular(y, lower=True, unit_diagonal=True, transpose_a=True)[:, 0]
+        return whole.scales[1] * jnp.zeros(b.shape).at[whole.unknowns].set(x, unique_indices=True)
 
-def _step(tangent: Tangent, right: np.ndarray) -> np.ndarray:
-    """M^-1 times columns (n, j)."""
-    return np.concatenate(tangent.solve(*np.split(right, [len(tangent.Q)])))
+    def forward(_: Any, b: jax.Array) -> jax.Array:
+        return jnp.where(whole.unique, solved(b), jnp.nan)
 
+    def back(product: Callable[..., Any], b: jax.Array) -> jax.Array:
+        def checked(x: jax.Array) -> jax.Array:
+            left, size = (jnp.linalg.norm(whole.scales[1] * y) for y in (product(x) - b, b))
+            return jnp.where(left <= UNSEEN * size, x, jnp.nan)
 
-def _step_back(tangent: Tangent, right: np.ndarray) -> np.ndarray:
-    """The transpose of M^-1 times columns (n, j)."""
-    by_r, by_multipliers = np.split(right, [len(tangent.Q)])
-    z, b = tangent.solve_transposed(by_r, by_multipliers)
-    return np.concatenate([tangent.multipliers(by_r, z, b), b])
+        (found,) = jax.linear_transpose(solved, b)(b)
+        return lax.cond(whole.unique, lambda x: x, checked, found)
+
+    return forward, back
 
 
 def quantity(
@@ -228,7 +233,7 @@ def quantity(
 
 def _outside(act: Callable[..., Any], like: Any, vmap: str, *arrays: Any) -> Any:
     """Call a function of NumPy from JAX; its results have the shapes of `like`."""
-    shapes = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape, np.float64), like)
+    shapes = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), like)
     return jax.pure_callback(act, shapes, *arrays, vmap_method=vmap)
 
 

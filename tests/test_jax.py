@@ -84,6 +84,22 @@ def test_a_kink_is_reported():
         jax.grad(lambda x: solve(Q, x, 0.3)[0][0, 0])(jnp.asarray(q) + np.array([[0, 0], [1, 0]]))
 
 
+def test_what_is_not_unique_has_no_derivative_and_the_rest_has():
+    # two contacts press on one spring: only the sum of their normal forces is known
+    Q, q = np.eye(4), np.array([[-1.0, 0.0], [-1.0, 0.0]])
+    Q[0, 2] = Q[2, 0] = 1.0
+    for weights, known in (([1.0, 1.0], True), ([1.0, 0.0], False)):
+
+        def force(x, weights=weights):
+            return (jnp.array(weights) * solve(Q, x, 0.3, method="newton")[0][:, 0]).sum()
+
+        with pytest.warns(UserWarning, match="not unique"):
+            by = jax.grad(force)(jnp.asarray(q))
+        assert np.isfinite(by).all() == known
+        if known:  # both gaps together, since one alone would open one of the contacts
+            assert np.isclose(by[:, 0].sum(), -1.0)
+
+
 def test_quantities_of_a_scene():
     pressure = quantity("punch-2d", "pressure", ["mu", "E:punch"], elements=8)
     at = jnp.array([0.3, 5.0])

@@ -19,7 +19,7 @@ from contactopt import (
     solve,
 )
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.derivatives import linear
+from contactopt.derivatives import factors
 from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
@@ -136,7 +136,7 @@ def test_adjoint_is_the_transpose_of_forward(kind, dim):
 def test_factors_of_sticking_components_give_what_lu_of_all_gives(dim, unsymmetric, monkeypatch):
     made, states = [], set()
     for most in (0, 10**9):  # unknowns up to which the system is factorised whole
-        monkeypatch.setattr(linear, "WHOLE", most)
+        monkeypatch.setattr(factors, "WHOLE", most)
         for seed in range(6):
             problem = random_problem(seed, dim, unsymmetric=unsymmetric, contacts=12)
             ours = contactopt.sensitivity(problem, solve(problem, tol=1e-12))
@@ -148,6 +148,24 @@ def test_factors_of_sticking_components_give_what_lu_of_all_gives(dim, unsymmetr
     for one, other in zip(made[:6], made[6:]):
         for a, b in zip(one, other):
             assert np.abs(a - b).max(initial=0.0) < 1e-10 * max(1.0, np.abs(a).max(initial=0.0))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_factors_that_newton_has_made_give_what_other_factors_give(dim):
+    problem = reduce_bodies(scenes.flat_punch(dim, elements=20 // dim), Q="explicit").problem
+    solution = solve(problem, "newton", tol=1e-12)
+    ours = contactopt.sensitivity(problem, solution)
+    theirs = contactopt.sensitivity(replace(problem), solution)
+    assert ours.tangent.other is not None
+    assert theirs.tangent.other is None  # it is another problem, for which nothing is known
+    change, weight = random_change(problem, 1), random_change(problem, 2)["q"]
+    found = []
+    for one in (ours, theirs):
+        moved, dual = one.forward(**change), one.adjoint(reactions=weight)
+        found.append([moved.reactions, moved.multipliers, moved.displacements])
+        found[-1] += [dual.q, dual.mu, dual.s]
+    for a, b in zip(*found):
+        assert np.abs(a - b).max() <= 1e-10 * np.abs(b).max()
 
 
 def test_several_laws_in_one_problem():

@@ -14,7 +14,7 @@ Differentiating both equations gives one linear system,
     M (dr, dlambda) = (P_mu dmu - D rho du,  -ds - dV' r),       M = [[I - D + D rho Q,  D rho V],
                                              [V', 0]].
 
-M is the matrix of Newton's last step, and its transpose is solved as another such matrix is
+M is the matrix of Newton's last step. Factors of it, or another such system, serve its transpose
 (contactopt.derivatives.linear).
 
     forward   dr and dlambda for given changes of the data: J v, one solve for each direction v;

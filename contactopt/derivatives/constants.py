@@ -20,4 +20,4 @@ ROUND, INNER = 1e-4, 1e-6
 
 # unknowns up to which LU of all costs less than Cholesky's factors of those that stick, and what is
 # beside them
-WHOLE = 200
+WHOLE = 300

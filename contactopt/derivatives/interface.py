@@ -11,14 +11,16 @@ import numpy as np
 
 from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
-from contactopt.derivatives.linear import Tangent, transposed
+from contactopt.derivatives.linear import ACCURACY, Tangent, transposed
 from contactopt.errors import InputError
+from contactopt.methods.kernels.coupled_newton import improved
 from contactopt.problem import (
     InterfaceProblem,
     Scales,
     Solution,
     natural_map_residual,
 )
+from contactopt.problem.certificate import Moved
 from contactopt.problem.scaling import immovable, scales_of, without_rounding
 
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
@@ -74,11 +76,13 @@ class Sensitivity:
     """The linear system of the derivatives at one solution. It is factorised, or set up, once.
 
     distance  to a kink, over the largest force, within which a contact counts as weakly active [-]
+    moved     Q r (k dim,) of the solution's reactions, where it is known [length]
     """
 
     problem: InterfaceProblem
     solution: Solution
     distance: float
+    moved: np.ndarray | None = None
 
     @cached_property
     def _scales(self) -> Scales:
@@ -87,14 +91,17 @@ class Sensitivity:
     @cached_property
     def _rho(self) -> np.ndarray:
         """Steps (k,) of the natural map [force / length]."""
-        stiffest = self._scales.force / self._scales.length
-        return np.asarray(1 / np.maximum(self.problem.compliances, 1e-3 / stiffest))
+        own = self.problem.compliances
+        if not own.min(initial=np.inf) > 1e-3 * own.max(initial=0.0):
+            own = np.maximum(own, 1e-3 * self._scales.length / self._scales.force)
+        return np.asarray(1 / own)
 
     @cached_property
     def _point(self) -> np.ndarray:
         """y = r - rho u (k, dim) [force]."""
-        r = self.solution.reactions
-        u = self.problem.displacements(r, self.solution.multipliers)
+        r, problem = self.solution.reactions, self.problem
+        moved = problem.Q @ r.ravel() if self.moved is None else self.moved
+        u = (moved + problem.V @ self.solution.multipliers).reshape(r.shape) + problem.q
         return np.asarray(r - self._rho[:, None] * u)
 
     @cached_property
@@ -104,9 +111,11 @@ class Sensitivity:
         D = problem.law.project(self._point)[1].copy()
         D[~problem.law.rough, 1:, :] = 0.0  # no friction, no tangential force, even at rest
         # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
-        moves = ~immovable(problem).reshape(problem.q.shape)
-        D *= moves[:, :, None] & moves[:, None, :]
-        return Tangent(problem.Q, without_rounding(problem.V), self._rho, D, problem)
+        held = immovable(problem).reshape(problem.q.shape)
+        if held.any():
+            D[held[:, :, None] | held[:, None, :]] = 0.0
+        accuracy = max(ACCURACY, min(self.solution.residual, CERTIFIED))
+        return Tangent(problem, without_rounding(problem.V), self._rho, D, accuracy)
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:
@@ -160,12 +169,14 @@ class Sensitivity:
         error = -self.tangent.slope(du.ravel()).reshape(r.shape)
         if dmu is not None:
             error += self.by_parameter * dmu[:, None]
-        dr, dlam = self._step(error, -ds)
+        dr, dlam, moves = self._step(error, -ds)
         if self.weak:
             direction = np.zeros(problem.contacts) if dmu is None else dmu
-            extra = self.onesided.step(self._moved(dr, dlam, du), direction)
+            extra = self.onesided.step(dr - self._rho[:, None] * (moves() + du), direction)
             dr, dlam = dr + extra[0], dlam + extra[1]
-        return Change(dr, dlam, (problem.Q @ dr.ravel() + problem.V @ dlam).reshape(r.shape) + du)
+            moved = problem.Q @ dr.ravel() + problem.V @ dlam
+            return Change(dr, dlam, moved.reshape(r.shape) + du)
+        return Change(dr, dlam, moves() + du)
 
     @cached_property
     def onesided(self) -> Onesided:
@@ -173,8 +184,8 @@ class Sensitivity:
         contacts = np.array([weak.contact for weak in self.weak], dtype=int)
 
         def response(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            dr, dlam = self._step(error, 0 * self.problem.s)
-            return dr, dlam, self._moved(dr, dlam, 0 * dr)
+            dr, dlam, moves = self._step(error, 0 * self.problem.s)
+            return dr, dlam, dr - self._rho[:, None] * moves()
 
         by_parameter = self.by_parameter if np.any(self.problem.law.rough) else 0 * self._point
         place = self.problem.law, self._point, contacts, self.tangent.D, by_parameter
@@ -198,24 +209,23 @@ class Sensitivity:
         if np.any(by_u):
             by_r = by_r + np.asarray(transposed(problem.Q) @ by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
-        z, b = self.tangent.solve_transposed(by_r.ravel(), by_lam)
+        z, b, a = self.tangent.solve_transposed(by_r.ravel(), by_lam)
 
         def by_parameter() -> np.ndarray:
-            a = self.tangent.multipliers(by_r.ravel(), z, b).reshape(by_r.shape)
-            return np.asarray(np.sum(self.by_parameter * a, axis=1))
+            return np.asarray(np.sum(self.by_parameter * a().reshape(by_r.shape), axis=1))
 
         r, lam = self.solution.reactions, self.solution.multipliers
         return Dual(by_u - z.reshape(by_u.shape), -b, r, lam, by_parameter)
 
-    def _step(self, error: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dr (k, dim), dlambda (p,) on the piece of P at which the solver ended."""
-        dr, dlam = self.tangent.solve(error.ravel(), balance)
-        return dr.reshape(error.shape), dlam
-
-    def _moved(self, dr: np.ndarray, dlam: np.ndarray, du: np.ndarray) -> np.ndarray:
-        """dy = dr - rho (Q dr + V dlambda + du), (k, dim) [force]."""
-        moved = (self.problem.Q @ dr.ravel() + self.problem.V @ dlam).reshape(du.shape) + du
-        return np.asarray(dr - self._rho[:, None] * moved)
+    def _step(
+        self, error: np.ndarray, balance: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]:
+        """dr (k, dim), dlambda (p,) on the piece of P at which the solver ended, and what gives
+        Q dr + V dlambda (k, dim).
+        """
+        dr, dlam, moved = self.tangent.solve(error.ravel(), balance)
+        V = self.problem.V
+        return dr.reshape(error.shape), dlam, lambda: (moved() + V @ dlam).reshape(error.shape)
 
 
 def sensitivity(
@@ -249,7 +259,9 @@ def sensitivity(
             "sensitivity needs an InterfaceProblem and its Solution; "
             f"got {type(problem).__name__} and {type(solution).__name__}."
         )
-    residual = natural_map_residual(problem, solution.reactions, solution.multipliers)
+    r = solution.reactions
+    moved = _moved(problem, solution) if r.shape == problem.q.shape else None
+    residual = natural_map_residual(problem, r, solution.multipliers, moved)
     if not solution.solved or not residual <= CERTIFIED:
         raise InputError(
             f"only a certified solution has a derivative; this one is '{solution.status}' with the"
@@ -257,7 +269,17 @@ def sensitivity(
         )
     distance = told_apart(residual) if distance is None else distance
     check_number("distance", distance, low=0.0)
-    return Sensitivity(problem, solution, distance)
+    return Sensitivity(problem, solution, distance, None if moved is None else moved.value)
+
+
+def _moved(problem: InterfaceProblem, solution: Solution) -> Moved:
+    """Q r, from the displacements of the bodies where a method carried them along."""
+    form, X = getattr(problem.Q, "coupled", None), solution.displacements
+    if form is not None and X is not None and len(X.parts) == len(form.terms):
+        found = improved(form, X, solution.reactions)
+        if found.accuracy <= CERTIFIED:
+            return found
+    return Moved(np.asarray(problem.Q @ solution.reactions.ravel()), 0.0)
 
 
 def told_apart(residual: float) -> float:

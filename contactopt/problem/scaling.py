@@ -133,6 +133,7 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         s=problem.s / (columns * scales.force),
         law=problem.law.scaled(scales.force),
     )
+    scaled.__dict__["origin"] = problem
     return scaled, scales
 
 

@@ -234,6 +234,7 @@ def costs() -> list[dict[str, Any]]:
             contactopt.sensitivity(p, s).adjoint(reactions=w).mu  # noqa: B018
 
         own = cpu(linear, 3)
+        anew = cpu(partial(linear, replace(problem)), 3)
         rows.append(
             {
                 "problem": name,
@@ -241,7 +242,9 @@ def costs() -> list[dict[str, Any]]:
                 "Newton steps": steps,
                 "whole solve [s]": whole,
                 "gradient by all data [s]": own,
+                "anew [s]": anew,
                 "over the whole solve": own / whole,
+                "anew over the whole solve": anew / whole,
             }
         )
     return rows
@@ -284,8 +287,11 @@ def through_jax() -> list[dict[str, Any]]:
         h = 1e-6
         ends = [exact(arrays[0], arrays[1] + t * turned[1], *arrays[2:]) for t in (h, -h)]
         size = float(np.linalg.norm(turn) * np.linalg.norm(solve(problem).reactions))
+        at = contactopt.sensitivity(problem, solve(problem)).tangent
         acts = {
             "solve": partial(solve, problem),
+            "call": empty_call((*arrays, s), (turn, problem.s)),
+            "factors": lambda at=at: replace(at).factors.whole,
             "value": lambda f=plain, x=arrays: jax.block_until_ready(f(*x)),
             "gradient": lambda f=both, x=arrays: jax.block_until_ready(f(*x)),
         }
@@ -299,11 +305,20 @@ def through_jax() -> list[dict[str, Any]]:
                 "contactopt.solve [ms]": 1e3 * spent["solve"],
                 "value by JAX [ms]": 1e3 * spent["value"],
                 "and gradient [ms]": 1e3 * spent["gradient"],
+                "an empty call [ms]": 1e3 * spent["call"],
+                "factors [ms]": 1e3 * spent["factors"],
                 "gradient over value": more / spent["value"],
                 "gradient over contactopt.solve": more / spent["solve"],
             }
         )
     return rows
+
+
+def empty_call(arrays: tuple[Any, ...], results: tuple[Any, ...]) -> Callable[[], Any]:
+    """A call of NumPy from JAX with these arrays, in which nothing is computed."""
+    shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in results)
+    act = jax.jit(lambda *given: jax.pure_callback(lambda *_: results, shapes, *given))
+    return lambda: jax.block_until_ready(act(*arrays))
 
 
 def in_turn(acts: dict[str, Callable[[], Any]], repeats: int = 31) -> dict[str, float]:
@@ -372,20 +387,29 @@ the others are in units of N and mm:
 
 {{scenes}}
 
-**Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. The
-gradient of one function by all data (q, mu, s, Q, V) takes one factorisation with one solve, or one
-coupled linear solve to the relative accuracy 1e-11. It also takes the certificate of the solution.
-Components that are known at once leave the system. Cholesky's factors serve those that stick.
+**Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. It
+compares the gradient of one function by all data (q, mu, s, Q, V) with the whole solve. The
+gradient takes the certificate of the solution and one solve with the transposed system. The dense
+rows take the Cholesky factor that Newton's method has made. It is kept for the problem that was
+factorised last, as long as that problem is in use. The column "anew" is the gradient of a copy of
+the problem, for which no factor is kept. With multigrid the certificate takes one V-cycle, since
+the solution has the displacements of the bodies. The coupled linear system is solved to the
+certificate of the solution, at most to 1e-11, because its matrix is not known better. Every V-cycle
+about halves what is left. So ten digits of a gradient take about as many V-cycles as all steps of
+Newton's method, which are inexact, and this row stays near the whole solve.
 
 {{costs}}
 
 **JAX.** `contactopt.jax.solve` is compared with central differences along a random direction of q,
 over the norms of the forces and of the weights. Times are medians of CPU milliseconds, compiled and
-warm. The acts of a row are timed in turn. The gradient by Q, q, mu and V takes one call of NumPy
-from JAX more than the value, and one factorisation. That is a fifth of a curved contact's solve,
-which takes eight to ten steps of Newton's method. A flat punch takes two steps, and problems
-without a plate are swept in one or two milliseconds: there one factorisation and what JAX takes for
-a call are more than half of the solve.
+warm. The acts of a row are timed in turn. "Gradient over value" is the time of value and gradient
+by Q, q, mu and V together, less that of the value, over that of the value, all by JAX. The last
+column is over `contactopt.solve` without JAX. A gradient takes no call of NumPy more than the
+value: the call that solves the problem gives the factors of the linear system as well, and XLA
+solves with them. "An empty call" has the arrays of the value and computes nothing. "Factors" is the
+time to assemble and factorise that system alone, below which no gradient is. A curved contact takes
+eight to ten steps of Newton's method. A flat punch takes two steps with one Cholesky factor, and
+problems without a plate are swept without any factor: there the factors of the gradient weigh most.
 
 {{jax}}
 

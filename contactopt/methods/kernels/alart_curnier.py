@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 from contactopt.linear.deadline import enough
 from contactopt.linear.operators import diagonal
 from contactopt.methods.constants import LAST_LOOSEST, LAST_SHARE, LOOSE
-from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded
+from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded, bonded
 from contactopt.methods.kernels.krylov import krylov_step
 from contactopt.methods.kernels.semismooth import RIDGE, Equations
 from contactopt.methods.kernels.sparse_blocks import block_matrix, factorised
@@ -116,10 +116,8 @@ def newton_steps(problem: InterfaceProblem, P: Preconditioner | None = None) -> 
     if sp.issparse(problem.Q):
         solver = partial(block_step, matrix=block_matrix(problem.Q, problem.dim))
     else:
-        factor: Bonded | None = None
-        if len(problem.s):  # it pays for elastic bodies that a plate presses together
-            with suppress(la.LinAlgError):
-                factor = Bonded(problem.Q, problem.V)
+        # it pays for elastic bodies that a plate presses together
+        factor = bonded(problem) if len(problem.s) else None
         solver = partial(_dense_step, factor=factor)
 
     def exact(ridge: float) -> Step:

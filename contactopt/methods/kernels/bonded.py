@@ -13,10 +13,13 @@ Newton's method, comes with it.
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import scipy.linalg as la
 
 from contactopt.linear.operators import asymmetry
+from contactopt.problem import InterfaceProblem
 
 # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
 LEAST_PIVOT = 1e-7
@@ -89,3 +92,26 @@ class Bonded:
             if len(balance):
                 multipliers = multipliers + np.linalg.solve(self.K, self.X[N].T @ z_N)
         return dr.reshape(k, d), multipliers
+
+
+_last: list[tuple[weakref.ref[InterfaceProblem], Bonded]] = []
+
+
+def bonded(problem: InterfaceProblem) -> Bonded | None:
+    """The factors of a dimensionless problem, or None. They are kept for derivatives, until another
+    problem is factorised or the one that was made dimensionless is gone.
+    """
+    try:
+        made = Bonded(problem.Q, problem.V)
+    except la.LinAlgError:
+        return None
+    origin = getattr(problem, "origin", problem)
+    _last[:] = [(weakref.ref(origin, lambda _: _last.clear()), made)]
+    return made
+
+
+def last_bonded(problem: InterfaceProblem) -> Bonded | None:
+    """The factors of a problem, in the units of `dimensionless`, if Newton's method made them last
+    for it; else None.
+    """
+    return next((made for origin, made in tuple(_last) if origin() is problem), None)

@@ -125,14 +125,19 @@ class Coupled:
         One V-cycle improves the displacements. The accuracy stated is that before it: the energy
         (f'Bf)^1/2 of the missing forces f over that of the displacements.
         """
-        form, r = self.form, at.r + error
-        missing = form.unbalanced(at.X, r.ravel())
-        correction = form.approximate(missing)
-        energy = at.X.dot(form.pulled(r.ravel()) - missing)
-        lacking = missing.dot(correction)
-        accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
-        better = at.X + correction
-        return r, at.multipliers, Moved(form.moved(better, r.ravel()), float(accuracy), better)
+        r = at.r + error
+        return r, at.multipliers, improved(self.form, at.X, r)
+
+
+def improved(form: CoupledForm, X: Stacked, r: np.ndarray) -> Moved:
+    """Q r for forces r (k, d) from displacements X of the bodies, which one V-cycle improves."""
+    missing = form.unbalanced(X, r.ravel())
+    correction = form.approximate(missing)
+    energy = X.dot(form.pulled(r.ravel()) - missing)
+    lacking = missing.dot(correction)
+    accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
+    better = X + correction
+    return Moved(form.moved(better, r.ravel()), float(accuracy), better)
 
 
 def coupled_steps(
