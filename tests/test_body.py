@@ -182,6 +182,21 @@ def test_a_mesh_in_two_pieces_is_refused():
         body_of("plane-strain", mesh=loose)
 
 
+@pytest.mark.parametrize("mesh", [skfem.MeshTri, skfem.MeshTet])
+def test_an_element_that_lies_over_its_neighbour_is_refused(mesh):
+    """A node within the mesh is moved past the elements around it, whose volumes stay positive once
+    they are numbered the right way round.
+    """
+    mesh, top = mesh().refined(2), {"top": lambda x: x[-1] == 1, "bottom": lambda x: x[-1] == 0}
+    kind = "plane-strain" if len(mesh.p) == 2 else "solid"
+    places = mesh.p.copy()
+    places[:, np.argmin(np.abs(places - 0.5).sum(axis=0))] = 0.95
+    held = dict(supports=(Support("bottom"),))
+    body_of(kind, mesh=mesh.with_boundaries(top), **held)
+    with pytest.raises(InputError, match="'b': an element of the mesh lies over its neighbour"):
+        body_of(kind, mesh=type(mesh)(places, mesh.t).with_boundaries(top), **held)
+
+
 def test_negative_radius_is_refused():
     mesh = block("axisymmetric", -2, 0)
     with pytest.raises(InputError, match="r >= 0"):

@@ -27,7 +27,7 @@ from contactopt import (
 )
 from contactopt.bodies import assemble
 from contactopt.bodies import elastic as elastic_bodies
-from contactopt.problem.unbalanced_loads import escape
+from contactopt.problem.unbalanced_loads import escape, sentence
 from contactopt.readings.quantities import elastic_energy
 from contactopt.readings.resultants import pair_resultants
 
@@ -247,6 +247,31 @@ def test_plates_that_are_pulled_off_are_named():
         InputError, match=r"pulls the bodies apart.*body 'punch' .plate 'top' along y"
     ):
         solve(reduce_bodies(lifted).problem)
+
+
+@pytest.mark.parametrize("law,holds", [("tresca", 0.25), ("frictionless", 0.0)])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_given_bound_of_friction_holds_up_to_bound_times_area(law, holds, dim):
+    """A block on an area of one, askew, pushed along the floor by F and pressed by one: it holds as
+    long as F <= bound times area. What pulls it off is told, too.
+    """
+    part, c, s = Part("b", block([0.0] * dim, [1.0] * dim, [3] * dim), SOFT), 0.8, 0.6
+    turn = np.eye(dim)
+    turn[0, 0], turn[0, -1], turn[-1, 0], turn[-1, -1] = c, -s, s, c
+    mesh = replace(part.mesh, doflocs=turn @ part.mesh.p)
+    floor, kind = Rigid("floor", tuple(turn[:, -1])), "solid" if dim == 3 else "plane-strain"
+
+    def told(along, normal):
+        load = BodyForce(tuple(along * turn[:, 0] + normal * turn[:, -1]))
+        loaded = replace(part, mesh=mesh, loads=(load,), contact="bottom")
+        pair = Contact("b", "floor", 0.25, law=law)
+        scene = Scene("given", bodies=(loaded, floor), contacts=(pair,), kind=kind)
+        problem = reduce_bodies(scene).problem
+        found = escape(problem)
+        return "" if found is None else sentence(problem, found)
+
+    assert "slides off" in told(1.03 * holds + 1e-3, -1.0) and told(0.0, 1.0)
+    assert told(0.97 * holds, -1.0) == ""  # the polygon of directions in space is 2 percent wide
 
 
 def test_a_body_far_from_the_origin_floats_as_well():

@@ -235,6 +235,16 @@ def test_bad_paths_are_refused():
         follow([dragged(0.1), replace(dragged(0.1), upper=held)])
 
 
+def test_a_state_that_nothing_can_hold_is_named():
+    def pushed(x):
+        block = dragged(0.0).upper
+        plate = Plate("top", {"x": x, "y": -1.0})
+        return Scene("pushed", replace(block, supports=(), loads=(plate,)), Rigid("floor"), 0.4)
+
+    with pytest.raises(InputError, match=r"^state 3 of 3: .*'block' slides off"):
+        follow([pushed(x) for x in (0.0, 0.3, 0.5)])
+
+
 def test_files_of_a_path(cycle, tmp_path):
     cycle.write(tmp_path / "new")
     assert {p.name for p in (tmp_path / "new").iterdir()} == {"history.csv", "path.npz"}

@@ -5,7 +5,18 @@ of the width.
 import numpy as np
 import pytest
 
-from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, run
+from contactopt import (
+    Contact,
+    Material,
+    Part,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    follow,
+    natural_map_residual,
+    run,
+)
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.meshes.structured import rename, tensor_mesh
 
@@ -83,3 +94,27 @@ def test_a_coating_between_two_contacts_is_reduced_and_does_not_matter():
 def test_compact_bodies_have_no_ground():
     reduction = reduce_bodies(shim(2, 0.2, 2, 8))
     assert reduction.grounded() is None
+
+
+def test_a_strip_that_friction_holds_remembers_its_slip():
+    """A strip on a rigid floor under an even pressure p, pulled at its end by F per depth and
+    pushed back. Friction q = mu p holds it beyond l = F / q, where the strip of stiffness k = E h
+    has slipped by q (l - x)^2 / 2 k. The work of friction is D = F^3 / 6 k q at first; each
+    reversal works over the same length with twice the force at twice the stretch, and costs 2 D.
+    """
+    length, h, p, mu, pull = 12.0, 0.1, 2.0, 0.5, 8.0
+    ticks = np.linspace(0, length, 97), np.linspace(0, h, 3)
+    mesh = tensor_mesh(*ticks)
+
+    def state(force):
+        loads = Traction("y+", (0.0, -p)), Traction("x-", (-force / h, 0.0))
+        strip = Part("strip", mesh, Material(E, 0.0), loads=loads, contact="y-")
+        return Scene("strip", strip, Rigid("floor"), mu)
+
+    path = follow([state(force) for force in (0.0, pull, -pull, pull)])
+    assert path.solved and path.reduction.on_ground
+    exact = pull**3 / (6 * E * h * mu * p)
+    work = np.diff(path.history["friction_work"]) / exact
+    assert work == pytest.approx([1.0, 2.0, 2.0], rel=0.01)
+    for step, known in enumerate(path.states):
+        assert natural_map_residual(path.problem(step), known.solution.reactions) < 1e-7

@@ -28,7 +28,7 @@ from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError
 from contactopt.material import lame
-from contactopt.meshes.cells import SHAPES, straight
+from contactopt.meshes.cells import SHAPES, overlapping, straight
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
@@ -100,8 +100,9 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
 def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     """Check that a part's mesh fits the kind of the scene and has all boundaries that are named.
 
-    InputError if it has another dimension, elements that are not known, numbers that are not
-    finite, points on the wrong side of an axis of revolution, or lacks a named boundary.
+    InputError if it has another dimension, elements that are not known or lie over each other,
+    numbers that are not finite, points on the wrong side of an axis of revolution, or lacks a named
+    boundary.
     """
     if (
         not isinstance(mesh, skfem.Mesh)
@@ -116,6 +117,12 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     if not np.all(np.isfinite(mesh.p)):
         raise InputError(
             f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers."
+        )
+    if (over := overlapping(mesh)) is not None:
+        place = ", ".join(f"{x:g}" for x in mesh.p[:, mesh.t[:, over]].mean(axis=1))
+        raise InputError(
+            f"body '{part.name}': an element of the mesh lies over its neighbour, at ({place});"
+            " move its nodes apart, or mesh this place anew."
         )
     if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
         raise InputError(

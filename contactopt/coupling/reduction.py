@@ -64,6 +64,7 @@ class Reduction:
     seconds    phase -> time
     planes     of symmetry beyond which mirror images make the bodies whole
     on_ground  whether a ground holds thin bodies (contactopt.bodies.thin)
+    slipped    (k, dim - 1) tangential displacement from which the problem measures slip [length]
     """
 
     scene: Scene
@@ -74,6 +75,7 @@ class Reduction:
     seconds: dict[str, float]
     planes: tuple[SymmetryPlane, ...] = ()
     on_ground: bool = False
+    slipped: np.ndarray | float = 0.0
     _known: WeakKeyDictionary[Solution, tuple[Any, ...]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -178,6 +180,7 @@ class Reduction:
         missing = self.seen(displaced) - self.problem.displacements(
             solution.reactions, solution.multipliers
         )
+        missing[:, 1:] -= self.slipped
         return replace(made, problem=replace(made.problem, q=made.problem.q + missing))
 
     def _with(self, bodies: tuple[Body, ...], Q: Interface) -> Reduction:
@@ -197,7 +200,16 @@ class Reduction:
         bodies = each(lambda pair: pair[0].loaded(scene, pair[1]), pairs, _parallel(self.bodies))
         problem = problem_of(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
-        return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
+        made = replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
+        return replace(made, slipped=0.0)
+
+    def after(self, slipped: np.ndarray) -> Reduction:
+        """The step of a load path that follows a state: slip is measured from the tangential
+        displacements (k, dim - 1) of that state [length].
+        """
+        q = self.problem.q.copy()
+        q[:, 1:] -= slipped
+        return replace(self, problem=replace(self.problem, q=q), slipped=slipped)
 
 
 def reduce(

@@ -97,6 +97,24 @@ def volumes(mesh: skfem.Mesh) -> np.ndarray:
     return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
 
 
+def overlapping(mesh: skfem.Mesh) -> int | None:
+    """The number of a triangle or tetrahedron that lies over its neighbour, on the same side of the
+    facet between them; None without any, and for elements of other shapes, which fold within
+    themselves before that.
+    """
+    if len(mesh.t) != len(mesh.p) + 1:
+        return None
+    inner = np.flatnonzero(mesh.f2t[1] >= 0)
+    corners = mesh.facets[:, inner]
+    normals = area_vectors(mesh.p[:, corners])
+    sides = []
+    for cell in mesh.f2t[:, inner]:
+        across = mesh.t[:, cell].sum(axis=0) - corners.sum(axis=0)  # the corner off the facet
+        sides.append(np.sum(normals * (mesh.p[:, across] - mesh.p[:, corners[0]]), axis=0))
+    over = inner[sides[0] * sides[1] > 0]
+    return int(mesh.f2t[0, over[0]]) if len(over) else None
+
+
 def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
     """Numbers (c, f) of the corners of facets (f,) of the surface, in the order around each that
     makes normals point outwards; in the plane the body is on their left.

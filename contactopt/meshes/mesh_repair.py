@@ -12,7 +12,14 @@ import skfem
 from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
-from contactopt.meshes.cells import area_vectors, joined, mirrored, outer_corners, volumes
+from contactopt.meshes.cells import (
+    area_vectors,
+    joined,
+    mirrored,
+    outer_corners,
+    overlapping,
+    volumes,
+)
 
 SAME = 1e-6  # places this fraction of a size apart are one place
 # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
@@ -207,6 +214,8 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
             int(np.argmax(np.any(mesh.t2f == np.argmax(shared), axis=0))),
             "more than two elements share a facet, one of them is {}; elements must not overlap.",
         )
+    if (over := overlapping(mesh)) is not None:
+        raise cells.refused(over, "{} lies over its neighbour; mesh this place anew.")
     # the outward normals of a closed surface integrate to zero
     areas = area_vectors(mesh.p[:, outer_corners(mesh, mesh.boundary_facets())])
     total = np.abs(areas.sum(axis=1)).max()

@@ -3,8 +3,10 @@
 Every solution has forces r in the friction cones K with V' r + s = 0. A motion z (p,) of the free
 bodies that every contact lets pass, V z in the dual cone of K, g_n >= mu |g_t| at each contact, has
 z' V' r >= 0 for all such r. Where it moves the loads forward, s' z > 0, this contradicts z' V' r =
--s' z: there is no solution, and the bodies fly apart, slide off or topple along z. Where the forces
-of least squares that balance the loads lie in the cones there is no such motion. Otherwise the
+-s' z: there is no solution, and the bodies fly apart, slide off or topple along z. A contact whose
+friction has a given bound b in place of mu r_n lets every motion with g_n >= 0 pass, and takes no
+more work than b |g_t| from it, so that there s' z > sum b |g_t| is the contradiction. Where the
+forces of least squares that balance the loads are admissible there is no such motion. Otherwise the
 search for it is a linear program with a polygon inside each cone; what it finds is checked on its
 own.
 
@@ -50,17 +52,17 @@ class Escape:
 def escape(problem: InterfaceProblem) -> Escape | None:
     """Find a motion along which the loads drive the bodies away from all contacts, or None.
 
-    Looked at are laws under which contacts can only push. Under laws whose friction is no cone,
-    only motions count that do not slide where there is friction.
+    Looked at are laws under which contacts can only push. Where the bound of friction is neither
+    given nor mu r_n, only motions count that do not slide.
     """
     if not problem.law.unilateral or not np.any(problem.s):
         return None
     problem = isotropic(problem)
-    s = problem.s / np.abs(problem.s).max()
-    if _balanced(problem, s):
+    s, given = problem.s / np.abs(problem.s).max(), _given(problem)
+    if _balanced(problem, s, given):
         return None
-    motion = _search(problem, sp.csr_array(problem.V), s)
-    if motion is None or not _passes(problem, s, motion):
+    motion = _search(problem, sp.csr_array(problem.V), s, given)
+    if motion is None or not _passes(problem, s, given, motion):
         return None
     g = (problem.V @ motion).reshape(problem.q.shape)
     opens = bool(np.abs(g[:, 1:]).max(initial=0.0) <= FLAT * np.abs(g).max(initial=0.0))
@@ -83,59 +85,75 @@ def _along(rows: sp.csr_array, dim: int) -> list[Any]:
     return [sum(c * rows[normal + 1 + i] for i, c in enumerate(way)) for way in polygon(dim)[0]]
 
 
-def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
-    """Whether the forces of least squares that balance the loads lie in the cones."""
+def _given(problem: InterfaceProblem) -> np.ndarray:
+    """(k,) given bounds of friction over the largest load: 0 where friction is mu r_n, infinite
+    where the bound depends on r_n in another way.
+    """
+    force = np.abs(problem.s).max()
+    bounds = [problem.law.bound(np.full(problem.contacts, r_n)) for r_n in (0.0, force)]
+    other = problem.law.rough & (problem.mu == 0)
+    return np.where(other, np.where(bounds[0] == bounds[1], bounds[0] / force, np.inf), 0.0)
+
+
+def _balanced(problem: InterfaceProblem, s: np.ndarray, given: np.ndarray) -> bool:
+    """Whether the forces of least squares that balance the loads are admissible."""
     even = problem.V @ np.linalg.lstsq(problem.V.T @ problem.V, -s, rcond=None)[0]
     r = even.reshape(problem.q.shape)
-    held = np.all(np.linalg.norm(r[:, 1:], axis=1) <= problem.mu * r[:, 0])
+    bound = problem.mu * r[:, 0] + np.where(np.isinf(given), 0.0, given)
+    held = np.all(r[:, 0] >= 0) and np.all(np.linalg.norm(r[:, 1:], axis=1) <= bound)
     left = np.linalg.norm(problem.V.T @ even + s)
     return bool(held and left <= BALANCED * np.linalg.norm(s))
 
 
-def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
-    """min |z|_1 with s' z = 1 and V z in a polygon inside each dual cone; None without any."""
+def _search(
+    problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray, given: np.ndarray
+) -> np.ndarray | None:
+    """min |z|_1 with s' z - given' w = 1, V z in a polygon inside each dual cone, and w >= |g_t| in
+    a polygon where the bound is given; None without any.
+    """
     from scipy.optimize import linprog  # late, since it takes long to import
 
     normal, factor = V[:: problem.dim], polygon(problem.dim)[1]
-    fixed = ~_cones(problem)
-    smooth = (problem.mu == 0) | fixed
-    mu = sp.diags_array(factor * problem.mu)
-    rows = [-normal[smooth]]
-    rows += [(mu @ slope - normal)[~smooth] for slope in _along(V, problem.dim)]
-    A = sp.vstack(rows, format="csr")
+    fixed, bounded = np.isinf(given), np.isfinite(given) & (given > 0)
+    smooth, count = problem.mu == 0, int(np.sum(bounded))
+    mu, slopes = sp.diags_array(factor * problem.mu), _along(V, problem.dim)
+    rows = [-normal[smooth]] + [(mu @ slope - normal)[~smooth] for slope in slopes]
+    within, slid = sp.vstack(rows), sp.vstack([factor * slope[bounded] for slope in slopes])
+    own = sp.vstack([-sp.eye_array(count)] * len(slopes))
     blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-    equal = sp.vstack([sp.csr_array(s[None]), V[blocks[fixed, 1:].ravel()]], format="csr")
+    equal = sp.vstack([sp.csr_array(s[None]), V[blocks[fixed, 1:].ravel()]])
+    lost = sp.csr_array(-given[bounded][None])
+    lost.resize(equal.shape[0], count)
+    A = sp.block_array([[within, -within, None], [slid, -slid, own]], format="csr")
     answer = linprog(  # z = z+ - z-
-        np.ones(2 * len(s)),
-        sp.hstack([A, -A], format="csr"),
+        np.append(np.ones(2 * len(s)), np.zeros(count)),
+        A,
         np.zeros(A.shape[0]),
-        sp.hstack([equal, -equal], format="csr"),
+        sp.hstack([equal, -equal, lost], format="csr"),
         np.append(1.0, np.zeros(equal.shape[0] - 1)),
-        (0, 1 / SURE),
+        [(0, 1 / SURE)] * (2 * len(s)) + [(0, None)] * count,
         method="highs",
         options={"time_limit": SECONDS},
     )
     if answer.x is None or answer.status != 0:
         return None
-    return np.asarray(answer.x[: len(s)] - answer.x[len(s) :])
+    return np.asarray(answer.x[: len(s)] - answer.x[len(s) : 2 * len(s)])
 
 
-def _cones(problem: InterfaceProblem) -> np.ndarray:
-    """(k,) contacts whose forces fill a cone, or are normal to the surface."""
-    return np.asarray(~problem.law.rough | (problem.mu > 0))
-
-
-def _passes(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> bool:
+def _passes(
+    problem: InterfaceProblem, s: np.ndarray, given: np.ndarray, motion: np.ndarray
+) -> bool:
     """Whether the motion does work and meets the conditions of all contacts up to rounding."""
     g = (problem.V @ motion).reshape(problem.q.shape)
     size = np.abs(problem.V) @ np.abs(motion)
     slide = np.linalg.norm(g[:, 1:], axis=1)
-    needed = np.where(
-        _cones(problem), problem.mu * slide, np.where(slide > SLACK * size.max(), np.inf, 0.0)
-    )
+    fixed = np.isinf(given) & (slide > SLACK * size.max())
+    needed = np.where(fixed, np.inf, problem.mu * slide)
     work = s * motion
+    lost = np.sum(given[np.isfinite(given)] * slide[np.isfinite(given)])
     return bool(
-        np.all(g[:, 0] - needed >= -SLACK * size.max()) and work.sum() > SURE * np.abs(work).sum()
+        np.all(g[:, 0] - needed >= -SLACK * size.max())
+        and work.sum() - lost > SURE * np.abs(work).sum()
     )
 
 

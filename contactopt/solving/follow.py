@@ -50,7 +50,8 @@ def follow(
 
     Raises
     ------
-    InputError : for an empty path, or for states that are not those of one scene
+    InputError : for an empty path, for states that are not those of one scene, and for a state
+        whose loads nothing can hold, which it names
     """
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
@@ -77,16 +78,19 @@ def follow_path(
     solved: Solved | None = None
     bodies: Forces | None = None
     for scene in scenes:
+        named = f"state {len(states) + 1}{total}{scene.state and f' ({scene.state})'}"
         if solved is None:
             once = isinstance(scenes, Sized) and len(scenes) == 1
             solved = solve_scene(scene, elements, zone, options, once=once)
         else:
-            solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
+            try:
+                solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
+            except InputError as error:
+                raise InputError(f"{named}: {error}") from error
         state, bodies = state_of(solved, states[-1] if states else None, bodies)
         states.append(state)
         steps = count(state.solution.iterations, "iteration")
-        step = scene.state and f" ({scene.state})"
-        options.note(f"state {len(states)}{total}{step}: {state.solution.status}, {steps}")
+        options.note(f"{named}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
         if options.restart is not None:

@@ -192,10 +192,7 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
     problem that comes back is that of this step alone. InputError if more than loads and friction
     differ.
     """
-    reduction = before.reduction.loaded(scene)
-    q = reduction.problem.q.copy()
-    q[:, 1:] -= slipped
-    step = replace(reduction, problem=replace(reduction.problem, q=q))
+    step = before.reduction.loaded(scene).after(slipped)
     known = options.restart.start(step) if options.restart else None
     return _solved(step, known or before.solution, options, {})
 
@@ -263,12 +260,14 @@ def _on_ground(
     """The answer for thin bodies, which a ground holds until it bears nothing or no longer gets
     less to bear.
     """
-    begin, before = time.perf_counter(), np.inf
+    before = np.inf
     solution = answer(held.problem, start)
+    seconds = Counter(solution.seconds)
     for _ in range(ROUNDS):
         left = _doubt(held, solution)
         if left <= BALANCED or left > SLOW * before or not solution.solved:
             break
         held, before = held.pulled(solution), left
         solution = answer(held.problem, solution)
-    return held, replace(solution, seconds={"solve": time.perf_counter() - begin})
+        seconds.update(solution.seconds)
+    return held, replace(solution, seconds=dict(seconds))

@@ -22,7 +22,8 @@ from contactopt.bodies.solvers.system import BodySolver, System, out_of_memory
 from contactopt.errors import InputError
 
 FACTORISE, SOLVE = 12, 33  # PARDISO's phases
-NO_MEMORY = -2, -9  # its errors
+NO_MEMORY, NO_PIVOT = (-2, -9), -4  # its errors
+DEFINITE, INDEFINITE = 2, -2  # its kinds of symmetric matrices
 
 
 class PardisoSolver(BodySolver):
@@ -33,7 +34,7 @@ class PardisoSolver(BodySolver):
 
     def __init__(self, system: System):
         try:
-            from pypardiso import PyPardisoSolver
+            from pypardiso.pardiso_wrapper import PyPardisoError
         except ImportError as error:
             raise InputError(
                 "the body solver 'pardiso' needs the package pypardiso: pip install pypardiso."
@@ -42,19 +43,32 @@ class PardisoSolver(BodySolver):
         library()  # so that pypardiso need not search for it
         self.upper = sp.triu(system.A, format="csr")
         self.upper.sort_indices()
-        self.factors = PyPardisoSolver(mtype=2, phase=FACTORISE)  # symmetric positive definite
-        # MKL's memory is not Python's
-        weakref.finalize(self, self.factors.free_memory, everything=True)
         self._one_at_a_time = Lock()  # PARDISO writes to its handle
         trailing = np.zeros(0, int) if system.trailing is None else system.trailing
-        self.factors.perm = np.zeros(self.n, dtype=np.int32)
-        self.factors.perm[trailing] = 1
-        # own values; METIS; the Schur complement beside the factors
-        for index, value in {1: 1, 2: 2, 36: 2 if len(trailing) else 0}.items():
-            self.factors.set_iparm(index, value)
-        # as one column: asked for as many right-hand sides as S has columns, oneMKL crashes
-        self._schur = self._call(np.zeros(max(len(trailing) ** 2, 1)))
+        try:
+            self._schur = self._factorised(DEFINITE, trailing)
+        except PyPardisoError as error:
+            if error.value != NO_PIVOT:
+                raise
+            # rounding makes a pivot of a thin body negative
+            self._schur = self._factorised(INDEFINITE, trailing)
         self.factors.set_phase(SOLVE)
+
+    def _factorised(self, kind: int, trailing: np.ndarray) -> np.ndarray:
+        """Factorise; the Schur complement on the trailing unknowns, as one column."""
+        from pypardiso import PyPardisoSolver
+
+        factors = self.factors = PyPardisoSolver(mtype=kind, phase=FACTORISE)
+        # MKL's memory is not Python's
+        weakref.finalize(self, factors.free_memory, everything=True)
+        factors.perm = np.zeros(self.n, dtype=np.int32)
+        factors.perm[trailing] = 1
+        # own values; METIS; pivots as they are; of blocks of one or two where they may be negative;
+        # the Schur complement beside the factors
+        for index, value in {1: 1, 2: 2, 10: 16, 21: 1, 36: 2 if len(trailing) else 0}.items():
+            factors.set_iparm(index, value)
+        # as one column: asked for as many right-hand sides as S has columns, oneMKL crashes
+        return self._call(np.zeros(max(len(trailing) ** 2, 1)))
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         if not load.size:
