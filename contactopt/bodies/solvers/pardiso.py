@@ -30,6 +30,7 @@ class PardisoSolver(BodySolver):
 
     name = "pardiso"
     releases_lock = True
+    order = 2  # METIS; 0 is minimum degree
 
     def __init__(self, system: System):
         try:
@@ -49,8 +50,8 @@ class PardisoSolver(BodySolver):
         trailing = np.zeros(0, int) if system.trailing is None else system.trailing
         self.factors.perm = np.zeros(self.n, dtype=np.int32)
         self.factors.perm[trailing] = 1
-        # own values; METIS; the Schur complement beside the factors
-        for index, value in {1: 1, 2: 2, 36: 2 if len(trailing) else 0}.items():
+        # own values; order; the Schur complement beside the factors
+        for index, value in {1: 1, 2: self.order, 36: 2 if len(trailing) else 0}.items():
             self.factors.set_iparm(index, value)
         # as one column: asked for as many right-hand sides as S has columns, oneMKL crashes
         self._schur = self._call(np.zeros(max(len(trailing) ** 2, 1)))
