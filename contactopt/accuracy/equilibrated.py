@@ -45,7 +45,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.accuracy.airy import least_by_airy
+from contactopt.accuracy.airy import Airy
 from contactopt.accuracy.composite_element import (
     WEIGHT,
     components,
@@ -73,25 +73,25 @@ class Simplices:
         return len(self.mesh.p)
 
     @cached_property
-    def _map(self) -> np.ndarray:
+    def map(self) -> np.ndarray:
         """(e, dim, dim) the matrices B from the reference element."""
         x = self.mesh.p[:, self.mesh.t]
         return np.moveaxis(x[:, 1:] - x[:, :1], 2, 0)
 
     @cached_property
-    def _ratio(self) -> np.ndarray:
+    def ratio(self) -> np.ndarray:
         """(e,) |det B|."""
-        return np.abs(np.linalg.det(self._map))
+        return np.abs(np.linalg.det(self.map))
 
     @cached_property
     def volume(self) -> np.ndarray:
         """(e,) [length^dim]."""
-        return self._ratio / (2 if self.dim == 2 else 6)
+        return self.ratio / (2 if self.dim == 2 else 6)
 
     @cached_property
     def back(self) -> np.ndarray:
         """(e, dim, dim) the inverses of these matrices."""
-        return np.linalg.inv(self._map)
+        return np.linalg.inv(self.map)
 
     @cached_property
     def slopes(self) -> np.ndarray:
@@ -155,11 +155,13 @@ class Simplices:
         ends, edges = self.between
         at_vertex, at_edge = nodal[:, t], nodal[:, self.mesh.nvertices + edges]
         at_edge = at_edge - (at_vertex[:, ends[0]] + at_vertex[:, ends[1]]) / 2
-        gradient = np.repeat(np.einsum("cae,eai->eci", at_vertex, G)[:, None], d + 1, axis=1)
-        for (i, j), own in zip(ends.T, at_edge.transpose(1, 2, 0)):
+        gradient = np.repeat((at_vertex.transpose(2, 0, 1) @ G)[:, None], d + 1, axis=1)
+        for (i, j), bubbles in zip(ends.T, at_edge.transpose(1, 2, 0)):
+            there = np.flatnonzero(bubbles.any(axis=1))  # few of linear displacements
+            own = 4 * bubbles[there, :, None]
             # the bubble 4 l_i l_j has the slope 4 grad l_j at vertex i
-            gradient[:, i] += 4 * own[:, :, None] * G[:, j, None, :]
-            gradient[:, j] += 4 * own[:, :, None] * G[:, i, None, :]
+            gradient[there, i] += own * G[there, j, None, :]
+            gradient[there, j] += own * G[there, i, None, :]
         strain = (gradient + gradient.swapaxes(2, 3)) / 2
         trace = np.trace(strain, axis1=2, axis2=3)[..., None, None]
         return 2 * shear * strain + lam * trace * np.eye(d)
@@ -174,9 +176,9 @@ class Simplices:
         force : (dim,) or (e, dim) per volume.
         """
         own = moments.reshape(-1, *moments.shape[2:])
-        body = np.broadcast_to(self._ratio[:, None] * force, own.shape[1:])
+        body = np.broadcast_to(self.ratio[:, None] * force, own.shape[1:])
         both = np.concatenate([own, body[None]]).transpose(1, 2, 0)  # in the axes of space
-        return (self.back @ both).transpose(0, 2, 1).reshape(len(self._ratio), -1)
+        return (self.back @ both).transpose(0, 2, 1).reshape(len(self.ratio), -1)
 
     @cached_property
     def by_moments(self) -> sp.bsr_array:
@@ -192,14 +194,14 @@ class Simplices:
 
     def data_of(self, stress: np.ndarray) -> np.ndarray:
         """The same for a stress (e, dim + 1, dim, dim) that is linear on each element."""
-        force = -np.einsum("eaij,eaj->ei", stress, self.slopes)
+        force = -(stress * self.slopes[:, :, None]).sum(axis=(1, 3))
         return self.data(self._moments(stress), force)
 
     def _moments(self, stress: np.ndarray) -> np.ndarray:
         """(dim + 1, dim, e, dim) as in data(), of a linear stress."""
         found = []
         for own, normal in zip(self.others, self.outward):
-            t = np.einsum("eaij,ej->aei", stress[:, own], normal)
+            t = (stress[:, own] * normal[:, None, None]).sum(axis=3).swapaxes(0, 1)
             found.append((t + t.sum(axis=0)) / (self.dim * (self.dim + 1)))
         return np.array(found)
 
@@ -212,7 +214,7 @@ class Simplices:
         base = np.zeros((len(pairs), d, d))
         for number, (i, j) in enumerate(pairs):
             base[number, i, j] = base[number, j, i] = 1.0
-        B, ratio = self._map[chosen], self._ratio[chosen]
+        B, ratio = self.map[chosen], self.ratio[chosen]
         G = B.swapaxes(1, 2) @ B
         turned = G[:, None] @ base
         traces = np.trace(turned, axis1=2, axis2=3)
@@ -286,10 +288,20 @@ class Simplices:
         m, unbalanced = self._tractions(near, mean, force, given, balance)
         missing = self.data(self.seen(m), force) - self.data_of(stress)
         if answer is None:
-            m += least_by_airy(self, material, missing, known)
+            m += self._nearest(material, missing, known)
         else:
             m += space.nearest(self._energy(material, missing)).reshape(m.shape)
         return self.data(self.seen(m), force), unbalanced
+
+    def _nearest(self, material: Material, missing: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """What to add to the moments (facets, 2, 2) of triangles so that the energy of `missing`,
+        the data of their stress less those of the other one, is least.
+        """
+        form, S = self.form(material, slice(None)), reference_stress(2)
+        parts = reference_energy(2)[..., :12, :12].reshape(9, 12, 12)
+        values = (missing @ S.reshape(-1, S.shape[2]).T).reshape(-1, *S.shape[:2]) @ form
+        slope = WEIGHT[2] * values.reshape(len(form), -1) @ S[..., :12].reshape(-1, 12)
+        return Airy(self, form.reshape(-1, 9), parts, known).least(slope)
 
     @cached_property
     def arms(self) -> np.ndarray:

@@ -251,14 +251,14 @@ class EquilibriumElements(Simplices):
 
     def _carried(self, own: np.ndarray) -> np.ndarray:
         """(e, 3, 3) components of S by those on the reference triangle: S = B S^ B' / |det B|."""
-        B = self._map[own]
+        B = self.map[own]
         out = np.empty((len(B), 3, 3))
         for row, (i, j) in enumerate(PAIRS):
             for column, (a, b) in enumerate(PAIRS):
                 out[:, row, column] = B[:, i, a] * B[:, j, b]
                 if a != b:
                     out[:, row, column] += B[:, i, b] * B[:, j, a]
-        return out / self._ratio[own, None, None]
+        return out / self.ratio[own, None, None]
 
     def _combined(
         self, own: np.ndarray, split: SplitTriangle, material: Material, c: np.ndarray
@@ -272,7 +272,7 @@ class EquilibriumElements(Simplices):
             out[..., 3] = material.nu * (out[..., 0] + out[..., 1])
             return out
         divergence = (c @ split.divergence.reshape(-1, n).T).reshape(len(own), -1, 2)
-        down = self._map[own, 0] / self._ratio[own, None]
+        down = self.map[own, 0] / self.ratio[own, None]
         out[..., 3] = (divergence @ down[..., None])[..., 0]
         return out
 
@@ -283,7 +283,7 @@ class EquilibriumElements(Simplices):
         out = np.empty((len(own), len(S), 4, n))
         out[:, :, :3] = self._carried(own)[:, None] @ S / r
         if self.revolved:
-            down = self._map[own, 0] / self._ratio[own, None]
+            down = self.map[own, 0] / self.ratio[own, None]
             by_point = split.divergence.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
             out[:, :, 3] = (down @ by_point).reshape(len(own), -1, n)
         else:
@@ -296,10 +296,10 @@ class EquilibriumElements(Simplices):
         """(e, m, n) and (e, m) which divergences are wanted; others follow from the balance of the
         element.
         """
-        n, ratio = split.stress.shape[-1], self._ratio[own]
+        n, ratio = split.stress.shape[-1], self.ratio[own]
         if self.revolved:
             by_node = split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)
-            up = self._map[own, 1] / ratio[:, None]
+            up = self.map[own, 1] / ratio[:, None]
             r = np.einsum("ve,pvd->epd", self.mesh.p[0][self.mesh.t[:, own]], split.lever)
             Z = (up @ by_node).reshape(len(own), -1, n)
             return Z[:, :-1], -force[1] * r.reshape(len(own), -1)[:, :-1]

@@ -31,6 +31,7 @@ class PardisoSolver(BodySolver):
 
     name = "pardiso"
     releases_lock = True
+    order = 2  # METIS; 0 is minimum degree
 
     def __init__(self, system: System):
         try:
@@ -63,9 +64,15 @@ class PardisoSolver(BodySolver):
         weakref.finalize(self, factors.free_memory, everything=True)
         factors.perm = np.zeros(self.n, dtype=np.int32)
         factors.perm[trailing] = 1
-        # own values; METIS; pivots as they are; of blocks of one or two where they may be negative;
+        # own values; order; pivots as they are; of blocks of one or two where some are negative;
         # the Schur complement beside the factors
-        for index, value in {1: 1, 2: 2, 10: 16, 21: 1, 36: 2 if len(trailing) else 0}.items():
+        for index, value in {
+            1: 1,
+            2: self.order,
+            10: 16,
+            21: 1,
+            36: 2 if len(trailing) else 0,
+        }.items():
             factors.set_iparm(index, value)
         # as one column: asked for as many right-hand sides as S has columns, oneMKL crashes
         return self._call(np.zeros(max(len(trailing) ** 2, 1)))
