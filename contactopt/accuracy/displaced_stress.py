@@ -61,22 +61,24 @@ def displaced_stress(
     if cells.corners is not None:  # bilinear, but for bubbles on the edges
         own[:, 3:] -= (own[:, i] + own[:, j]) / 2
         own[:, :3] = 0.0
-    shapes = np.concatenate([at * (2 * at - 1), 4 * at[i] * at[j]])
-    at_vertices = np.einsum("vs,evk->vkes", 4 * at - 1, cells.slopes)
-    at_edges = np.einsum("js,ejk->jkes", 4 * at[i], cells.slopes[:, j])
-    at_edges += np.einsum("js,ejk->jkes", 4 * at[j], cells.slopes[:, i])
-    slopes = np.concatenate([at_vertices, at_edges])
-    gradient = np.einsum("cqe,qkes->ckes", own, slopes, optimize=True)
-    along = own[0].T @ shapes
+    shapes = np.concatenate([at * (2 * at - 1), 4 * at[i] * at[j]])  # (q, s)
+    by_share = np.zeros((len(shapes), 3, at.shape[1]))
+    by_share[np.arange(3), np.arange(3)] = 4 * at - 1
+    for q, (one, other) in enumerate(zip(i, j), 3):
+        by_share[q, one], by_share[q, other] = 4 * at[other], 4 * at[one]
+    nodes = np.ascontiguousarray(own.transpose(2, 0, 1))  # (e, c, q)
+    turned = (nodes @ by_share.reshape(len(shapes), -1)).reshape(-1, 2, 3, at.shape[1])
+    gradient = cells.slopes.swapaxes(1, 2)[:, None] @ turned  # (e, c, k, s)
+    along = nodes[:, 0] @ shapes
     if cells.corners is not None:
         N, slopes = cells.bilinear
-        values = nodal[:, cells.corners]
-        gradient += np.einsum("cqe,qkes->ckes", values, slopes, optimize=True)
-        along += np.einsum("qe,qes->es", values[0], N)
+        values = np.ascontiguousarray(nodal[:, cells.corners].transpose(2, 0, 1))
+        gradient += (values @ slopes.reshape(*slopes.shape[:2], -1)).reshape(gradient.shape)
+        along += (values[:, :1] @ N)[:, 0]
     across = np.zeros(along.shape) if r is None else along / r
-    strains = gradient[0, 0], gradient[1, 1], across
+    strains = gradient[:, 0, 0], gradient[:, 1, 1], across
     normal = [lam * sum(strains) + 2 * shear * strain for strain in strains]
-    turn = shear * (gradient[0, 1] + gradient[1, 0])
+    turn = shear * (gradient[:, 0, 1] + gradient[:, 1, 0])
     return np.stack([normal[0], normal[1], turn, normal[2]], axis=-1)
 
 

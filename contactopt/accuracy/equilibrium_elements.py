@@ -32,21 +32,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import null_space, qr
-from scipy.sparse.linalg import splu
 
 from contactopt.accuracy.displaced_stress import bilinear, displaced_stress
 from contactopt.accuracy.equilibrated import Simplices
+from contactopt.accuracy.least_in_balance import LeastInBalance
 from contactopt.accuracy.split_triangle import PAIRS, SplitTriangle, split_triangle
-from contactopt.errors import InputError
 from contactopt.material import Material
 
 NONE = 1e-9  # of the largest singular value, what is zero
 BLOCK = 1024  # elements at a time
 AXIS = 1e-12  # of the largest radius
-SOFT = 1e-12  # of the scaled energy: constraints leave nothing free
-STIFF = 1e6  # of the balance of elements, in the same scale
-BALANCED = 1e-11  # of the force on an element, so much may be missing
-CORRECTIONS = 20  # of the multipliers of the balance, at most
 # integrals over an edge of the hat functions of its ends times the shape functions of its points
 LEVERS = {
     1: np.array([[2.0, 1.0], [1.0, 2.0]]) / 6,
@@ -55,18 +50,28 @@ LEVERS = {
 
 
 class _Elements(NamedTuple):
-    """Some elements whose composite stresses follow from the tractions g (e, 6 (k + 1)) on their
-    edges, and the energy of what they differ from s(u) by.
+    """Some elements whose n composite stresses follow from the tractions g (e, 6 (k + 1)) on their
+    edges, from the works h (e, j) of the j without tractions, and from divergences w (e, m).
 
-    stress, rest  (e, n, 6 (k + 1)), (e, n): the stress is stress g + rest
-    form, slope   (e, 6 (k + 1), 6 (k + 1)), (e, 6 (k + 1)) second and first derivatives of half the
-                  energy at g = 0
+    stress, by_work, by_load  (e, n, 6 (k + 1)), (e, j, j), (e, j, m): the stress is stress g, and
+                              by_work h + by_load w of those without tractions
+    form                      (e, 6 (k + 1), 6 (k + 1)) second derivative of half the energy by g
     """
 
     stress: np.ndarray
-    rest: np.ndarray
+    by_work: np.ndarray
+    by_load: np.ndarray
     form: np.ndarray
-    slope: np.ndarray
+
+
+class _System(NamedTuple):
+    """All elements, the second derivative K of half the energy by all tractions, and the program
+    for those that are to be found.
+    """
+
+    parts: list[_Elements]
+    K: sp.csr_matrix
+    program: LeastInBalance
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +108,14 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def bilinear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Shape functions of the quadrilaterals, and their slopes, at the points."""
+        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at the
+        points.
+        """
         places = np.einsum("dve,vs->des", self.mesh.p[:, self.mesh.t], self._points)
-        return bilinear(self.mesh.p[:, self.corners], places)
+        N, slopes = bilinear(self.mesh.p[:, self.corners], places)
+        return np.ascontiguousarray(N.swapaxes(0, 1)), np.ascontiguousarray(
+            slopes.transpose(2, 0, 1, 3)
+        )
 
     def data_of(self, stress: np.ndarray) -> np.ndarray:
         """A stress is its own data."""
@@ -139,28 +149,50 @@ class EquilibriumElements(Simplices):
         The stress (e, s, 4), and the largest force by which an element is out of balance over the
         largest force on one.
         """
-        parts = [self._least_within(material, stress, force, *own) for own in self._pieces]
         g, number = self._given(held, moments).ravel(), self._numbers[0]
         free = np.isnan(g)
         g[free] = 0.0
-        K, slope = sp.csr_matrix((len(g), len(g))), np.zeros(len(g))
-        for (own, _), part in zip(self._pieces, parts):
-            at = number[own]
-            slope += np.bincount(at.ravel(), part.slope.ravel(), len(g))
-            rows, columns = np.repeat(at, at.shape[1], axis=1), np.tile(at, (1, at.shape[1]))
-            K = K + sp.csr_matrix((part.form.ravel(), (rows.ravel(), columns.ravel())), K.shape)
         C, load = self._balance(force)
-        missing = C @ g + load
         rows = np.flatnonzero(abs(C) @ free)  # of elements with a traction to be found
-        x, missed = _least(
-            K[free][:, free], (slope + K @ g)[free], C[rows][:, free], -missing[rows]
-        )
-        g[free] = x
-        made = self._particular(force)
-        for (own, split), part in zip(self._pieces, parts):
-            c = (part.stress @ g[number[own], None])[..., 0] + part.rest
+        known = material, free.tobytes()
+        if known not in self._systems:  # adjoints have the tractions of the solution to be found
+            self._systems.clear()
+            self._systems[known] = self._system(material, free, C[rows][:, free])
+        system = self._systems[known]
+        made, slope, rest = self._particular(force), np.zeros(len(g)), []
+        for (own, split), part in zip(self._pieces, system.parts):
+            off = made[own] - stress[own]
+            Z, w = self._divergences(own, split, force)
+            h = self._work(own, split, material, off)
+            inner = _without_tractions(split)
+            y = part.by_work @ (h @ inner)[..., None]
+            for _ in range(2):  # the second time against rounding
+                y += part.by_load @ (w[..., None] - Z @ (inner @ y))
+            c = y[..., 0] @ inner.T
+            h = self._work(own, split, material, off + self._combined(own, split, material, c))
+            by_traction = part.stress.swapaxes(1, 2) @ h[..., None]
+            slope += np.bincount(number[own].ravel(), by_traction.ravel(), len(g))
+            rest.append(c)
+        left = -(C @ g + load)[rows]
+        g[free], missed = system.program.find((slope + system.K @ g)[free], left)
+        for (own, split), part, c in zip(self._pieces, system.parts, rest):
+            c = c + (part.stress @ g[number[own], None])[..., 0]
             made[own] += self._combined(own, split, material, c)
         return made, missed
+
+    @cached_property
+    def _systems(self) -> dict[Any, _System]:
+        """The last system, by its material and its tractions that are to be found."""
+        return {}
+
+    def _system(self, material: Material, free: np.ndarray, C: sp.csr_matrix) -> _System:
+        number, K = self._numbers[0], sp.csr_matrix(2 * free.shape)
+        parts = [self._within(material, *own) for own in self._pieces]
+        for (own, _), part in zip(self._pieces, parts):
+            at = number[own]
+            rows, columns = np.repeat(at, at.shape[1], axis=1), np.tile(at, (1, at.shape[1]))
+            K = K + sp.csr_matrix((part.form.ravel(), (rows.ravel(), columns.ravel())), K.shape)
+        return _System(parts, K, LeastInBalance(K[free][:, free], C))
 
     @cached_property
     def _pieces(self) -> list[tuple[np.ndarray, SplitTriangle]]:
@@ -290,8 +322,25 @@ class EquilibriumElements(Simplices):
             out[:, :, 3] = material.nu * (out[:, :, 0] + out[:, :, 1])
         return out
 
+    def _work(
+        self, own: np.ndarray, split: SplitTriangle, material: Material, stress: np.ndarray
+    ) -> np.ndarray:
+        """(e, n) integrals of s : C^-1 : s' of a stress (e, s, 4) and all composite stresses."""
+        strain = (stress @ _compliance(material)) * self._weights[own, :, None]
+        across = strain[..., 3]
+        if not self.revolved:
+            strain[..., :2] += material.nu * across[..., None]
+        S = strain[..., :3] / self._radius[own, :, None] @ self._carried(own)
+        n = split.stress.shape[-1]
+        h = S.reshape(len(own), -1) @ split.stress.reshape(-1, n)
+        if self.revolved:
+            down = self.map[own, 0] / self.ratio[own, None]
+            along = across[..., None] * down[:, None]
+            h += along.reshape(len(own), -1) @ split.divergence.reshape(-1, n)
+        return np.asarray(h)
+
     def _divergences(
-        self, own: np.ndarray, split: SplitTriangle, force: np.ndarray, inner: np.ndarray
+        self, own: np.ndarray, split: SplitTriangle, force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """(e, m, n) and (e, m) which divergences are wanted; others follow from the balance of the
         element.
@@ -303,7 +352,7 @@ class EquilibriumElements(Simplices):
             r = np.einsum("ve,pvd->epd", self.mesh.p[0][self.mesh.t[:, own]], split.lever)
             Z = (up @ by_node).reshape(len(own), -1, n)
             return Z[:, :-1], -force[1] * r.reshape(len(own), -1)[:, :-1]
-        every = split.nodes.reshape(-1, n)  # on the reference triangle, the same for all
+        every, inner = split.nodes.reshape(-1, n), _without_tractions(split)
         _, left, order = qr((every @ inner).T, mode="economic", pivoting=True)
         chosen = order[: np.count_nonzero(np.abs(left.diagonal()) > NONE)]
         wanted = -(self.back[own] @ force) * ratio[:, None]
@@ -312,39 +361,32 @@ class EquilibriumElements(Simplices):
             np.tile(wanted, (1, len(every) // 2))[:, chosen],
         )
 
-    def _least_within(
-        self,
-        material: Material,
-        stress: np.ndarray,
-        force: np.ndarray,
-        own: np.ndarray,
-        split: SplitTriangle,
-    ) -> _Elements:
-        """The stresses in some elements that make the energy of s - s(u) least."""
+    def _within(self, material: Material, own: np.ndarray, split: SplitTriangle) -> _Elements:
+        """The stresses in some elements that make the energy least."""
         n, count = split.stress.shape[-1], len(own)
         made = self._made(own, split, material)
         weighted = _compliance(material) @ made * self._weights[own, :, None, None]
-        made, weighted = made.reshape(count, -1, n), weighted.reshape(count, -1, n).swapaxes(1, 2)
-        H = weighted @ made
-        h = weighted @ (self._particular(force) - stress)[own].reshape(count, -1, 1)
-        tractions = split.tractions.reshape(-1, n)
-        borne, inner = np.linalg.pinv(tractions), null_space(tractions, rcond=NONE)
-        Z, wanted = self._divergences(own, split, force, inner)
-        size = np.sqrt(np.trace(H, axis1=1, axis2=2))[:, None, None]
-        Z, wanted = size * Z, size * wanted[..., None]  # entries of one size
+        H = weighted.reshape(count, -1, n).swapaxes(1, 2) @ made.reshape(count, -1, n)
+        borne, inner = np.linalg.pinv(split.tractions.reshape(-1, n)), _without_tractions(split)
+        Z, _ = self._divergences(own, split, np.zeros(2))
+        size = np.sqrt(np.trace(H, axis1=1, axis2=2))[:, None, None]  # entries of one size
         system = np.zeros((count, *[inner.shape[1] + Z.shape[1]] * 2))
         y, mu = slice(0, inner.shape[1]), slice(inner.shape[1], None)
-        system[:, y, y], system[:, mu, y] = inner.T @ H @ inner, Z @ inner
+        system[:, y, y], system[:, mu, y] = inner.T @ H @ inner, size * (Z @ inner)
         system[:, y, mu] = system[:, mu, y].swapaxes(1, 2)
-        right = np.concatenate(
-            [np.concatenate([-inner.T @ H @ borne, -inner.T @ h], axis=2),
-             np.concatenate([-Z @ borne, wanted], axis=2)], axis=1)  # fmt: skip
-        found = inner @ np.linalg.solve(system, right)[:, y]
-        R, rest = borne + found[..., :-1], found[..., -1:]
+        inverse = np.linalg.inv(system)
+        by_work, by_load = -inverse[:, y, y], size * inverse[:, y, mu]
+        R = borne + inner @ (by_work @ (inner.T @ H @ borne))
+        for _ in range(2):  # the second time against rounding
+            R -= inner @ (by_load @ (Z @ R))
         back, sign = self.back[own], self._numbers[1][own]
         R = (R.reshape(count, -1, 2) @ back).reshape(R.shape) * sign[:, None]
-        turned = R.swapaxes(1, 2)
-        return _Elements(R, rest[..., 0], turned @ H @ R, (turned @ (H @ rest + h))[..., 0])
+        return _Elements(R, by_work, by_load, R.swapaxes(1, 2) @ H @ R)
+
+
+def _without_tractions(split: SplitTriangle) -> np.ndarray:
+    """(n, j) the composite stresses that have no tractions on the boundary."""
+    return null_space(split.tractions.reshape(-1, split.stress.shape[-1]), rcond=NONE)
 
 
 def _compliance(material: Material) -> np.ndarray:
@@ -354,33 +396,3 @@ def _compliance(material: Material) -> np.ndarray:
     out[2] = out[:, 2] = 0.0
     out[2, 2] = 2 * (1 + material.nu)
     return out / material.E
-
-
-def _least(
-    K: sp.csr_matrix, slope: np.ndarray, C: sp.csr_matrix, values: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """The x with x' K x / 2 + slope' x least under C x = values, by an augmented Lagrangian, and
-    what C x misses over the largest share of x in it.
-    """
-    scale = 1 / np.sqrt(K.diagonal())
-    D = sp.diags(scale)
-    K, C, slope = D @ K @ D, C @ D, scale * slope
-    size = 1 / np.sqrt(np.asarray(C.multiply(C).sum(axis=1)).ravel())
-    C, values = sp.diags(size) @ C, size * values
-    system = (K + STIFF * (C.T @ C) + SOFT * sp.eye(len(slope))).tocsc()
-    try:
-        solve = splu(
-            system, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        ).solve
-    except RuntimeError as error:  # triangles without a height
-        raise InputError("the mesh has triangles too thin for a bound.") from error
-    x, multipliers, missed, found = np.zeros(len(slope)), np.zeros(len(values)), -values, np.inf
-    for number in range(CORRECTIONS):
-        x -= solve(K @ x + slope + C.T @ (multipliers + STIFF * missed))
-        missed = C @ x - values
-        multipliers += STIFF * missed
-        largest = float((abs(C) @ np.abs(x)).max(initial=0.0)) or 1.0
-        found = float(np.abs(missed).max(initial=0.0)) / largest
-        if number and found < BALANCED:
-            break
-    return scale * x, found
