@@ -38,6 +38,7 @@ Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -279,7 +280,7 @@ class Simplices:
         over that of an element.
         """
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
-        balance = Balance(self.forces_of_moments, known)
+        balance = self._once(known.tobytes(), lambda: Balance(self.forces_of_moments, known))
         near, mean = stress, stress.mean(axis=1)
         if answer is not None:
             space = BalancedMoments(self, material, balance, answer)
@@ -301,7 +302,18 @@ class Simplices:
         parts = reference_energy(2)[..., :12, :12].reshape(9, 12, 12)
         values = (missing @ S.reshape(-1, S.shape[2]).T).reshape(-1, *S.shape[:2]) @ form
         slope = WEIGHT[2] * values.reshape(len(form), -1) @ S[..., :12].reshape(-1, 12)
-        return Airy(self, form.reshape(-1, 9), parts, known).least(slope)
+        key = material, known.tobytes()
+        return self._once(key, lambda: Airy(self, form.reshape(-1, 9), parts, known)).least(slope)
+
+    def _once(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What was made for a key: a bound and its adjoints have the same tractions to find."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    @cached_property
+    def _kept(self) -> dict[Any, Any]:
+        return {}
 
     @cached_property
     def arms(self) -> np.ndarray:
@@ -342,10 +354,9 @@ class Simplices:
         def forces(y: np.ndarray) -> np.ndarray:
             turned = []
             for own in self.blocks:
-                s = (y[own].astype(np.float32) @ values[:, : y.shape[1]].T).reshape(
-                    -1, *stress.shape[:2]
-                )
-                turned.append((s @ single[own]).reshape(len(s), -1) @ values[:, :inputs])
+                s = y[own].astype(np.float32) @ values[:, : y.shape[1]].T
+                s = s.reshape(-1, *stress.shape[:2]) @ single[own]
+                turned.append(s.reshape(len(s), -1) @ values[:, :inputs])
             return size * np.asarray(back @ np.concatenate(turned).ravel()).reshape(-1, d)
 
         def product(m: np.ndarray) -> np.ndarray:

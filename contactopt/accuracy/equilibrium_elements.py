@@ -154,11 +154,8 @@ class EquilibriumElements(Simplices):
         g[free] = 0.0
         C, load = self._balance(force)
         rows = np.flatnonzero(abs(C) @ free)  # of elements with a traction to be found
-        known = material, free.tobytes()
-        if known not in self._systems:  # adjoints have the tractions of the solution to be found
-            self._systems.clear()
-            self._systems[known] = self._system(material, free, C[rows][:, free])
-        system = self._systems[known]
+        key = material, free.tobytes()
+        system = self._once(key, lambda: self._system(material, free, C[rows][:, free]))
         made, slope, rest = self._particular(force), np.zeros(len(g)), []
         for (own, split), part in zip(self._pieces, system.parts):
             off = made[own] - stress[own]
@@ -179,11 +176,6 @@ class EquilibriumElements(Simplices):
             c = c + (part.stress @ g[number[own], None])[..., 0]
             made[own] += self._combined(own, split, material, c)
         return made, missed
-
-    @cached_property
-    def _systems(self) -> dict[Any, _System]:
-        """The last system, by its material and its tractions that are to be found."""
-        return {}
 
     def _system(self, material: Material, free: np.ndarray, C: sp.csr_matrix) -> _System:
         number, K = self._numbers[0], sp.csr_matrix(2 * free.shape)
