@@ -119,9 +119,13 @@ def _kept(levels: Sequence[Level]) -> list[float]:
 
 
 def _grows(values: Sequence[float], count: int) -> bool:
-    """Whether the last values of _kept() grow steadily as the elements there become smaller."""
-    growths = -np.diff(values[: count + 1])
-    if len(growths) < count or np.any(growths <= 0):
-        return False
-    ratios = growths[:-1] / growths[1:]
-    return bool(np.all((ratios >= STEADY[0]) & (ratios <= STEADY[1])))
+    """Whether the last values of _kept(), or every second one of them, grow steadily as the
+    elements there become smaller. Elements on the two sides of a place may be halved in turn.
+    """
+    for step in (1, 2):
+        growths = -np.diff(values[::step][: count + 1])
+        if len(growths) == count and np.all(growths > 0):
+            ratios = growths[:-1] / growths[1:]
+            if np.all((ratios >= STEADY[0]) & (ratios <= STEADY[1])):
+                return True
+    return False
