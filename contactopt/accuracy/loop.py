@@ -232,7 +232,7 @@ class _Loop:
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
             larger = [
-                (distance, one.value, one.size / peak.size if peak.size else 2.0)
+                (distance, one.value, one.size / peak.size)
                 for one, distance in zip(earlier, away)
                 if one.size >= WATCHED * peak.size and distance <= SAME_PEAK * one.size
             ]
