@@ -235,18 +235,6 @@ def test_the_estimate_holds_what_a_polygon_lacks_of_a_circle():
     assert total == pytest.approx(0.01 * np.pi - value, rel=0.02)
 
 
-def test_two_edges_which_have_no_size_are_refined_beside_each_other():
-    """Those of stick and of contact, where each ends by itself."""
-    tool = Rigid("cam", (0.0, 1.0), lambda x: x[0] ** 2 / 4, force={"y": -0.2, "x": 0.03})
-    ticks = np.linspace(-2, 2, 17)
-    mesh = skfem.MeshTri.init_tensor(ticks, ticks[:9]).with_boundaries(
-        {"contact": lambda x: x[1] == 0, "bottom": lambda x: x[1] == -2}
-    )
-    block = Part("block", mesh, MATERIAL, (Support("bottom"),), contact="contact")
-    estimate = locally(Scene("cam", tool, block, 0.3), "stick", 0.05, limits=Limits(2000))[1]
-    assert 0 < estimate.value < 1 and len(estimate.levels) > 2
-
-
 def test_bounds_end_the_loop_with_the_best_answer():
     scene = pressed_block(4)
     solved, estimate = locally(scene, "energy", 1e-9, limits=Limits(500))

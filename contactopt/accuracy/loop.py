@@ -12,14 +12,13 @@ import numpy as np
 from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
 from contactopt.accuracy.estimate import Estimate, Judged, Level, read
-from contactopt.accuracy.everywhere import CERTAIN, SWING, Everywhere
+from contactopt.accuracy.everywhere import SWING, Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.checks import check_number
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.methods.driver import TOL
-from contactopt.readings.constants import SLOWEST
 from contactopt.readings.peaks import Peak, Reading
 from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse
@@ -200,31 +199,27 @@ class _Loop:
         The largest is among them until smaller elements around it have changed it little; where
         all elements are divided, the differences of nested solutions tell more. The search judges
         what the value changed; what the peak changed beyond that counts here. Another may grow by
-        what is left of its last growth, 1 / (s^p - 1) of it where the elements have become s times
-        smaller. The order p is 1 unless nested solutions have shown it. One that has fallen is not
-        expected to grow, but may swing back as differences of nested solutions do
-        (contactopt.accuracy.everywhere).
+        as much again as it did on smaller elements. One that has fallen is not expected to, but may
+        swing back as differences of nested solutions do (contactopt.accuracy.everywhere).
         """
-        last, order = self.peaks[-1], self.judged.order
+        last = self.peaks[-1]
         found, excess = [], 0.0
-        p = 1.0 if order is None or order <= 0 else float(np.clip(order, SLOWEST, CERTAIN))
         if self.search.watches and last and last[0].size:
-            then, largest, _ = self._before(last[0])
+            then, largest = self._before(last[0])
             change = abs(last[0].value - then)
             excess = max(change - abs(last[0].value - largest), 0.0)
             found = [last[0]] if change > self.judged.size / 2 else []
         for peak in last[1:]:
-            then, _, finer = self._before(peak)
-            grown = peak.value - then
+            grown = peak.value - self._before(peak)[0]
             if peak.value + abs(grown) >= last[0].value - last[0].uncertainty:
                 found.append(peak)
-                doubt = max(grown, -SWING * grown) / (finer**p - 1)
+                doubt = max(grown, -SWING * grown)
                 excess = max(excess, peak.value + doubt - last[0].value)
         return found, excess
 
-    def _before(self, peak: Peak) -> tuple[float, float, float]:
-        """The value of a peak and the largest value on the last mesh of larger elements there, and
-        how much larger they were; where there is none, a share of its value, its value, and 2.
+    def _before(self, peak: Peak) -> tuple[float, float]:
+        """The value of a peak, and the largest value, on the last mesh of larger elements there;
+        where there is none, a share of its value, and its value.
 
         What nodes scatter about a fit is no measure here: where facets change their length, it is
         large on every mesh.
@@ -232,14 +227,13 @@ class _Loop:
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
             larger = [
-                (distance, one.value, one.size / peak.size if peak.size else 2.0)
+                (distance, one.value)
                 for one, distance in zip(earlier, away)
                 if one.size >= WATCHED * peak.size and distance <= SAME_PEAK * one.size
             ]
             if larger:
-                _, value, ratio = min(larger)
-                return value, earlier[0].value, ratio
-        return (1 - UNWATCHED) * peak.value, peak.value, 2.0
+                return min(larger)[1], earlier[0].value
+        return (1 - UNWATCHED) * peak.value, peak.value
 
     def _unresolved(self) -> np.ndarray:
         """Numbers of contacts around which the mesh is too coarse to know anything."""
