@@ -4,14 +4,24 @@ One factorisation gives all that is asked for. PARDISO eliminates the unknowns t
 all others h if it is told so, and hands out their Schur complement S = A_tt - A_th A_hh^-1 A_ht
 while it keeps the factors of the whole matrix. The block of the inverse on t is S^-1.
 
+PARDISO keeps what it needs in the threads that call it, and crashes now and then in processes whose
+calling threads have ended. All calls are therefore made by threads that last as long as the
+process.
+
 Source: oneMKL Developer Reference, pardiso iparm Parameter, iparm(36) = 2.
 """
 
 from __future__ import annotations
 
+import os
 import weakref
-from functools import cached_property
+from _thread import start_new_thread
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cache, cached_property
 from threading import Lock
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -20,10 +30,31 @@ import scipy.sparse as sp
 from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import BodySolver, System, out_of_memory
 from contactopt.errors import InputError
+from contactopt.linear.concurrency import cores
 
 FACTORISE, SOLVE = 12, 33  # PARDISO's phases
 NO_MEMORY, NO_PIVOT = (-2, -9), -4  # its errors
 DEFINITE, INDEFINITE = 2, -2  # its kinds of symmetric matrices
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    """The threads that call PARDISO, one for each core."""
+    return ThreadPoolExecutor(cores(), thread_name_prefix="pardiso")
+
+
+os.register_at_fork(after_in_child=_threads.cache_clear)
+
+
+def _alone(lock: Lock, act: Callable[..., Any], *given: Any) -> Any:
+    """What a call of PARDISO makes, which writes to its handle: one at a time."""
+    with lock:
+        return act(*given)
+
+
+def _free(lock: Lock, factors: Any) -> None:
+    with suppress(RuntimeError):  # Python is ending: there is nothing left to free
+        _threads().submit(_alone, lock, factors.free_memory, True)
 
 
 class PardisoSolver(BodySolver):
@@ -44,7 +75,7 @@ class PardisoSolver(BodySolver):
         library()  # so that pypardiso need not search for it
         self.upper = sp.triu(system.A, format="csr")
         self.upper.sort_indices()
-        self._one_at_a_time = Lock()  # PARDISO writes to its handle
+        self._lock = Lock()
         trailing = np.zeros(0, int) if system.trailing is None else system.trailing
         try:
             self._schur = self._factorised(DEFINITE, trailing)
@@ -60,8 +91,8 @@ class PardisoSolver(BodySolver):
         from pypardiso import PyPardisoSolver
 
         factors = self.factors = PyPardisoSolver(mtype=kind, phase=FACTORISE)
-        # MKL's memory is not Python's
-        weakref.finalize(self, factors.free_memory, everything=True)
+        # MKL's memory is not Python's; a thread of its own may wait for locks that are held here
+        weakref.finalize(self, start_new_thread, _free, (self._lock, factors)).atexit = False
         factors.perm = np.zeros(self.n, dtype=np.int32)
         factors.perm[trailing] = 1
         # own values; order; pivots as they are; of blocks of one or two where some are negative;
@@ -98,8 +129,10 @@ class PardisoSolver(BodySolver):
         from pypardiso.pardiso_wrapper import PyPardisoError
 
         try:
-            with self._one_at_a_time:
-                return np.asarray(self.factors._call_pardiso(self.upper, load))
+            call = self.factors._call_pardiso
+            return np.asarray(
+                _threads().submit(_alone, self._lock, call, self.upper, load).result()
+            )
         except PyPardisoError as error:
             if error.value in NO_MEMORY:
                 raise out_of_memory(self.n) from error
