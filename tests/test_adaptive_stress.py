@@ -12,7 +12,7 @@ from conftest import MATERIAL, block, two_blocks
 
 from contactopt import InputError, Part, Plate, Rigid, Scene, Support, run
 from contactopt.accuracy import refine
-from contactopt.accuracy.corners import filled, re_entrant
+from contactopt.accuracy.corners import filled, grows, re_entrant
 from contactopt.accuracy.indicators import element_errors, pressure_errors, read_once
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
@@ -292,3 +292,19 @@ def test_the_summary_has_one_line_for_each_pair(capsys, tmp_path):
     assert len(pairs) == len(names) > 1
     for words, pair in zip(pairs, names.values(), strict=True):
         assert f"{pair['stick']} stick" in words and "largest pressure" in words
+
+
+@pytest.mark.parametrize(
+    ("steps", "infinite"),
+    [
+        ([40.0] * 4, True),  # a logarithm
+        ([10 * 1.3**n for n in range(4)], True),  # a power
+        ([30.0, 60.0] * 4, True),  # the elements on both sides of a place are halved in turn
+        ([80.0, 40.0, 20.0, 10.0, 5.0, 2.5, 1.2, 0.6], False),  # first order
+        ([80.0, 60.0, 20.0, 15.0, 5.0, 4.0, 1.2, 1.0], False),  # the same in turn
+        ([30.0, 60.0, 20.0], False),  # too few to say
+    ],
+)
+def test_what_grows_with_every_refinement_is_infinite(steps, infinite):
+    values = 1000.0 + np.cumsum([0.0, *steps])
+    assert grows(list(values[::-1]), 4) == infinite

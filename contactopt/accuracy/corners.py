@@ -48,11 +48,11 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
     rises = len(levels) > TRIED and len(values) > 1 and values[0] > RISE * values[-1]
     place = "(" + ", ".join(f"{x:.4g}" for x in levels[-1].place) + ")"
     what = f"the largest {'pressure' if pressure else 'stress'}"
-    if pressure and _grows(values, AT_EDGE) and _singular(solved, reading.peaks[0]):
+    if pressure and grows(values, AT_EDGE) and _singular(solved, reading.peaks[0]):
         where = "is at the edge of the contact surface, a corner, where"
     elif not pressure and rises and _singular(solved, reading.peaks[0]):
         where = f"is at the re-entrant corner near {place}, where it is infinite;"
-    elif _grows(values, GROWTHS):
+    elif grows(values, GROWTHS):
         what, where = f"{what}, at {place},", "grows with every refinement like an infinite one;"
     else:
         return ""
@@ -118,7 +118,7 @@ def _kept(levels: Sequence[Level]) -> list[float]:
     return [level.value for level in kept]
 
 
-def _grows(values: Sequence[float], count: int) -> bool:
+def grows(values: Sequence[float], count: int) -> bool:
     """Whether the last values of _kept(), or every second one of them, grow steadily as the
     elements there become smaller. Elements on the two sides of a place may be halved in turn.
     """
