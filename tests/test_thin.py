@@ -14,6 +14,7 @@ from contactopt import (
     Support,
     Traction,
     follow,
+    gradient,
     natural_map_residual,
     run,
 )
@@ -118,3 +119,4 @@ def test_a_strip_that_friction_holds_remembers_its_slip():
     assert work == pytest.approx([1.0, 2.0, 2.0], rel=0.01)
     for step, known in enumerate(path.states):
         assert natural_map_residual(path.problem(step), known.solution.reactions) < 1e-7
+    assert "a soft ground holds a thin body" in gradient(path, "energy", ["E:strip"]).sentence

@@ -13,6 +13,11 @@ from contactopt.readings.quantities import seeds_of
 from contactopt.readings.state import Seeds
 from contactopt.scenes.parameters import parameters as parameters_of
 
+GROUND = (
+    "; a soft ground holds a thin body, whose pull is taken as constant, so that the derivatives are"
+    " less accurate than the solution."
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
@@ -38,7 +43,8 @@ class Gradient:
     def sentence(self) -> str:
         """What the derivatives are, for people."""
         names = [f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak]
-        return of_kinks("quantity", names)
+        ground = any(step.reduction.on_ground for step in self.chain.steps)
+        return of_kinks("quantity", names) + ground * GROUND
 
     def onesided(self, direction: dict[str, Any]) -> float:
         """The one-sided derivative along a direction, name of a parameter -> amount."""
