@@ -118,7 +118,8 @@ def element_errors(
         return ElementErrors(value, tuple(own / 2 for own, _ in shares), norm, unsigned=True)
     curved = 0.5 if quantity.name == ENERGY else 0.0
     errors, between = tuple(product - curved * own for own, product in shares), 0.0
-    if volumes and curved:  # where the adjoint is infinite, at a place, this would be no error
+    # what is read at a place has an adjoint that is infinite there: this would be no error
+    if volumes and (curved or quantity.reader is None):
         parts = zip(errors, solved.reduction.scene.parts, bodies, volumes, displaced, fields)
         errors = tuple(
             one + _of_shape(part, state.problem.dim, body, volume, U, W, curved)
