@@ -14,8 +14,8 @@ from contactopt.readings.state import Seeds
 from contactopt.scenes.parameters import parameters as parameters_of
 
 GROUND = (
-    "; a soft ground holds a thin body, whose pull is taken as constant, so that the derivatives are"
-    " less accurate than the solution."
+    "; a soft ground holds a thin body, whose pull is taken as constant, so that the derivatives"
+    " are less accurate than the solution"
 )
 
 
