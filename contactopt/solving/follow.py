@@ -78,7 +78,8 @@ def follow_path(
     solved: Solved | None = None
     bodies: Forces | None = None
     for scene in scenes:
-        named = f"state {len(states) + 1}{total}{scene.state and f' ({scene.state})'}"
+        said = getattr(scene, "state", "")  # what is no scene is told below
+        named = f"state {len(states) + 1}{total}{said and f' ({said})'}"
         if solved is None:
             once = isinstance(scenes, Sized) and len(scenes) == 1
             solved = solve_scene(scene, elements, zone, options, once=once)
