@@ -228,18 +228,8 @@ class Simplices:
         form *= (self.volume[chosen] / ratio**2 / E)[:, None, None]
         return form
 
-    def metric(self, material: Material, chosen: slice) -> np.ndarray:
-        """H (e, inputs, inputs): y' H y = int s : C^-1 : s for the composite stress s of data y, of
-        some elements [per thickness].
-        """
-        parts = reference_energy(self.dim)
-        i, j = np.triu_indices(len(parts))  # both factors are symmetric in their components
-        twice = parts[i, j] + np.where(i < j, 1.0, 0.0)[:, None, None] * parts[j, i]
-        flat = self.form(material, chosen)[:, i, j] @ twice.reshape(len(i), -1)
-        return np.asarray(flat.reshape(-1, *parts.shape[2:]))
-
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """(e,) y' H z of all elements."""
+        """(e,) integrals of s : C^-1 : s' of two composite stresses by their data."""
         stress, out = reference_stress(self.dim), np.zeros(len(one))
         by_inputs, shape = stress.reshape(-1, stress.shape[2]).T, (-1, *stress.shape[:2])
         there = np.flatnonzero(np.any(one != 0, axis=1) & np.any(other != 0, axis=1))
