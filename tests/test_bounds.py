@@ -520,6 +520,36 @@ def test_intervals_hold_where_surfaces_slip_both_ways(law, degree):
     hold_the_fine_value(scene, ("normal_force", "shear_force", "energy"))
 
 
+@pytest.mark.parametrize("law", ["tresca", "coulomb"])
+def test_intervals_with_friction_are_mirrored_and_in_other_units(law):
+    """Of a pushed block: seen in a mirror, and with lengths and forces in other units."""
+
+    def seen(scale, force, sign):
+        def part(own):
+            upper = own.name == "upper"
+            mesh = type(own.mesh)(
+                own.mesh.p * scale * np.array([[sign], [1.0]]), own.mesh.t[[1, 0, 2]]
+            ).with_boundaries(
+                {
+                    "contact": lambda x: np.abs(x[1]) < 1e-9 * scale,
+                    "far": lambda x: np.abs(np.abs(x[1]) - scale) < 1e-9 * scale,
+                }
+            )
+            moved = {"x": 0.05 * scale * sign, "y": -0.1 * scale}
+            supports = (Support("far", moved if upper else None),)
+            material = Material(own.material.E * force / scale**2, own.material.nu)
+            return replace(own, mesh=mesh, supports=supports, material=material)
+
+        bound = LAWS[law] * (force / scale**2 if law == "tresca" else 1.0)
+        scene = replace(two_blocks(1, law, bound).with_parts(part), thickness=scale)
+        solved = solve_scene(scene, options=Options(tol=1e-12))
+        return np.array(interval(Bound(solved), find_quantity("normal_force", scene))) / force
+
+    plain = seen(1.0, 1.0, 1.0)
+    assert np.allclose(seen(1.0, 1.0, -1.0), plain, rtol=1e-6)
+    assert np.allclose(seen(1e3, 1e-2, 1.0), plain, rtol=1e-6)
+
+
 def hold_the_fine_value(scene, names):
     solved, best = solve_scene(scene), fine(scene)
     for quantity in (find_quantity(name, scene) for name in names):

@@ -87,8 +87,9 @@ def interval(bound: Any, quantity: Quantity) -> tuple[float, float]:
     scene, problem = bound.scene, bound.scene.problem
     if reason := without_interval(scene.reduction, quantity):
         raise InputError(reason)
-    seeds = quantity.slopes(State(scene.reduction, scene.solution))
-    duals = duals_of(State(scene.reduction, scene.solution), seeds)
+    state = State(scene.reduction, scene.solution)
+    seeds = quantity.slopes(state)
+    duals = duals_of(state, seeds)
     omega, motions = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     if seeds.multipliers is not None:
         motions += seeds.multipliers
