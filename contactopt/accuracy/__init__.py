@@ -37,7 +37,8 @@ forces holds too little energy, one under given displacements or an interference
 
 Linear elements have straight edges, and those far from the place that matters stay long. What lies
 between them and the curve for which they stand is estimated as well, by the derivative of J by the
-shape of the body: without it a disc under its own weight is too light for its contact.
+shape of the body: without it a disc under its own weight is too light for its contact. A J that is
+read at a place is left out, because its adjoint is infinite there.
 
 A stress at a place is recovered by a fit to the stresses of the elements near it
 (contactopt.bodies.stress_recovery). The stresses scatter about the fit, and the estimated error is

@@ -98,6 +98,9 @@ def element_errors(
     too small by that of the error; where displacements or an interference are given W is zero, so
     that it is too large by as much.
 
+    `volumes` (elements,) of each body lie between straight facets and the curves for which they
+    stand [length^dim]; what they would add is part of the error.
+
     For edges, for no quantity at all, and where the adjoint problem has no solution, the energy of
     the error serves as a guide to the marking alone, without a sign.
     """
