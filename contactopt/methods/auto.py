@@ -103,7 +103,8 @@ class Auto(Method):
         if sparse and problem.q.size <= constants.SMALL:
             problem = problem.altered(Q=problem.Q.toarray())
         swept = _Swept(sweeping, start)
-        yield from swept.points(constants.FIRST_SWEEPS, constants.SWEEPING)
+        if not swept.tried:
+            yield from swept.points(constants.FIRST_SWEEPS, constants.SWEEPING)
         # asked only now, because a factorisation tells
         loose = sparse and not (problem.symmetric and definite(problem.Q))
         if loose:
@@ -134,7 +135,10 @@ class _Swept:
 
     def __init__(self, problem: InterfaceProblem, start: Iterate | None):
         self.problem = problem
-        self.r = np.array((start or at_rest(problem))[0], order="C")
+        # where contactopt.methods.small tried them
+        self.tried = "swept" in problem.__dict__
+        first = problem.__dict__["swept"] if self.tried else (start or at_rest(problem))[0]
+        self.r = np.array(first, order="C")
 
     def points(self, most: int, budget: float) -> Iterator[Iterate]:
         """Points that `most` sweeps reach within a number of multiplications, if they converge: the

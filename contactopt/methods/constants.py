@@ -14,6 +14,7 @@ from __future__ import annotations
 FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
+QUICK = 2e5  # multiplications of a sweep up to which the first sweeps are one call
 SWEEPS_KEPT = 16  # last sweeps that the next one starts from
 NEARLY_SWEPT, SWEPT = 1e-7, 1e-13  # change of a sweep over the forces: most digits, all digits
 LOOK, MOMENT = 3e5, 1e8  # multiplications worth a certificate; between two looks at the clock

@@ -16,8 +16,10 @@ from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
+from contactopt.methods.auto import Auto
 from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.notes import collected, remark
+from contactopt.methods.small import solve_small
 from contactopt.problem import (
     Infeasible,
     InterfaceProblem,
@@ -30,7 +32,7 @@ from contactopt.problem import (
     natural_map_residual,
 )
 from contactopt.problem.certificate import Moved
-from contactopt.problem.unbalanced_loads import escape, sentence
+from contactopt.problem.unbalanced_loads import check_equilibrium
 
 TOL = 1e-8  # largest certificate of an answer that counts as solved, unless another is asked for
 CYCLE = 12  # longest cycle that is looked for
@@ -98,7 +100,11 @@ def solve(
     chosen = _method_for(problem, method, settings)
     limits = _Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
-        solution = _run(problem, chosen, limits, start)
+        solution, swept = None, None
+        if chosen == Auto() and start is None and limits.usual:
+            solution, swept = solve_small(problem, tol)
+        if solution is None:
+            solution = _run(problem, chosen, limits, start, swept)
         remark(problem, solution)
     return replace(solution, notes=tuple(notes))
 
@@ -136,14 +142,25 @@ class _Limits:
     time_limit: float
     progress: Callable[[int, float], None] | None
 
+    @property
+    def usual(self) -> bool:
+        """Whether a solve of a few milliseconds that ends with its first iterate meets them."""
+        told = self.progress is not None or self.change_tol is not None
+        return not told and self.max_iterations >= 1 and self.time_limit >= LEAST_PROOF
+
 
 def _run(
-    problem: InterfaceProblem, method: Method, limits: _Limits, start: Solution | None
+    problem: InterfaceProblem,
+    method: Method,
+    limits: _Limits,
+    start: Solution | None,
+    swept: np.ndarray | None,
 ) -> Solution:
+    """`swept`: where the first sweeps ended, which need no repetition."""
     begin = time.perf_counter()
     if problem.contacts == 0:
         return _without_contacts(problem, method, limits.tol)
-    _check_equilibrium(problem)
+    check_equilibrium(problem)
     if not getattr(method, "unsymmetric", False) and not problem.symmetric:
         raise InputError(
             f"method '{type(method).__name__.lower()}' minimises an energy, which an unsymmetric Q"
@@ -154,6 +171,8 @@ def _run(
     scaled, scales = dimensionless(isotropic(problem))
     stretch = problem.law.stretch(problem.dim)
     scales = scales if stretch is None else replace(scales, stretch=stretch)
+    if swept is not None:
+        scaled.__dict__["swept"] = swept / scales.force
     first = None if start is None else _dimensionless_start(start, problem, scales)
     recorder = _Recorder(problem, scales, limits, first or at_rest(scaled))
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
@@ -376,25 +395,3 @@ def _same(new: State, old: State) -> bool:
 def _relative(new: np.ndarray, old: np.ndarray) -> float:
     size = float(np.linalg.norm(new))
     return float(np.linalg.norm(new - old)) / size if size > 0 else float(np.linalg.norm(old) > 0)
-
-
-def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """InputError for a load that no contacts can balance: bodies escape along a named motion, or a
-    plate is pulled off along the normals.
-    """
-    if problem.motions:
-        found = escape(problem)
-        if found is not None:
-            raise InputError(sentence(problem, found))
-        return
-    if not len(problem.s) or not problem.law.unilateral:
-        return
-    V = problem.V.reshape(problem.contacts, problem.dim, -1)
-    for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
-        rounding = 1e-9 * np.abs(column).max(initial=0.0)
-        along = rounding > 0 and np.all(np.abs(column[:, 1:]) <= rounding)
-        # what normal reactions add to s
-        if s != 0 and along and np.all(column[:, 0] * np.sign(s) >= -rounding):
-            raise InputError(
-                "the load on the plate pulls the bodies apart: no equilibrium; press them together."
-            )
