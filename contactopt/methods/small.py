@@ -26,7 +26,7 @@ def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None,
     made.
     """
     Q, law = problem.Q, problem.law
-    compiled = getattr(gauss_seidel.sweeps, "small", None)
+    compiled = gauss_seidel.compiled("small")
     if compiled is None or not gauss_seidel.Sweeps.can(problem):
         return None, None
     if type(law) is not Coulomb or not problem.q.size:
@@ -37,8 +37,8 @@ def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None,
         rows = gauss_seidel.NONE, gauss_seidel.NONE, Q
     else:
         return None, None
-    begin, r = time.perf_counter(), np.zeros(problem.q.shape)
-    k, dim = r.shape
+    begin, (k, dim) = time.perf_counter(), problem.q.shape
+    r = np.zeros((k, dim))
     cost = rows[2].size + constants.LOCAL * k
     if cost > constants.QUICK:
         return None, None

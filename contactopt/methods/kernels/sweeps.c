@@ -344,15 +344,15 @@ static PyObject *sweep(PyObject *self, PyObject *args)
     return at == NULL ? PyErr_NoMemory() : Py_BuildValue("dn", change, count);
 }
 
-/* ---- Small problems: scaling, sweeps and certificate in one call. The formulas are those of
-contactopt.problem.scaling, .certificate and contactopt.methods.auto, for Coulomb's law without
-plates, in the units of the problem: sweeps do not depend on units. ---- */
+/* Small problems in one call, by the formulas of contactopt.problem.scaling, .certificate and
+contactopt.methods.auto for Coulomb's law; sweeps need no scaling. */
 
 #define NOISE 1e-13
 #define ACTS 1e-6
 #define ROUNDED 1e-6
 #define DUST 1e-5
 #define STIFFEST 1e4
+#define UNSEEN 1e4
 
 static double length_of(const double *v, int d)
 {
@@ -375,7 +375,7 @@ static double row_times(const Matrix *Q, Py_ssize_t n, Py_ssize_t i, const doubl
     return sum;
 }
 
-/* The yardsticks: force, length and mean compliance of forces r with displacements d = Q r. */
+/* The yardsticks, and the mean compliance, of forces r with d = Q r. */
 static void measure(int dim, Py_ssize_t k, const double *q, const double *c, const double *r,
                     const double *d, double *force, double *length, double *mean)
 {
@@ -407,7 +407,7 @@ static void measure(int dim, Py_ssize_t k, const double *q, const double *c, con
     *force = *force == 0 ? 1.0 : *force;
 }
 
-/* natural_map_residual; d (n,) is room for Q r, and c (k,) are the compliances. */
+/* natural_map_residual; d (n,) is room for Q r. */
 static double certificate(int dim, const Matrix *Q, const double *q, const double *mu,
                           const double *c, const double *r, double *d)
 {
@@ -430,12 +430,14 @@ static double certificate(int dim, const Matrix *Q, const double *q, const doubl
         if (!isfinite(error) || !isfinite(beyond) || !isfinite(y[0]))
             return INFINITY;
         worst = fmax(worst, fmax(error, beyond) / force);
+        if (length_of(at, dim) > UNSEEN * force)
+            worst = fmax(worst, DBL_EPSILON * length_of(at, dim) / force);
     }
     return worst;
 }
 
-/* Compliances c (k,) and local problems. A component that nothing moves gets the mean compliance in
-the block of its contact, so that it bears no force. diag (n,) is room for the diagonal of Q. */
+/* Compliances c (k,) and local problems; a component that nothing moves gets the mean compliance, so
+that it bears no force. diag (n,) is room. */
 static void prepare(int dim, const Matrix *Q, const double *q, const double *mu, double *diag,
                     double *c, Local *at)
 {
