@@ -1,4 +1,4 @@
-"""Small problems in one compiled call, against the same formulas in Python."""
+"""Small problems by compiled sweeps, against the same formulas in Python."""
 
 import numpy as np
 import pytest
@@ -32,22 +32,20 @@ def any_problem(seed: int) -> InterfaceProblem:
     return InterfaceProblem(Q, q, mu=rng.choice([0.0, 0.2, 0.8, 2.0], size=k))
 
 
-def test_certificates_are_those_of_python():
-    """At the answers, and to the last digits; the certificate is that of the given data."""
+def test_nearly_all_are_solved_at_once():
+    """The certificate is that of the given data, in their units."""
     solved = 0
     for seed in range(400):
         problem = any_problem(seed)
         solution, _ = solve_small(problem, 1e-8)
         if solution is not None:
-            expected = natural_map_residual(problem, solution.reactions)
-            assert solution.residual == pytest.approx(expected, abs=1e-14), seed
-            assert solution.residual <= 1e-8
+            expected = natural_map_residual(problem, solution.reactions, np.zeros(0))
+            assert solution.residual == expected <= 1e-8, seed
             solved += 1
     assert solved > 300
 
 
-def test_certificates_far_from_a_solution_are_those_of_python():
-    """The sweeps of a problem without a solution end anywhere."""
+def test_a_problem_without_a_solution_is_not_solved():
     squeezed = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2))
     problem = InterfaceProblem(squeezed, [[-1.0, 0.0], [-1.0, 0.0]], 0.3)
     assert solve_small(problem, 1e-8)[0] is None

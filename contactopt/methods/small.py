@@ -1,7 +1,7 @@
-"""Small problems of the default method by one compiled call: scaling, the first sweeps and the
-certificate (`small` in kernels/sweeps.c), by the formulas of contactopt.problem.scaling,
-contactopt.problem.certificate and contactopt.methods.auto. What it does not solve goes on as
-without it, and so does everything where the package was installed without a compiler.
+"""Small problems of the default method in a few calls: the first sweeps of
+contactopt.methods.auto, compiled and in the units of the problem (`small` in kernels/sweeps.c), and
+the certificate. Sweeps need no scaling. What they do not solve goes on as without them, and so does
+everything where the package was installed without a compiler.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from contactopt.methods import constants
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels import gauss_seidel
 from contactopt.methods.notes import FEW
-from contactopt.problem import InterfaceProblem, Solution, Status
+from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
 from contactopt.problem.laws.coulomb import Coulomb
 
-NAME = repr(Auto())
+NAME, NONE = repr(Auto()), np.zeros(0)
 
 
 def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None, np.ndarray | None]:
@@ -38,22 +38,27 @@ def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None,
     else:
         return None, None
     begin, (k, dim) = time.perf_counter(), problem.q.shape
-    r = np.zeros((k, dim))
     cost = rows[2].size + constants.LOCAL * k
     if cost > constants.QUICK:
         return None, None
     # all digits cost less than the condition of few contacts (contactopt.methods.notes)
     look = np.inf if k <= FEW else constants.LOOK / cost
-    arrays = *(np.ascontiguousarray(a) for a in (rows[2], law.coefficient, problem.q)), r
-    given = constants.SWEEPS_KEPT, constants.FIRST_SWEEPS
-    enough = constants.NEARLY_SWEPT, constants.SWEPT
-    residual = compiled(dim, *rows[:2], *arrays, *given, *enough, look, tol)
-    if not residual <= tol:
+    r = np.zeros((k, dim))
+    given = *(np.ascontiguousarray(a) for a in (rows[2], law.coefficient, problem.q)), r
+    given = dim, *rows[:2], *given, constants.SWEEPS_KEPT
+    nearly, swept = constants.NEARLY_SWEPT, constants.SWEPT
+    done, there = compiled(*given, constants.FIRST_SWEEPS, nearly, swept, look)
+    if not there:
         return None, r
-    seconds = time.perf_counter() - begin
-    row = {"residual": residual, "change": float(np.any(r[:, 1:])), "seconds": seconds}
-    phases = {"solve": seconds, "certificate": 0.0, "checks": 0.0}  # it is all one call
-    status = Status.SOLVED
-    return Solution(
-        r, np.zeros(0), status, residual, 1, NAME, (row,), phases, status.sentence
-    ), None
+    swept_at = time.perf_counter()
+    residual = natural_map_residual(problem, r, NONE)
+    if not residual <= tol and done > look:
+        compiled(*given, 2 * done, swept, swept, 0.0)
+        residual = natural_map_residual(problem, r, NONE)
+    if not residual <= tol:
+        return None, None
+    sweeping, certifying = swept_at - begin, time.perf_counter() - swept_at
+    phases = {"solve": sweeping, "certificate": certifying, "checks": 0.0}
+    row = {"residual": residual, "change": float(np.any(r[:, 1:])), "seconds": sweeping}
+    end = Status.SOLVED, residual, 1, NAME, (row,), phases, Status.SOLVED.sentence
+    return Solution(r, np.zeros(0), *end), None

@@ -344,126 +344,40 @@ static PyObject *sweep(PyObject *self, PyObject *args)
     return at == NULL ? PyErr_NoMemory() : Py_BuildValue("dn", change, count);
 }
 
-/* Small problems in one call, by the formulas of contactopt.problem.scaling, .certificate and
-contactopt.methods.auto for Coulomb's law; sweeps need no scaling. */
+#define NOISE 1e-13 /* relative size of what rounding leaves of a zero */
 
-#define NOISE 1e-13
-#define ACTS 1e-6
-#define ROUNDED 1e-6
-#define DUST 1e-5
-#define STIFFEST 1e4
-#define UNSEEN 1e4
-
-static double length_of(const double *v, int d)
-{
-    double sum = 0.0;
-    for (int i = 0; i < d; i++)
-        sum += v[i] * v[i];
-    return sqrt(sum);
-}
-
-/* Row i of Q times x; of its entries' sizes, where x is NULL, the largest. */
-static double row_times(const Matrix *Q, Py_ssize_t n, Py_ssize_t i, const double *x)
+/* The largest entry of row i of Q. */
+static double row_size(const Matrix *Q, Py_ssize_t n, Py_ssize_t i)
 {
     int64_t from = Q->first ? Q->first[i] : i * n, to = Q->first ? Q->first[i + 1] : from + n;
-    double sum = 0.0;
-    if (x != NULL && Q->first == NULL)
-        return dot(Q->entries + from, x, n);
+    double most = 0.0;
     for (int64_t place = from; place < to; place++)
-        sum = x ? sum + Q->entries[place] * x[Q->columns[place]]
-                : fmax(sum, fabs(Q->entries[place]));
-    return sum;
+        most = fmax(most, fabs(Q->entries[place]));
+    return most;
 }
 
-/* The yardsticks, and the mean compliance, of forces r with d = Q r. */
-static void measure(int dim, Py_ssize_t k, const double *q, const double *c, const double *r,
-                    const double *d, double *force, double *length, double *mean)
-{
-    double largest = 0.0, over = 0.0, narrow = INFINITY, far = 0.0, least = INFINITY, most = 0.0;
-    double total = 0.0, weighed = 0.0, movable = 0.0, summed = 0.0;
-    for (Py_ssize_t i = 0; i < k; i++)
-        largest = fmax(largest, length_of(r + i * dim, dim));
-    for (Py_ssize_t i = 0; i < k; i++) {
-        double size = length_of(r + i * dim, dim), gap = q[i * dim], u[3];
-        double weight = largest > 0 ? fmin(1.0, size / (ACTS * largest)) : 0.0;
-        if (c[i] > 0)
-            total += size, weighed += size * c[i], movable += 1.0, summed += c[i];
-        most = fmax(most, weight * length_of(d + i * dim, dim));
-        far = fmax(far, weight * length_of(q + i * dim, dim));
-        over = fmax(over, -gap), narrow = fmin(narrow, fabs(gap));
-        for (int a = 0; a < dim; a++)
-            u[a] = d[i * dim + a] + q[i * dim + a];
-        if ((size > 0 || u[0] < 0) && length_of(u, dim) > 0)
-            least = fmin(least, length_of(u, dim));
-    }
-    if (!(total > 0))
-        total = movable, weighed = summed;
-    *mean = total > 0 ? weighed / total : 0.0;
-    *length = fmax(fmax(most, over), fmax(narrow, ROUNDED * far));
-    if (*length == 0)
-        *length = isfinite(least) ? least : 0.0;
-    double natural = *mean > 0 ? *length / *mean : 0.0;
-    *force = natural > 0 ? fmax(fmin(largest, natural), DUST * natural) : largest;
-    *force = *force == 0 ? 1.0 : *force;
-}
-
-/* natural_map_residual; d (n,) is room for Q r. */
-static double certificate(int dim, const Matrix *Q, const double *q, const double *mu,
-                          const double *c, const double *r, double *d)
-{
-    double force, length, mean, worst = 0.0;
-    for (Py_ssize_t i = 0; i < Q->k * dim; i++)
-        d[i] = row_times(Q, Q->k * dim, i, r);
-    measure(dim, Q->k, q, c, r, d, &force, &length, &mean);
-    for (Py_ssize_t i = 0; i < Q->k; i++) {
-        const double *at = r + i * dim;
-        double stiff = fmin(fmax(c[i] > 0 ? mean / c[i] : 1.0, 1.0), STIFFEST), y[3], e[3];
-        double rho = length == 0 ? 0.0 : stiff * (force / length);
-        for (int a = 0; a < dim; a++)
-            y[a] = at[a] - rho * (d[i * dim + a] + q[i * dim + a]);
-        double height = fmax(y[0], 0.0), bound = mu[i] * height, size = length_of(y + 1, dim - 1);
-        e[0] = at[0] - height;
-        for (int a = 1; a < dim; a++)
-            e[a] = at[a] - y[a] * (size > bound ? bound / size : 1.0);
-        double error = length_of(e, dim);
-        double beyond = length_of(at + 1, dim - 1) - mu[i] * fmax(at[0], 0.0);
-        if (!isfinite(error) || !isfinite(beyond) || !isfinite(y[0]))
-            return INFINITY;
-        worst = fmax(worst, fmax(error, beyond) / force);
-        if (length_of(at, dim) > UNSEEN * force)
-            worst = fmax(worst, DBL_EPSILON * length_of(at, dim) / force);
-    }
-    return worst;
-}
-
-/* Compliances c (k,) and local problems; a component that nothing moves gets the mean compliance, so
-that it bears no force. diag (n,) is room. */
+/* Local problems of Coulomb's law, as contactopt.problem.scaling has them: a component that nothing
+moves gets the mean compliance, so that it bears no force. diag (n,) is room. */
 static void prepare(int dim, const Matrix *Q, const double *q, const double *mu, double *diag,
-                    double *c, Local *at)
+                    Local *at)
 {
     Py_ssize_t n = Q->k * dim, positive = 0;
-    double sum = 0.0, highest = 0.0, largest = 0.0, farthest = 0.0;
+    double sum = 0.0, largest = 0.0, farthest = 0.0;
     for (Py_ssize_t i = 0; i < n; i++) {
         double W[9] = {0.0};
         own_block(dim, i / dim, Q, W);
         diag[i] = W[(i % dim) * (dim + 1)];
         if (diag[i] > 0)
             sum += diag[i], positive++;
-        highest = fmax(highest, diag[i]), largest = fmax(largest, fabs(diag[i]));
-        farthest = fmax(farthest, fabs(q[i]));
+        largest = fmax(largest, fabs(diag[i])), farthest = fmax(farthest, fabs(q[i]));
     }
     for (Py_ssize_t i = 0; i < Q->k; i++) {
-        double W[9] = {0.0}, total = 0.0;
-        int counted = 0;
+        double W[9] = {0.0};
         own_block(dim, i, Q, W);
-        for (Py_ssize_t a = 0, j = i * dim; a < dim; a++, j++) {
-            if (diag[j] > NOISE * highest)
-                total += diag[j], counted++;
+        for (Py_ssize_t a = 0, j = i * dim; a < dim; a++, j++)
             if (fabs(diag[j]) <= NOISE * largest && fabs(q[j]) <= NOISE * farthest &&
-                row_times(Q, n, j, NULL) <= NOISE * largest)
+                row_size(Q, n, j) <= NOISE * largest)
                 W[a * (dim + 1)] = positive ? sum / positive : 1.0;
-        }
-        c[i] = total / (counted ? counted : 1);
         at[i] = local_of(dim, W, mu[i], 0);
     }
 }
@@ -472,41 +386,36 @@ static PyObject *small(PyObject *self, PyObject *args)
 {
     int dim, most;
     Py_ssize_t count, more;
-    double nearly, swept, look, tol, change, residual = INFINITY;
+    double nearly, swept, look, change = INFINITY;
     Py_buffer first, columns, entries, mu, q, r;
-    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*indddd", &dim, &first, &columns, &entries, &mu, &q,
-                          &r, &most, &count, &nearly, &swept, &look, &tol))
+    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*inddd", &dim, &first, &columns, &entries, &mu, &q,
+                          &r, &most, &count, &nearly, &swept, &look))
         return NULL;
     Py_ssize_t k = mu.len / (Py_ssize_t)sizeof(double), n = k * dim;
     Matrix Q = {entries.buf, first.len ? first.buf : NULL, columns.buf, k};
-    double *room = most > LONGEST ? NULL : calloc(3 * n + k + work_of(most, n), sizeof(double));
+    double *room = most > LONGEST ? NULL : calloc(2 * n + work_of(most, n) + 1, sizeof(double));
     Local *at = room ? malloc((k ? k : 1) * sizeof(Local)) : NULL;
     if (at != NULL) {
         Py_BEGIN_ALLOW_THREADS;
-        double *d = room + n, *c = d + 2 * n, *force = r.buf;
-        Memory past = memory_in(c + k, most, n);
-        prepare(dim, &Q, q.buf, mu.buf, d + n, c, at);
-        change = sweep_over(dim, &count, 1.0, nearly, &Q, q.buf, at, force, room, &past);
-        if (change <= nearly) {
-            if (count > look)
-                residual = certificate(dim, &Q, q.buf, mu.buf, c, force, d);
-            if (!(residual <= tol)) {
-                more = 2 * count;
-                sweep_over(dim, &more, 1.0, swept, &Q, q.buf, at, force, room, &past);
-                residual = certificate(dim, &Q, q.buf, mu.buf, c, force, d);
-            }
+        Memory past = memory_in(room + 2 * n, most, n);
+        prepare(dim, &Q, q.buf, mu.buf, room + n, at);
+        change = sweep_over(dim, &count, 1.0, nearly, &Q, q.buf, at, r.buf, room, &past);
+        if (change <= nearly && count <= look) {
+            more = 2 * count; /* the last digits take less than the first */
+            sweep_over(dim, &more, 1.0, swept, &Q, q.buf, at, r.buf, room, &past);
         }
         Py_END_ALLOW_THREADS;
     }
     free(room), free(at);
     PyBuffer_Release(&first), PyBuffer_Release(&columns), PyBuffer_Release(&entries);
     PyBuffer_Release(&mu), PyBuffer_Release(&q), PyBuffer_Release(&r);
-    return at == NULL ? PyErr_NoMemory() : PyFloat_FromDouble(residual);
+    PyObject *there = change <= nearly ? Py_True : Py_False;
+    return at == NULL ? PyErr_NoMemory() : Py_BuildValue("nO", count, there);
 }
 
 static PyMethodDef functions[] = {
-    {"small", small, METH_VARARGS, "Scale, sweep and certify: the certificate, infinite if the"
-     " sweeps did not converge; r is where they ended."},
+    {"small", small, METH_VARARGS, "Sweep a problem in any units until most digits are there, and if"
+     " this takes at most `look` sweeps all; the number of the first ones, and whether it is so."},
     {"sweep", sweep, METH_VARARGS,
      "Sweep at most `count` times over all contacts; the last change over the forces, the sweeps."},
     {NULL, NULL, 0, NULL}};
