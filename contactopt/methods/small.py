@@ -44,8 +44,8 @@ def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None,
     # all digits cost less than the condition of few contacts (contactopt.methods.notes)
     look = np.inf if k <= FEW else constants.LOOK / cost
     r = np.zeros((k, dim))
-    given = *(np.ascontiguousarray(a) for a in (rows[2], law.coefficient, problem.q)), r
-    given = dim, *rows[:2], *given, constants.SWEEPS_KEPT
+    arrays = *(np.ascontiguousarray(a) for a in (rows[2], law.coefficient, problem.q)), r
+    given = dim, *rows[:2], *arrays, constants.SWEEPS_KEPT
     nearly, swept = constants.NEARLY_SWEPT, constants.SWEPT
     done, there = compiled(*given, constants.FIRST_SWEEPS, nearly, swept, look)
     if not there:
