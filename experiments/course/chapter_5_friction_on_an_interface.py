@@ -404,6 +404,9 @@ assert solve(
 # mechanics. `hint("5.1")` gives a hint, three times, and then the solution. `table(5)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **5.1** (Pen and paper.) A sledge is pressed down with 130 N and pulled with 23 N. What is the
 # smallest friction coefficient with which it stands still?
 
@@ -431,7 +434,7 @@ check("5.3", answer)
 # **5.4** (Program.) Measure the factor by which the certificate of Tresca's iteration falls from
 # one step to the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for
 # every step, with the certificate as `"residual"`.) Your factor is compared with the one that
-# `diagnose` predicts.
+# `diagnose` predicts, and may differ from it by 4 percent.
 
 # %% tags=["exercise"]
 answer = ...  # factor in one step [-]
