@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import count
 from contactopt.checks import meant, said_once
 from contactopt.coupling.back_to_bodies import recover
@@ -97,7 +96,6 @@ def run(
     out: str | Path | None = None,
     *,
     note: Note = lambda text: None,
-    team: Team | None = None,
     **changes: Any,
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into a folder if one is given.
@@ -108,8 +106,6 @@ def run(
         scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     note : receives progress messages
-    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
-        live in this process
     OPTIONS
     changes : to the arguments of a named scene, such as `elements`, or to the fields of a Scene
 
@@ -143,9 +139,7 @@ def run(
         solved, estimate = None, None
         if options.simplest:
             states, solved = _simplest(states, how)
-        if team is not None:
-            states = _dealt(states, team, note)
-        if solved is None or team is not None or options.accuracy is not None:
+        if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
         if options.read:
@@ -247,14 +241,6 @@ def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...
 
     found, solved = proved_part(states[0], how)
     return (found.scene,), solved
-
-
-def _dealt(states: tuple[Scene, ...], team: Team, note: Note) -> tuple[Scene, ...]:
-    """The states with their elastic bodies on the ranks of a team."""
-    idle = team.size - sum(part.meshed for part in states[-1].parts)
-    if idle > 0:
-        note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
-    return tuple(spread(state, team) for state in states)
 
 
 @said_once()

@@ -43,22 +43,6 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
     return changes | given
 
 
-def scene_asked(options: argparse.Namespace) -> Any:
-    """Make the scene of the command `run`.
-
-    Parameters
-    ----------
-    options : of the command
-
-    Returns
-    -------
-    Scene : of a load path its last state
-    """
-    from contactopt.runner import scene_of
-
-    return scene_of(options.scene, **_changes(options))
-
-
 def run(options: argparse.Namespace) -> int:
     """Solve a scene, write its files and print its numbers.
 
@@ -79,7 +63,6 @@ def run(options: argparse.Namespace) -> int:
         options.scene,
         out,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
-        team=options.team,
         **{name: getattr(options, name) for name in OPTIONS},
         **_changes(options),
     )
@@ -87,9 +70,6 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(result.summary, indent=2))
     else:
         _print_result(result, out)
-        if options.team is not None:
-            sent = options.team.traffic
-            print(f"{options.team.size} ranks, {sent.messages} messages, {sent.length} bytes")
     reached = result.estimate is None or result.estimate.reached
     return 0 if result.solution.solved and reached else 1
 
