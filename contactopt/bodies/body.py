@@ -29,6 +29,7 @@ from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError
 from contactopt.material import lame
 from contactopt.meshes.cells import SHAPES, overlapping, straight
+from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
@@ -57,7 +58,8 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     check_free(part.name, A, rigid_motions)
     traces = {}
     for name in scene.surfaces_of(part):
-        tied = scene.laws_of(part, name) == {"tied"}
+        laws = [find_law(law) for law in scene.laws_of(part, name)]
+        tied = bool(laws) and not any(law.bounded for law in laws)
         traces[name] = contact_trace(basis, scene.degree, mesh.boundaries[name], weight, tied)
     return Assembly(
         part.name,

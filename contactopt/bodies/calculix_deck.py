@@ -32,6 +32,7 @@ from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.meshes.cells import elements_of
 from contactopt.meshes.inp import FACES
+from contactopt.problem.laws import find_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
@@ -84,7 +85,7 @@ def _check(scene: Scene) -> None:
     if scene.degree != 1:
         raise InputError("a deck of CalculiX is written with linear elements; give degree = 1.")
     for pair in scene.pairs:
-        if pair.law != "coulomb" or callable(pair.mu) or np.ndim(pair.mu) > 0:
+        if not find_law(pair.law).plain_coulomb() or callable(pair.mu) or np.ndim(pair.mu) > 0:
             raise InputError(
                 f"contact '{pair.name}': a deck of CalculiX knows Coulomb's law with one number mu."
             )
