@@ -113,12 +113,11 @@ class AssembledElastic(AssembledBody):
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
         near = PLANE * float(np.ptp(extent, axis=1).max())
         planes = []
-        names = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[body.kind]
         for support in self.part.supports:
             given = support.displacement or {}
             if list(given.values()) != [0.0]:
                 continue
-            axis = names.index(next(iter(given)))
+            axis = body.kind.components.index(next(iter(given)))
             nodes = mesh.facets[:, np.asarray(mesh.boundaries[support.boundary])]
             low, high = extent[axis]
             for place, sign in ((low, 1.0), (high, -1.0)):

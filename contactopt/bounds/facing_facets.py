@@ -67,7 +67,7 @@ class FacingFacets:
     def __init__(self, solved: Solved, number: int, cells: Sequence[Any]):
         scene, coupling = solved.reduction.scene, solved.reduction.couplings[number]
         pair, self.gap, self.frame = scene.pairs[number], coupling.gap, coupling.frames[0]
-        self.revolved = scene.kind == "axisymmetric"
+        self.revolved = scene.analysis.revolved
         name, self.joined = f"contact '{pair.name}'", coupling.kind == "mortar"
         law = find_law(pair.law)
         if not (law.convex or law.plain_coulomb()) or law.dilatant or not law.opens:

@@ -77,7 +77,7 @@ def _laid_out(
     n = points.normals
     along = np.all(np.abs(n) == np.abs(lead.normals)) and np.all(n == n[:, :1])
     if lead.chart is None or not along:
-        return lay_out(points, scene.copies, scene.kind == "axisymmetric")
+        return lay_out(points, scene.copies, scene.analysis.revolved)
     frame = np.roll(np.eye(len(n)), 1, axis=0)  # n, t1, t2 along the last, first, second component
     frame[0] = n[:, 0]
     k = len(points.gap)

@@ -15,7 +15,8 @@ from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_zone, stick_width
 from contactopt.readings.peaks import nodal_pressure
-from contactopt.scenes.scene import COMPONENTS, BodyForce, Traction
+from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.scene import BodyForce, Traction
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -41,7 +42,7 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
     together or of whole rings, with components r and z. Mirror images across `planes` and the parts
     of a ring balance each other but for what acts along the planes and along the axis.
     """
-    if reduction.scene.kind == "axisymmetric":
+    if reduction.scene.analysis.revolved:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
     for plane in reduction.planes:
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
@@ -58,7 +59,7 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
     empty where the bodies are whole, and where a plane does not lie across an axis.
     """
     scene = reduction.scene
-    if scene.kind == "axisymmetric":
+    if scene.analysis.revolved:
         return [{"axis": scene.components[0], "place": 0.0}]
     made = []
     for plane in reduction.planes:
@@ -115,7 +116,7 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
     """For the name of each pair the components of the force on its upper body, without their unit,
     from the summary of a result: normal forces of a curved surface add up to more than it.
     """
-    axes = COMPONENTS[summary["kind"]]
+    axes = KINDS[summary["kind"]].components
     words = {}
     for name, pair in summary["pairs"].items():
         least = ROUNDING * max(map(abs, (*pair["force"], pair["normal_force"])))
@@ -135,7 +136,7 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     force:PAIR:x, moment:PAIR:z                      on the upper body of a pair
     force:body 'block', support 'bottom':x           of a support or plate on its body
     """
-    scene, axes = reduction.scene, COMPONENTS[reduction.scene.kind]
+    scene, axes = reduction.scene, reduction.scene.components
     found: dict[str, float] = {}
     for part in scene.parts:
         for item in (part, *getattr(part, "supports", ()), *getattr(part, "loads", ())):
