@@ -132,7 +132,7 @@ def run(
     for quantity in options.read:
         quantity_of_states(quantity, states)
     restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
-    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
+    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.limits.items()})
     how = _how(options, method, start, restart, note)
     prepared = time.perf_counter() - start
     try:
@@ -252,7 +252,15 @@ def _solved(
         return solve_states(states, options=how), None
     from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    return refine(states, options.quantity, options.accuracy, how, limits, options.adaptive)
+    return refine(
+        states,
+        options.quantity,
+        options.accuracy,
+        how,
+        limits,
+        adaptive=options.adaptive,
+        bound=options.bound,
+    )
 
 
 def _too_large(scene: Scene, why: str) -> str:

@@ -85,7 +85,8 @@ def _print_result(result: Any, out: str) -> None:
     for remark in s["remarks"]:
         print(f"note: {remark}")
     if (estimate := result.estimate) is not None:
-        print(estimate.guarantee.sentence)
+        if estimate.guarantee is not None:
+            print(estimate.guarantee.sentence)
         for one in estimate.levels:
             print(f"  {one.mesh}: {one.unknowns} unknowns, {one.value:.6g}, {one.seconds:.2f} s")
     phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")

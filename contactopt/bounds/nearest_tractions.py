@@ -16,7 +16,7 @@ Any moments m become those of elements in balance in three steps, written P m:
 2. T - C e(w) is in weak equilibrium, if w is the displacement of the body under the forces
    int T : e(phi). This takes one solve with the factors of the body.
 3. Of all changes of m that leave the forces V (T - C e(w)) grad phi_a, the smallest is taken. It is
-   found vertex by vertex (contactopt.accuracy.vertex_balance).
+   found vertex by vertex (contactopt.bounds.vertex_balance).
 
 The energy of the stress is minimised over balanced moments by conjugate gradients, preconditioned
 by P D^-1 P' with the diagonal D of its second derivative, averaged over the components. An L2 norm
@@ -38,7 +38,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.accuracy.vertex_balance import Balance
+from contactopt.bounds.vertex_balance import Balance
 from contactopt.material import Material, lame
 
 GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is the last one

@@ -1,6 +1,6 @@
 """An interval that holds the exact value of a quantity, from a bound of the error in energy.
 
-The letters are those of contactopt.accuracy.bound, which makes that bound.
+The letters are those of contactopt.bounds.bound, which makes that bound.
 
 A quantity J is linear in the contact forces, with the weights omega_n of the pressure and omega_t
 of the shear, and in displacements of plates. Its adjoint has displacements z, and a stress s_z in
@@ -36,7 +36,7 @@ c <= |s_z - s(z)| / (2 rho) other zones cost nothing. The energy is such a quant
 a(v, u - v) in its place, up to |u - v|^2 / 2.
 
 In space |t + g e| is not bounded by the work of friction alone, so that there is no interval with
-friction. Coulomb's law needs small friction, as in contactopt.accuracy.bound.
+friction. Coulomb's law needs small friction, as in contactopt.bounds.bound.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contactopt.accuracy.facing_facets import FacingFacets, facet_nodes
-from contactopt.accuracy.pressed_scene import PressedScene
+from contactopt.bounds.facing_facets import FacingFacets, facet_nodes
+from contactopt.bounds.pressed_scene import PressedScene
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import Duals, duals_of
 from contactopt.errors import InputError

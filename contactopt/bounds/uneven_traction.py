@@ -2,7 +2,7 @@
 
 The contact traction t is linear between the contacts of one side. On a facet F of the other side it
 bends wherever a contact lies within it, and ends where the surface of the first side does. The
-stress of contactopt.accuracy.equilibrated bears only the linear traction with the same moments. A
+stress of contactopt.bounds.tetrahedra bears only the linear traction with the same moments. A
 stress s in the element T behind F makes up for it, with the rest d of t as traction on F and none
 on the other facets: it is in equilibrium, since the moments of d are zero. Its norm adds to that of
 s* - s(v) in T. Let T be the image x = B x^ + b of the regular simplex, whose edges have length one.
@@ -30,9 +30,10 @@ c_n + c / n, and
 It is finite, by the inequalities of Korn and of traces. The bound is close where the simplex is
 nearly regular and larger for others.
 
-In bodies of revolution r s takes the place of s, and r is zero on the axis. There the element is
+In a plane section nothing needs to be estimated: the element is
 cut into a fan of triangles whose outer edges lie between the bends. Of all stresses of composite
 elements on the fan, with d on these edges and none on the others, that of least energy is taken.
+In bodies of revolution r s takes the place of s.
 """
 
 from __future__ import annotations
@@ -42,13 +43,13 @@ from typing import Any
 import numpy as np
 import skfem
 
-from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.equilibrium_elements import EquilibriumElements
-from contactopt.accuracy.facing_facets import measures
+from contactopt.bounds.equilibrium_elements import EquilibriumElements
+from contactopt.bounds.facing_facets import measures
+from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.errors import InputError
 from contactopt.material import Material
 
-CONSTANT = {2: 0.93, 3: 1.73}  # c by the dimension, from 16 and from 8 parts of an edge
+CONSTANT = 1.73  # c of tetrahedra, from 8 parts of an edge
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
 UNBALANCED = 1e-6  # of the force on a piece
 
@@ -58,7 +59,7 @@ def uneven_traction(scene: Any) -> list[np.ndarray]:
     out = [np.zeros(0 if own is None else len(own.volume)) for own in scene.cells]
     for pair in (own for own in scene.pairs if own.joined):
         body, facets = pair.sides[1].body, pair.sides[1].facets
-        energy = (_by_fans if scene.revolved else _by_constant)(scene, pair)
+        energy = (_by_constant if scene.problem.dim == 3 else _by_fans)(scene, pair)
         elements = scene.cells[body].mesh.f2t[0, facets]
         np.add.at(out[body], elements, np.sqrt(scene.factor * energy))
     return out
@@ -90,7 +91,11 @@ def uneven_squares(scene: Any, pair: Any) -> np.ndarray:
 
 
 def least_energy(
-    cells: Simplices, material: Material, elements: np.ndarray, size: np.ndarray, square: np.ndarray
+    cells: Tetrahedra,
+    material: Material,
+    elements: np.ndarray,
+    size: np.ndarray,
+    square: np.ndarray,
 ) -> np.ndarray:
     """An upper bound (f,) of the least energies of stresses in f elements, without divergence, with
     tractions d on one facet whose moments are zero, and with none on the others.
@@ -98,24 +103,23 @@ def least_energy(
     Parameters
     ----------
     cells, material, elements : The elements of a body, what it is made of, and f of the elements.
-    size : (f,) length or area of the facets.
-    square : (f, dim, dim) integrals of d d' over the facets.
+    size : (f,) area of the facets.
+    square : (f, 3, 3) integrals of d d' over the facets.
     """
-    d, regular = cells.dim, regular_simplex(cells.dim)
+    regular = regular_tetrahedron()
     points = regular.mesh.p
     form = regular.form(Material(1.0, 0.0), np.zeros(1, dtype=int))[0]
     unit = np.linalg.inv(np.linalg.cholesky(form))
     largest = np.linalg.eigvalsh(unit @ cells.form(material, elements) @ unit.T)[:, -1]
     back = points[:, 1:] @ cells.back[elements]
-    own = np.einsum("fai,fij,faj->f", back, square, back) * size / measures(points[:, :d, None])
-    return np.asarray(CONSTANT[d] * largest * np.maximum(own, 0.0))
+    own = np.einsum("fai,fij,faj->f", back, square, back) * size / measures(points[:, :3, None])
+    return np.asarray(CONSTANT * largest * np.maximum(own, 0.0))
 
 
-def regular_simplex(d: int) -> Simplices:
-    """The regular simplex with a vertex at the origin, whose edges have length one."""
-    points = np.column_stack([np.zeros(d), np.linalg.cholesky((np.eye(d) + 1) / 2).T])
-    kind = skfem.MeshTri if d == 2 else skfem.MeshTet
-    return Simplices(kind(points, np.arange(d + 1)[:, None]))
+def regular_tetrahedron() -> Tetrahedra:
+    """With a vertex at the origin, and edges of the length one."""
+    points = np.column_stack([np.zeros(3), np.linalg.cholesky((np.eye(3) + 1) / 2).T])
+    return Tetrahedra(skfem.MeshTet(points, np.arange(4)[:, None]))
 
 
 def _by_fans(scene: Any, pair: Any) -> np.ndarray:
@@ -154,7 +158,7 @@ def _by_fans(scene: Any, pair: Any) -> np.ndarray:
     if not corners:
         return np.zeros(len(side.facets))
     mesh, moments = _fans(np.array(corners), np.array(outer), np.array(rest))
-    fans = EquilibriumElements(mesh, cells.degree, True)
+    fans = EquilibriumElements(mesh, cells.degree, scene.revolved)
     return np.bincount(outer, _least_energies(fans, moments, material), len(side.facets))
 
 

@@ -1,8 +1,8 @@
-"""The composite elements of Johnson and Mercier: a triangle or tetrahedron is cut at its centroid
-into dim + 1 parts, and a symmetric stress with continuous tractions is linear on each.
+"""The composite tetrahedron of Johnson and Mercier: it is cut at its centroid into four parts, and
+a symmetric stress with continuous tractions is linear on each.
 
 It has as many parameters as there are moments of tractions on the boundary and of body forces on
-the parts. Here one body force serves all parts. Sources: as contactopt.accuracy.equilibrated.
+the parts. Here one body force serves all parts. Sources: as contactopt.bounds.tetrahedra.
 """
 
 from __future__ import annotations
@@ -11,23 +11,24 @@ from functools import cache
 
 import numpy as np
 
-WEIGHT = {2: 1 / 36, 3: 1 / 80}  # int l_a l_b = V (1 + delta) / ... on a part of the element
+WEIGHT = 1 / 80  # int l_a l_b = V (1 + delta) / 20 on each of four parts
 
 
-def components(d: int) -> list[tuple[int, int]]:
+def components() -> list[tuple[int, int]]:
     """The components of a symmetric matrix."""
-    return [(i, j) for i in range(d) for j in range(i, d)]
+    return [(i, j) for i in range(3) for j in range(i, 3)]
 
 
 @cache
-def reference_stress(d: int) -> np.ndarray:
+def reference_stress() -> np.ndarray:
     """The stress (value, component, input) of the reference element, which the inputs determine:
     moments of tractions, then a body force. The integral of a product of two stresses is WEIGHT
     times the sum of the products of their values.
     """
+    d = 3
     x = np.concatenate([np.zeros((1, d)), np.eye(d)])
-    pairs, n = components(d), d + 1
-    volume = 1 / (2 if d == 2 else 6) / n
+    pairs, n = components(), d + 1
+    volume = 1 / 6 / n
     slopes = []
     for s in range(n):
         corners = x.copy()
@@ -59,10 +60,3 @@ def reference_stress(d: int) -> np.ndarray:
     found = solved.reshape(n, n, len(pairs), inputs)  # part, vertex of the part, component
     # at the vertices of the parts, and their sums
     return np.concatenate([found.reshape(n * n, *found.shape[2:]), found.sum(axis=1)])
-
-
-@cache
-def reference_energy(d: int) -> np.ndarray:
-    """Integrals (component, component, input, input) of products of components of its stress."""
-    stress = reference_stress(d)
-    return WEIGHT[d] * np.einsum("vak,vbl->abkl", stress, stress, optimize=True)

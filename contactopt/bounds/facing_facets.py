@@ -1,4 +1,4 @@
-"""The contact surfaces of a solved scene as a guaranteed bound (contactopt.accuracy.bound) sees
+"""The contact surfaces of a solved scene as a guaranteed bound (contactopt.bounds.bound) sees
 them: flat, facet facing facet, or piece of a facet facing piece of a facet. The pieces are
 intervals in the plane. In space they are triangles, of which polygons are made up that
 contactopt.coupling.segments cuts.

@@ -6,7 +6,7 @@ cylindrical coordinates let S = r s for the stresses s_rr, s_zz and s_rz. Equili
     (div S)_z + r f_z = 0,        s_tt = (div S)_r + r f_r,
 
 where the second equation is only what the hoop stress s_tt is, so that the bodies need no balance
-of forces along r. S is made of the composite stresses of contactopt.accuracy.split_triangle, of
+of forces along r. S is made of the composite stresses of contactopt.bounds.split_triangle, of
 degree 1 for linear displacements and 2 for quadratic ones. Hence tractions, times r in bodies of
 revolution, are polynomials of this degree on each edge. On the axis S is zero, which makes every
 stress finite.
@@ -20,7 +20,7 @@ Integrals with 1 / r are taken by a rule on each part of a triangle.
 
 Source: Fraeijs de Veubeke (1965), Displacement and equilibrium models in the finite element method,
 for tractions as unknowns; Love (1927), A treatise on the mathematical theory of elasticity, section
-188, for bodies of revolution; else as contactopt.accuracy.split_triangle.
+188, for bodies of revolution; else as contactopt.bounds.split_triangle.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import null_space, qr
 
-from contactopt.accuracy.displaced_stress import bilinear, displaced_stress
-from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.least_in_balance import LeastInBalance
-from contactopt.accuracy.split_triangle import PAIRS, SplitTriangle, split_triangle
+from contactopt.bounds.displaced_stress import bilinear, displaced_stress
+from contactopt.bounds.least_in_balance import LeastInBalance
+from contactopt.bounds.simplices import Simplices
+from contactopt.bounds.split_triangle import PAIRS, SplitTriangle, split_triangle
 from contactopt.material import Material
 
 NONE = 1e-9  # of the largest singular value, what is zero
@@ -139,7 +139,7 @@ class EquilibriumElements(Simplices):
 
         Parameters
         ----------
-        material, stress, force, held : As for Simplices.equilibrated().
+        material, stress, force, held : As for Tetrahedra.equilibrated().
         moments : (facets, 2, 2) of the tractions on the other boundary facets, vertex by vertex,
             with the hat functions of the edge; of r times them in bodies of revolution.
         answer : Not needed in the plane.

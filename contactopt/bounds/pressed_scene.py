@@ -1,4 +1,4 @@
-"""A solved scene as a guaranteed bound (contactopt.accuracy.bound) sees it: tractions that the law
+"""A solved scene as a guaranteed bound (contactopt.bounds.bound) sees it: tractions that the law
 allows and that balance the bodies, and displacements that the contact allows.
 """
 
@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.accuracy.displaced_stress import Halves, halved
-from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.equilibrium_elements import EquilibriumElements
-from contactopt.accuracy.facing_facets import (
+from contactopt.bodies.elastic import ElasticBody
+from contactopt.bodies.rigid import RigidBody
+from contactopt.bounds.displaced_stress import Halves, halved
+from contactopt.bounds.equilibrium_elements import EquilibriumElements
+from contactopt.bounds.facing_facets import (
     NEAR,
     FacingFacets,
     control_points,
@@ -21,9 +22,9 @@ from contactopt.accuracy.facing_facets import (
     measures,
     quadratic_shapes,
 )
-from contactopt.accuracy.nearest_tractions import Answer
-from contactopt.bodies.elastic import ElasticBody
-from contactopt.bodies.rigid import RigidBody
+from contactopt.bounds.nearest_tractions import Answer
+from contactopt.bounds.simplices import Simplices
+from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved
 from contactopt.scenes.scene import BodyForce, Plate, Traction
@@ -95,11 +96,11 @@ class PressedScene:
                 f"{name}: a bound needs triangles, tetrahedra, or quadrilaterals with linear"
                 " displacements, none of them curved."
             )
-        if shape == "RefTet" or (shape == "RefTri" and not self.revolved):
-            return Simplices(mesh)
+        if shape == "RefTet":
+            return Tetrahedra(mesh)
         halves = Halves(mesh) if shape == "RefTri" else halved(mesh)
         mesh = halves.mesh
-        made: Any = Simplices(mesh)
+        made = Simplices(mesh)
         edges = mesh.p[:, mesh.facets[1]] - mesh.p[:, mesh.facets[0]]
         longest = np.sum(edges**2, axis=0)[made.opposite].max(axis=0)
         if np.any(longest > THIN * 2 * made.volume):
@@ -253,7 +254,7 @@ class PressedScene:
         self, number: int, tractions: np.ndarray, loaded: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Body force (dim,), held components (facets, dim) and moments of tractions (facets, dim,
-        dim) of a body, as Simplices.equilibrated() takes them; not `loaded`: of the contact alone.
+        dim) of a body, as Tetrahedra.equilibrated() takes them; not `loaded`: of the contact alone.
         """
         scene, mesh, d = self.reduction.scene, self.cells[number].mesh, self.problem.dim
         part: Any = scene.parts[number]

@@ -18,11 +18,11 @@ right side is the primal-dual gap, 2 (J(v) + J*(s*)): it needs v and s* alone, a
 It is also the error in the constitutive relations (Ladeveze). Its terms are reported apart: what s*
 and s(v) differ by is the mesh's, the second term that of contact, the third that of friction.
 
-s* comes from contactopt.accuracy.equilibrated. Its pressure is the piecewise linear one that has
+s* comes from contactopt.bounds.tetrahedra. Its pressure is the piecewise linear one that has
 the values r_i / A_i at the contacts, for the forces r and nodal areas A of the solution. The finite
 elements were loaded otherwise, so each body is solved once more under this pressure, with the
 factors that are there, and s* is made from that displacement. In bodies of revolution, and of
-quadrilaterals, s* comes from contactopt.accuracy.equilibrium_elements. In the former it is the
+quadrilaterals, s* comes from contactopt.bounds.equilibrium_elements. In the former it is the
 pressure times the radius that is linear between the contacts. Plates and free motions stay in
 balance: the pressures are scaled by what is missing, which also makes the bound hold for a solver
 that stopped early.
@@ -39,7 +39,7 @@ whose last term is at most |s(u) - s*| |w|. Since 2 |s(u) - s*| |w| - |s(u) - s*
 
 to which that of w is added, which moves along a surface only where two surfaces meet in an edge.
 
-contactopt.accuracy.interval makes intervals of quantities from the same terms.
+contactopt.bounds.interval makes intervals of quantities from the same terms.
 
 Coulomb's law is treated as Tresca's with g = mu p*. What follows is that the error of p* changes g:
 the left side of (*) loses 2 int mu (p* - p) (|[u_t]| - |[v_t]|). If this is at most
@@ -51,7 +51,7 @@ unique.
 The bound is of the problem whose boundary is that of the mesh. It does not cover straight edges in
 place of a curve. Integrals over contact facets are taken over SPLIT parts of each; there
 penetration is looked for as well. Where a mortar coupling joins facets that do not match, what s*
-lacks is bounded by contactopt.accuracy.uneven_traction, and nothing penetrates anywhere.
+lacks is bounded by contactopt.bounds.uneven_traction, and nothing penetrates anywhere.
 
 Sources: Prager, Synge (1947); Ladeveze, Leguillon (1983); Coorevits, Hild, Pelle (2000), A
 posteriori error estimation for unilateral contact with matching and non-matching meshes, Comput.
@@ -64,20 +64,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from skfem.refdom import RefQuad
 
-from contactopt.accuracy.estimate import Guarantee
-from contactopt.accuracy.interval import interval, without_interval
-from contactopt.accuracy.pressed_scene import PressedScene
-from contactopt.accuracy.uneven_traction import uneven_traction
+from contactopt.bounds.pressed_scene import PressedScene
+from contactopt.bounds.uneven_traction import uneven_traction
 from contactopt.errors import InputError
-from contactopt.readings.quantities import Quantity
 from contactopt.solving.solve_scene import Solved
 
 UNBALANCED = 1e-6  # of the force of an element: so much a vertex may be out of balance
-MOST = {2: 150_000, 3: 25_000}  # elements of a search with a bound, some 1 GB of memory
-DEAR = 4  # times what a triangle in plane strain costs: elements of rings, and quadrilaterals
-SMALL = "if friction is small, which contactopt diagnose tests"
 Data = list[Any]  # for every body what determines a composite stress; None for a rigid one
 
 
@@ -189,33 +182,6 @@ class Bound:
                 )
             out.append(made + self.strained[i] if forces else made)
         return out
-
-
-def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
-    """What is guaranteed of a quantity with this value, and of the displacement."""
-    scene = solved.reduction.scene
-    bodies = [getattr(body, "body", None) for body in solved.reduction.bodies]
-    meshes = [own.basis.mesh for own in bodies if own is not None]
-    elements, most = sum(mesh.nelements for mesh in meshes), MOST[scene.dim]
-    if scene.kind == "axisymmetric" or any(mesh.refdom is RefQuad for mesh in meshes):
-        if missing := without_interval(solved.reduction, quantity):
-            return Guarantee(missing=missing)  # the energy norm alone is not worth its time
-        most //= DEAR
-    if elements > most:
-        return Guarantee(missing=f"a search takes no bound of more than {most:,} elements.")
-    try:
-        bound = Bound(solved)
-    except InputError as error:
-        return Guarantee(missing=str(error))
-    terms = bound.terms if bound.norm > 0 else {}
-    law = solved.reduction.problem.law
-    assumed = SMALL if law.proportional and np.any(law.rough) else ""
-    try:
-        middle, width = interval(bound, quantity)
-    except InputError as error:
-        return Guarantee(energy=terms, missing=str(error), assumed=assumed)
-    relative = (abs(middle - value) + width) / (abs(value) or 1.0)
-    return Guarantee(relative, terms, assumed=assumed)
 
 
 def _minus(one: Data, other: Data) -> Data:

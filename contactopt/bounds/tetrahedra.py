@@ -1,4 +1,4 @@
-"""A stress in exact equilibrium with loads and contact pressure, made element by element.
+"""A stress on tetrahedra in exact equilibrium with loads and contact pressure.
 
 The stress s(u) of finite elements jumps between elements. Here a symmetric stress s* close to it is
 made, for which in every element and across every facet
@@ -18,17 +18,15 @@ steps.
    The equations of one vertex have a solution because u balances the hat function there
    (Galerkin); of all solutions the one is taken that is nearest to the mean of s(u) n from both
    sides.
-2. The stress within elements, by the composite elements of Johnson and Mercier: each triangle or
-   tetrahedron is cut at its centroid into dim + 1 parts, on which s* is linear. Tractions on the
+2. The stress within elements, by the composite elements of Johnson and Mercier: each
+   tetrahedron is cut at its centroid into four parts, on which s* is linear. Tractions on the
    boundary and f determine it. It is the image of a stress on the reference element,
    s = B s^ B' / |det B|, where x = B x^ + b, which keeps symmetry, divergence and tractions. So one
    small matrix, made once, serves all elements: H gives the energy int s : C^-1 : s = y' H y of
    the data y of an element, its tractions and body force.
-3. A stress nearer to s(u). In the plane all stresses without loads derive from functions of Airy.
-   Of these the one is added that makes the energy of s* - s(u) least, a sparse linear system. Long
-   thin elements, on which tractions bend, would be far from s(u) without it. In space conjugate
-   gradients make that energy less (contactopt.accuracy.nearest_tractions), from a stress that is
-   averaged at the vertices and brought into balance by one solve.
+3. A stress nearer to s(u). Conjugate gradients make the energy of s* - s(u) less
+   (contactopt.bounds.nearest_tractions), from a stress that is averaged at the vertices and brought
+   into balance by one solve.
 
 Sources: Ladeveze, Leguillon (1983), Error estimate procedure in the finite element method and
 applications, SIAM J. Numer. Anal. 20, for the tractions; Johnson, Mercier (1978), Some equilibrium
@@ -38,114 +36,24 @@ Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.accuracy.airy import Airy
-from contactopt.accuracy.composite_element import (
-    WEIGHT,
-    components,
-    reference_energy,
-    reference_stress,
-)
-from contactopt.accuracy.nearest_tractions import Answer, BalancedMoments, Energy
-from contactopt.accuracy.vertex_balance import Balance
+from contactopt.bounds.composite_element import WEIGHT, components, reference_stress
+from contactopt.bounds.nearest_tractions import Answer, BalancedMoments, Energy
+from contactopt.bounds.simplices import Simplices
+from contactopt.bounds.vertex_balance import Balance
 from contactopt.material import Material, lame
 
 BLOCK = 8192  # elements at a time
 
 
 @dataclass(frozen=True, eq=False)
-class Simplices:
-    """Straight-edged triangles or tetrahedra, with displacements and stresses on them.
-
-    mesh  of scikit-fem, whose vertices are p (dim, vertices) and t (dim + 1, e)
-    """
-
-    mesh: Any
-
-    @cached_property
-    def dim(self) -> int:
-        return len(self.mesh.p)
-
-    @cached_property
-    def map(self) -> np.ndarray:
-        """(e, dim, dim) the matrices B from the reference element."""
-        x = self.mesh.p[:, self.mesh.t]
-        return np.moveaxis(x[:, 1:] - x[:, :1], 2, 0)
-
-    @cached_property
-    def ratio(self) -> np.ndarray:
-        """(e,) |det B|."""
-        return np.abs(np.linalg.det(self.map))
-
-    @cached_property
-    def volume(self) -> np.ndarray:
-        """(e,) [length^dim]."""
-        return self.ratio / (2 if self.dim == 2 else 6)
-
-    @cached_property
-    def back(self) -> np.ndarray:
-        """(e, dim, dim) the inverses of these matrices."""
-        return np.linalg.inv(self.map)
-
-    @cached_property
-    def slopes(self) -> np.ndarray:
-        """(e, dim + 1, dim) gradients of the hat functions."""
-        return np.concatenate([-self.back.sum(axis=1, keepdims=True), self.back], axis=1)
-
-    @cached_property
-    def others(self) -> np.ndarray:
-        """(dim + 1, dim) for each local vertex the others, which span the facet opposite it."""
-        every = np.arange(self.dim + 1)
-        return np.array([every[every != o] for o in every])
-
-    @cached_property
-    def opposite(self) -> np.ndarray:
-        """(dim + 1, e) the facet of the mesh opposite each vertex."""
-        local = [tuple(facet) for facet in self.mesh.refdom.facets]
-        return np.asarray(self.mesh.t2f[[local.index(tuple(own)) for own in self.others]])
-
-    @cached_property
-    def slots(self) -> np.ndarray:
-        """(dim + 1, dim, e) the place that each of `others` has among the vertices of its facet."""
-        corners = self.mesh.facets[:, self.opposite]
-        return np.stack(
-            [
-                [np.argmax(corners[:, o] == self.mesh.t[a], axis=0) for a in own]
-                for o, own in enumerate(self.others)
-            ]
-        )
-
-    @cached_property
-    def sign(self) -> np.ndarray:
-        """(dim + 1, e) 1 where the normal of the facet points out of the element, else -1."""
-        return np.where(self.mesh.f2t[0, self.opposite] == np.arange(len(self.volume)), 1.0, -1.0)
-
-    @cached_property
-    def outward(self) -> np.ndarray:
-        """(dim + 1, e, dim) outward normals times the measure of the facets."""
-        return -self.dim * np.moveaxis(self.volume[:, None, None] * self.slopes, 1, 0)
-
-    @cached_property
-    def between(self) -> tuple[np.ndarray, np.ndarray]:
-        """Local vertices (2, j) at the ends of the edges of an element, and the edges (j, e)."""
-        flat = self.dim == 2
-        ends = self.mesh.refdom.facets if flat else self.mesh.refdom.edges
-        return np.array(ends).T, np.asarray(self.mesh.t2f if flat else self.mesh.t2e)
-
-    def quadratic(self, nodal: np.ndarray) -> np.ndarray:
-        """Displacements (dim, vertices and edges) of nodal ones, which may be those of vertices."""
-        count = self.mesh.nvertices
-        if nodal.shape[1] > count:
-            return nodal
-        edges = self.mesh.facets if self.dim == 2 else self.mesh.edges
-        return np.concatenate([nodal, nodal[:, edges].mean(axis=1)], axis=1)
+class Tetrahedra(Simplices):
+    """Straight-edged tetrahedra, with displacements and stresses on them."""
 
     def stress(self, material: Material, nodal: np.ndarray) -> np.ndarray:
         """The stress (e, dim + 1, dim, dim), at the vertices of each element between which it is
@@ -211,7 +119,7 @@ class Simplices:
         the components of their stresses on the reference element.
         """
         d, (E, nu) = self.dim, (material.E, material.nu)
-        pairs = components(d)
+        pairs = components()
         base = np.zeros((len(pairs), d, d))
         for number, (i, j) in enumerate(pairs):
             base[number, i, j] = base[number, j, i] = 1.0
@@ -219,24 +127,22 @@ class Simplices:
         G = B.swapaxes(1, 2) @ B
         turned = G[:, None] @ base
         traces = np.trace(turned, axis1=2, axis2=3)
-        # in plane strain the trace in space is 1 + nu times that in the plane
-        factor = nu * (1 + nu) if d == 2 else nu
         rows = turned.reshape(-1, len(pairs), d * d)
         columns = turned.swapaxes(2, 3).reshape(rows.shape)
         form = (1 + nu) * rows @ columns.swapaxes(1, 2)
-        form -= factor * traces[:, :, None] * traces[:, None]
+        form -= nu * traces[:, :, None] * traces[:, None]
         form *= (self.volume[chosen] / ratio**2 / E)[:, None, None]
         return form
 
     def products(self, material: Material, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(e,) integrals of s : C^-1 : s' of two composite stresses by their data."""
-        stress, out = reference_stress(self.dim), np.zeros(len(one))
+        stress, out = reference_stress(), np.zeros(len(one))
         by_inputs, shape = stress.reshape(-1, stress.shape[2]).T, (-1, *stress.shape[:2])
         there = np.flatnonzero(np.any(one != 0, axis=1) & np.any(other != 0, axis=1))
         for own in np.split(there, range(BLOCK, len(there), BLOCK)):
             a, b = ((y[own] @ by_inputs).reshape(shape) for y in (one, other))
             out[own] = np.sum(self.form(material, own) * (a.swapaxes(1, 2) @ b), axis=(1, 2))
-        return out * WEIGHT[self.dim]
+        return out * WEIGHT
 
     @property
     def blocks(self) -> list[slice]:
@@ -250,7 +156,7 @@ class Simplices:
         force: np.ndarray,
         held: np.ndarray,
         moments: np.ndarray,
-        answer: Answer | None = None,
+        answer: Answer,
     ) -> tuple[np.ndarray, float]:
         """The data (e, inputs) of the stress s* of the head of this module.
 
@@ -262,7 +168,7 @@ class Simplices:
         held : (facets, dim) components in which a boundary facet is held, its traction unknown.
         moments : (facets, dim, dim) of the other boundary facets: vertex by vertex those of the
             traction with the hat functions [force per thickness].
-        answer : How the body answers forces; None in the plane.
+        answer : How the body answers forces.
 
         Returns
         -------
@@ -271,39 +177,13 @@ class Simplices:
         """
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
         balance = self._once(known.tobytes(), lambda: Balance(self.forces_of_moments, known))
-        near, mean = stress, stress.mean(axis=1)
-        if answer is not None:
-            space = BalancedMoments(self, material, balance, answer)
-            near, mean = space.smooth(stress)
+        space = BalancedMoments(self, material, balance, answer)
+        near, mean = space.smooth(stress)
         given = np.where(known[:, None], moments, np.nan)
         m, unbalanced = self._tractions(near, mean, force, given, balance)
         missing = self.data(self.seen(m), force) - self.data_of(stress)
-        if answer is None:
-            m += self._nearest(material, missing, known)
-        else:
-            m += space.nearest(self._energy(material, missing)).reshape(m.shape)
+        m += space.nearest(self._energy(material, missing)).reshape(m.shape)
         return self.data(self.seen(m), force), unbalanced
-
-    def _nearest(self, material: Material, missing: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """What to add to the moments (facets, 2, 2) of triangles so that the energy of `missing`,
-        the data of their stress less those of the other one, is least.
-        """
-        form, S = self.form(material, slice(None)), reference_stress(2)
-        parts = reference_energy(2)[..., :12, :12].reshape(9, 12, 12)
-        values = (missing @ S.reshape(-1, S.shape[2]).T).reshape(-1, *S.shape[:2]) @ form
-        slope = WEIGHT[2] * values.reshape(len(form), -1) @ S[..., :12].reshape(-1, 12)
-        key = material, known.tobytes()
-        return self._once(key, lambda: Airy(self, form.reshape(-1, 9), parts, known)).least(slope)
-
-    def _once(self, key: Any, make: Callable[[], Any]) -> Any:
-        """What was made for a key: a bound and its adjoints have the same tractions to find."""
-        if key not in self._kept:
-            self._kept[key] = make()
-        return self._kept[key]
-
-    @cached_property
-    def _kept(self) -> dict[Any, Any]:
-        return {}
 
     @cached_property
     def arms(self) -> np.ndarray:
@@ -334,9 +214,9 @@ class Simplices:
         """Of the stress with the data `missing` by the moments of facets. Single precision does for
         it, since it says how far the energy can fall but not whether the stress is in balance.
         """
-        d, count, stress = self.dim, self.mesh.facets.shape[1], reference_stress(self.dim)
+        d, count, stress = self.dim, self.mesh.facets.shape[1], reference_stress()
         inputs, back = (d + 1) * d * d, self.by_moments.T.tobsr((d, d))  # without the body force
-        form = WEIGHT[d] * self.form(material, slice(None))
+        form = WEIGHT * self.form(material, slice(None))
         size = float(np.abs(form).max()) or 1.0
         single = (form / size).astype(np.float32)
         values = stress.reshape(-1, stress.shape[2]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The balance of elements at their vertices, the first step of contactopt.accuracy.equilibrated."""
+"""The balance of elements at their vertices, the first step of contactopt.bounds.tetrahedra."""
 
 from __future__ import annotations
 
