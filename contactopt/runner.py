@@ -367,8 +367,8 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder)
-            if result.path is None:
-                restart.finished(result.solution)
+            states = [result] if result.path is None else result.path.states
+            restart.ended(result.reduction, [state.solution for state in states])
             restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
