@@ -25,7 +25,8 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
-from contactopt.readings.quantities import approach, quantity_of_states
+from contactopt.readings.plate_motions import approach
+from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
@@ -324,7 +325,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
-        "approach": approach(problem, solution),
+        "approach": approach(reduction, solution),
         **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,

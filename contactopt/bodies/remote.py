@@ -237,6 +237,8 @@ class RemoteBody(Remote, Body):
     added_work = _fetched("added_work")
     on_elements = _fetched("on_elements")
     held_by = _fetched("held_by")
+    plates = _fetched("plates")
+    acting = _fetched("acting")
     fields = _fetched("fields")
     limits = _fetched("limits")
     displacement = _staying("displacement")
@@ -259,6 +261,10 @@ class RemoteBody(Remote, Body):
     def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
         both = Remote(self.team, self._keep("material_change", constant, U, force))
         return both._field("__getitem__", 0), both._ask("__getitem__", 1)
+
+    def carried(self, component: int) -> tuple[Any, Any]:
+        both = Remote(self.team, self._keep("carried", component))
+        return both._field("__getitem__", 0), both._field("__getitem__", 1)
 
     def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
         both = Remote(self.team, self._keep("energy_gradient", U, force))
