@@ -100,3 +100,23 @@ class Assembly:
     def contact_dofs(self) -> np.ndarray:
         """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
+
+    def carried(self, component: int) -> np.ndarray:
+        """Weights (n,) of the displacements that give the motion along a component: that of the
+        plates that move along it; else of the supports that move along it; else, where nothing
+        holds the body along it, the mean displacement.
+        """
+        own, n = self.unknowns[component], len(self.load)
+        moving = [column for column in self.motion.T if column[own].any()]
+        if not moving:
+            driven = np.zeros(n)
+            driven[own] = self.prescribed[own] != 0
+            supports = [own for name, own in self.holders.items() if name.startswith("support")]
+            parts = [np.bincount(own, driven[own], n) for own in supports]
+            moving = [part for part in parts if part.any()]
+        if moving:
+            return np.asarray(sum(column / column.sum() for column in moving) / len(moving))
+        fields, forces = self.rigid_motions.fields, self.rigid_motions.forces
+        others = np.delete(np.arange(n), own)
+        free = np.all(fields[own] == 1.0, axis=0) & ~np.any(fields[others], axis=0)
+        return np.asarray(forces[:, free].sum(axis=1))

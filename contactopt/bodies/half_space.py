@@ -63,6 +63,10 @@ class HalfSpaceBody(UndividedBody):
         return int(np.prod(self.grid)) * len(self.components)
 
     @property
+    def whole(self) -> range:  # type: ignore[override]
+        return range(2 * self.unknowns, 2 * self.unknowns + len(self.components))
+
+    @property
     def cell(self) -> float:
         """Area of a cell [length^2]."""
         return float(np.prod(self.spacing)) * self.thickness

@@ -34,7 +34,7 @@ class Resultant:
     @property
     def table(self) -> dict[str, list[float]]:
         """As lists, for files."""
-        return {"force": self.force.tolist(), "moment": self.moment.tolist()}
+        return {"force": (self.force + 0.0).tolist(), "moment": (self.moment + 0.0).tolist()}
 
 
 def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> Resultant:
@@ -78,13 +78,18 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
     """For every pair of surfaces, by its name, the resultant of the contact forces on its upper
-    body.
+    body: of the forces on the nodes, which balance those of the supports to rounding. Those on the
+    nodes of the lower body count where the upper one has none.
     """
-    forces, points = space_forces(reduction, solution), reduction.problem.coordinates
-    return {
-        pair.name: _resultant(reduction, points[:, pair.contacts], forces[:, pair.contacts])
-        for pair in reduction.problem.pairs
-    }
+    named = {body.name: body for body in reduction.bodies}
+    space, found = space_forces(reduction, solution), {}
+    for pair, own, made in zip(reduction.scene.pairs, reduction.problem.pairs, reduction.couplings):
+        forces, acting = solution.reactions[own.contacts].ravel(), None
+        for name, trace in zip(pair.bodies, (made.upper, made.lower)):
+            acting = named[name].acting(trace.T @ forces) if acting is None else acting
+        points = reduction.problem.coordinates[:, own.contacts]
+        found[own.name] = _resultant(reduction, *(acting or (points, space[:, own.contacts])))
+    return found
 
 
 def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
@@ -146,6 +151,9 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
                     found[":".join([*filter(None, place), axis])] = float(value)
     names = reduction.problem.motions or range(len(solution.multipliers))
     found |= {f"motion:{name}": float(x) for name, x in zip(names, solution.multipliers)}
+    for body, U in zip(reduction.bodies, reduction.displaced(solution)):
+        plates = body.plates(U).items()
+        found |= {f"motion:body '{body.name}': {name}": value for name, value in plates}
     every = pair_resultants(reduction, solution) | holder_resultants(reduction, solution)
     turns = axes if reduction.problem.dim == 3 else ("z",)
     for name, own in every.items():
