@@ -258,19 +258,21 @@ def _reached(
     body: str, unknowns: np.ndarray, pieces: Sequence[tuple[_Seam, np.ndarray]]
 ) -> dict[str, np.ndarray]:
     """The unknowns of each body that pieces of surfaces join to some unknowns of one body; each
-    piece is passed once.
+    piece is passed once in each direction.
     """
-    reached, left, passed = {body: unknowns}, dict(enumerate(pieces)), True
-    while passed:
-        passed = False
-        for number, (seam, rows) in list(left.items()):
-            for here, there in ((0, 1), (1, 0)):
-                at = reached.get(seam.pair.bodies[here])
-                touching = rows[:0] if at is None else np.intersect1d(rows, seam.at(here, at))
-                if len(touching) and number in left:
-                    more, beyond = seam.near[there][touching].indices, seam.pair.bodies[there]
-                    reached[beyond] = np.union1d(reached.get(beyond, more), more)
-                    passed = bool(left.pop(number))
+    reached, new = {body: unknowns}, True
+    ways = [(seam, rows, here) for seam, rows in pieces for here in (0, 1)]
+    while new:
+        new, left = False, []
+        for seam, rows, here in ways:
+            at, there = reached.get(seam.pair.bodies[here]), seam.pair.bodies[1 - here]
+            touching = rows[:0] if at is None else np.intersect1d(rows, seam.at(here, at))
+            if len(touching):
+                more, new = seam.near[1 - here][touching].indices, True
+                reached[there] = np.union1d(reached.get(there, more), more)
+            else:
+                left.append((seam, rows, here))
+        ways = left
     return reached
 
 
