@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import (
     Weight,
     contact_trace,
@@ -58,7 +59,9 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     for name in scene.surfaces_of(part):
         laws = [find_law(law) for law in scene.laws_of(part, name)]
         tied = bool(laws) and not any(law.bounded for law in laws)
-        traces[name] = contact_trace(basis, scene.degree, mesh.boundaries[name], weight, tied)
+        facets = np.asarray(mesh.boundaries[name])
+        copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
+        traces[name] = contact_trace(basis, scene.degree, facets, weight, tied, copied)
     return Assembly(
         part.name,
         kind,
