@@ -76,7 +76,8 @@ class AssembledElastic(AssembledBody):
         places = body.locations[:, nodes]
         curve = self.part.curve_of(name)
         if curve is not None:
-            check_curve(curve, body.basis.mesh, name)
+            if curve.given:
+                check_curve(curve, body.basis.mesh, name)
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False

@@ -156,7 +156,8 @@ class Part:
             found = (self.curve or {}).get(boundary)
         if found is None or isinstance(found, Curve):
             return found
-        return Curve(found, True, f"the curve of boundary {boundary!r} of body '{self.name}'")
+        label = f"the curve of boundary {boundary!r} of body '{self.name}'"
+        return Curve(found, True, label, given=True)
 
     def build_mesh(self, elements: int, zone: float | None) -> Any:
         """Make the mesh of the body.
