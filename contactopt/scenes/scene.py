@@ -251,6 +251,19 @@ class Scene:
                 f" {self.copies}; drop one of them."
             )
 
+    def _check_once(self) -> None:
+        """No two surfaces are joined twice: both pairs would carry a part of one force."""
+        contact = {part.name: getattr(part, "contact", None) for part in self.parts}
+        known: dict[frozenset[tuple[str, str | None]], Contact] = {}
+        for pair in self.pairs:
+            sides = zip(pair.bodies, pair.surfaces)
+            same = known.setdefault(frozenset((b, s or contact[b]) for b, s in sides), pair)
+            if same is not pair:
+                raise self._wrong(
+                    f"contacts '{same.name}' and '{pair.name}' join the same two surfaces, and"
+                    " each would carry a part of their force; keep one of them."
+                )
+
     def _check_pairs(self) -> None:
         """Names are known and given once, each body is in a pair, no pair is of rigid bodies."""
         names = [part.name for part in self.parts]
@@ -279,6 +292,7 @@ class Scene:
                 raise self._wrong(
                     f"both bodies of contact '{pair.name}' are rigid; at least one must be elastic."
                 )
+        self._check_once()
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
