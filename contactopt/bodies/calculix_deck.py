@@ -31,7 +31,7 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.meshes.cells import elements_of
-from contactopt.meshes.inp import FACES
+from contactopt.meshes.inp_elements import FACES
 from contactopt.problem.laws import find_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
