@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contactopt.errors import InputError
-from contactopt.methods.method import Method
-from contactopt.problem import Law
+
+if TYPE_CHECKING:
+    from contactopt.methods.method import Method
+    from contactopt.problem import Law
 
 
 class Repeated(Exception):

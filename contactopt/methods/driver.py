@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.checks import check_number, real_array
+from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
@@ -32,7 +33,6 @@ from contactopt.problem import (
 from contactopt.problem.certificate import Moved
 from contactopt.problem.unbalanced_loads import escape, sentence
 
-TOL = 1e-8  # largest certificate of an answer that counts as solved, unless another is asked for
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
