@@ -24,7 +24,8 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
-from contactopt.readings.quantities import approach, quantity_of_states
+from contactopt.readings.plate_motions import approach
+from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import validity
@@ -318,7 +319,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
-        "approach": approach(problem, solution),
+        "approach": approach(reduction, solution),
         **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,
@@ -361,8 +362,8 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder)
-            if result.path is None:
-                restart.finished(result.solution)
+            states = [result] if result.path is None else result.path.states
+            restart.ended(result.reduction, [state.solution for state in states])
             restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")

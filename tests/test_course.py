@@ -58,7 +58,7 @@ def _start_afresh():
 
 
 def asked(text):
-    return re.findall(r"^# \*\*(\d\.\d)\*\*", text, re.M)
+    return re.findall(r"^# \*\*(\d\.\d+)\*\*", text, re.M)
 
 
 @pytest.mark.slow
@@ -155,7 +155,7 @@ def test_there_are_sixty_exercises_in_three_levels():
 def test_questions_and_records_agree_and_no_answer_stands_in_a_chapter(name):
     text, chapter = CHAPTERS[name].read_text(), int(name.split("_")[1])
     assert asked(text) == list(exercises(chapter))
-    for number, level in re.findall(r"^# \*\*(\d\.\d)\*\* \((.*?)\.\)", text, re.M):
+    for number, level in re.findall(r"^# \*\*(\d\.\d+)\*\* \((.*?)\.\)", text, re.M):
         assert level.lower() == grader.LEVELS[exercise(number).level]
     cells = [cell for cell in re.split(r"^(?=# %%)", text, flags=re.M) if "exercise" in cell[:30]]
     for number, cell in zip(exercises(chapter), cells, strict=True):

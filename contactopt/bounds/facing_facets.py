@@ -19,10 +19,10 @@ from skfem.refdom import RefLine, RefTri
 from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.coupling.segments import areas, clip
 from contactopt.errors import InputError
+from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part
 from contactopt.solving.solve_scene import Solved
 
-LAWS = "frictionless", "tresca", "coulomb"
 NEAR = 1e-6  # vertices and contacts coincide within this fraction of the surface
 FLAT = 1e-9  # by how much the normals of a flat contact surface differ
 SPLIT = {2: 16, 3: 4}  # parts of an edge of a contact facet for integrals over it
@@ -67,10 +67,14 @@ class FacingFacets:
     def __init__(self, solved: Solved, number: int, cells: Sequence[Any]):
         scene, coupling = solved.reduction.scene, solved.reduction.couplings[number]
         pair, self.gap, self.frame = scene.pairs[number], coupling.gap, coupling.frames[0]
-        self.revolved = scene.kind == "axisymmetric"
+        self.revolved = scene.analysis.revolved
         name, self.joined = f"contact '{pair.name}'", coupling.kind == "mortar"
-        if pair.law not in LAWS:
-            raise InputError(f"{name} has the law '{pair.law}'; a bound knows {', '.join(LAWS)}.")
+        law = find_law(pair.law)
+        if not (law.convex or law.plain_coulomb()) or law.dilatant or not law.opens:
+            raise InputError(
+                f"{name} has the law '{pair.law}'; a bound knows contact that may open, with"
+                " Coulomb's friction, with a given bound of friction, or without friction."
+            )
         if np.ptp(coupling.frames, axis=0).max() > FLAT:
             raise InputError(f"{name} has a curved surface; a bound needs a flat one.")
         names = [part.name for part in scene.parts]

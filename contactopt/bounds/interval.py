@@ -51,6 +51,7 @@ from contactopt.bounds.pressed_scene import PressedScene
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import Duals, duals_of
 from contactopt.errors import InputError
+from contactopt.problem.laws import find_law
 from contactopt.readings.quantities import Quantity
 from contactopt.readings.state import State
 
@@ -208,7 +209,7 @@ def _shear_by_pressure(
     omega: np.ndarray,
 ) -> tuple[np.ndarray, float]:
     """mu e (f, 1) of each facet under Coulomb's law, else the work of g e in y_t."""
-    if law == "coulomb":
+    if find_law(law).proportional:
         mu = scene.problem.law.bound(np.ones(len(scene.limit)))
         mu = np.broadcast_to(mu, len(scene.limit))[pair.contacts[pair.contacts >= 0]]
         if np.ptp(mu) > ALL * mu.max():

@@ -55,12 +55,13 @@ class PressedScene:
         if solved.path is not None or self.reduction.on_ground:
             raise InputError("a bound is of one state of bodies that need no ground to hold them.")
         self.bodies: list[Any] = list(self.reduction.bodies)
-        self.revolved = scene.kind == "axisymmetric"
+        self.revolved = scene.analysis.revolved
         self.cells: list[Any] = [
             self._elements(number, body) for number, body in enumerate(self.bodies)
         ]
-        full = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}
-        self.factor = scene.copies * full[scene.kind]
+        if scene.analysis.stretches:
+            raise InputError(f"a bound does not know the kind '{scene.kind}'.")
+        self.factor = scene.copies * scene.analysis.measure(scene.thickness)
         count = range(len(scene.pairs))
         self.pairs = [FacingFacets(solved, number, self.cells) for number in count]
         self.loads = [self._load(number, body) for number, body in enumerate(self.bodies)]

@@ -65,6 +65,7 @@ class Coupling:
     carrier       'upper' or 'lower': the side whose nodes carry the contacts
     share         (k,) part of the faces around each contact that the areas cover: less than one
                   where the other surface ends; None: all of them
+    remarks     sentences for the reader on what this coupling cannot do well
     """
 
     upper: sp.csr_matrix
@@ -79,6 +80,7 @@ class Coupling:
     kind: str = "matching"
     carrier: str = "lower"
     share: np.ndarray | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def couple(

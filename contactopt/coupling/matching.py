@@ -77,7 +77,7 @@ def _laid_out(
     n = points.normals
     along = np.all(np.abs(n) == np.abs(lead.normals)) and np.all(n == n[:, :1])
     if lead.chart is None or not along:
-        return lay_out(points, scene.copies, scene.kind == "axisymmetric")
+        return lay_out(points, scene.copies, scene.analysis.revolved)
     frame = np.roll(np.eye(len(n)), 1, axis=0)  # n, t1, t2 along the last, first, second component
     frame[0] = n[:, 0]
     k = len(points.gap)
@@ -95,11 +95,12 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
             f"interface nodes do not match: body '{upper.body}' has {upper.points.shape[1]} contact"
             f" nodes, body '{lower.body}' has {k}; {REMEDY}."
         )
-    if np.array_equal(upper.points, lower.points):
+    facing = np.sum(upper.normals * lower.normals, axis=0)
+    if np.array_equal(upper.points, lower.points) and np.all(facing < 0):
         return np.arange(k)
-    spacing = 1.0
-    if k > 1:
-        spacing = float(KDTree(lower.points.T).query(lower.points.T, k=2)[0][:, 1].min())
+    spacing, apart = 1.0, np.unique(lower.points.T, axis=0)  # nodes at corners are there twice
+    if len(apart) > 1:
+        spacing = float(KDTree(apart).query(apart, k=2)[0][:, 1].min())
     mean = lower.normals @ lower.areas
     mean = mean / max(float(np.linalg.norm(mean)), 1e-300)
     turn = _turn(lower)
@@ -145,8 +146,7 @@ def _along(
     found, ranks = np.full(count, -1), np.arange(1, min(NEAREST, count) + 1)
     for _ in range(STEPS):
         near = tree.query((lower.points + height * direction).T, k=ranks)[1]
-        facing = np.einsum("di,dij->ij", lower.normals, upper.normals[:, near]) < 0
-        before, found = found, near[np.arange(count), np.argmax(facing, axis=1)]
+        before, found = found, near[np.arange(count), _best(upper, lower, near, spacing)]
         height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)
         if np.array_equal(before, found):
             break
@@ -171,3 +171,14 @@ def _along(
         if np.any(off[some] > allowed[some]):
             break
     return found, off, allowed
+
+
+def _best(upper: Surface, lower: Surface, near: np.ndarray, spacing: float) -> np.ndarray:
+    """Which (k,) of some upper contacts (k, j), the nearest first, is the partner of each lower
+    one: the first that does not face the same way, or one at its place that faces it better.
+    """
+    cosine = np.einsum("di,dij->ij", lower.normals, upper.normals[:, near])
+    row = np.arange(len(near))
+    first = np.argmax(cosine < 0, axis=1)
+    apart = np.linalg.norm(upper.points[:, near] - upper.points[:, near[row, first], None], axis=0)
+    return np.asarray(np.argmin(np.where(apart <= MATCH * spacing, cosine, np.inf), axis=1))

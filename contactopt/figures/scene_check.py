@@ -112,7 +112,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     mean of that of its nodes.
     """
     body = assembled.body
-    R, labels = whole_motions(scene.kind, scene.components, body.basis)
+    R, labels = whole_motions(scene.analysis, body.basis)
     mean = body.motion.T / np.maximum(body.motion.sum(axis=0), 1.0)[:, None]
     held = np.ones(len(R), dtype=bool)
     held[body.free] = False
