@@ -47,11 +47,12 @@ def couple_nodes(
     -------
     One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
-    names = pair.surfaces
+    names, conforming = pair.surfaces, True
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
         lead, partner = second, _match(first, second)
         normals, gap = lead.normals, 0 * lead.areas
+        conforming = _conforming(lead.cells, first.cells, partner)
     else:
         lead = upper.surface(names[0]) if upper.meshed else lower.surface(names[1])
         follower, outward = (lower, -lead.normals) if upper.meshed else (upper, lead.normals)
@@ -67,7 +68,20 @@ def couple_nodes(
     _, frames, order = laid_out = _laid_out(scene, lead, points)
     theirs = local_map(first.traces, partner[order], frames)
     maps = theirs, local_map(second.traces, order, frames)
-    return of_contacts("matching", "lower" if lower.meshed else "upper", points, laid_out, maps)
+    side = "lower" if lower.meshed else "upper"
+    made = of_contacts("matching", side, points, laid_out, maps)
+    return replace(made, conforming=conforming)
+
+
+def _conforming(cells: np.ndarray, others: np.ndarray, partner: np.ndarray) -> bool:
+    """Whether all cells (v, c) of a surface have the partners of their corners at the corners of
+    one of the cells of the other surface.
+    """
+    if len(cells) != len(others):
+        return False
+    known = np.unique(np.sort(others, axis=0), axis=1)
+    both = np.unique(np.concatenate([known, np.sort(partner[cells], axis=0)], axis=1), axis=1)
+    return both.shape[1] == known.shape[1]
 
 
 def _laid_out(

@@ -76,7 +76,8 @@ def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) ->
     free = _free_problem(scene, made)
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
-    notes = [*_balance(states, made, free), *_gap_notes(scene, made)]
+    coupled = [text for own in made.couplings for text in own.remarks]
+    notes = [*_balance(states, made, free), *_gap_notes(scene, made), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -189,7 +190,8 @@ def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
     total = float(own.areas.sum())
     lines = [
         f"pair '{pair.name}': {pair.friction}; {count(len(own.gap), 'contact')} by {own.kind},"
-        f" area {total:.5g} {length}^2"
+        f" area {total:.5g} {length}^2",
+        f"  by {own.kind} because {own.why}",
     ]
     normals = own.frames[:, 0]
     mean = np.average(normals, axis=0, weights=own.areas)
