@@ -126,8 +126,6 @@ def _scene(
             "there are no contacts; add a table [[contacts]]"
             " for each pair of surfaces that may touch."
         )
-    meshes = [mesh for mesh in reading.meshes.values() if hasattr(mesh, "nvertices")]
-    curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
     changes = {
         "contacts": tuple(_contact(pair, parts, reading) for pair in pairs),
         "thickness": top.take("thickness", float, 1.0, low=0.0),
@@ -135,13 +133,11 @@ def _scene(
         "mirror": top.take("mirror", str, "") or None,
         "state": reading.step if steps else "",
     }
-    for key, usual, most, valid in (
-        ("copies", 1, 1000, "at least 1"),
-        ("degree", 2 if curved else 1, 2, "1 or 2"),
-    ):
-        changes[key] = top.take(key, int, usual)
-        if not 1 <= changes[key] <= most:
-            raise top.fail(f"{key} must be {valid}; got {changes[key]}.", key)
+    for key, most, valid in (("copies", 1000, "at least 1"), ("degree", 2, "1 or 2")):
+        value = top.take(key, int)
+        if value is not None and not 1 <= value <= most:
+            raise top.fail(f"{key} must be {valid}; got {value}.", key)
+        changes |= {} if value is None else {key: value}
     solve = _solve(top.table("solve"))
     top.close(OPTIONS)
     with top.about():
