@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, change, read_table
 from contactopt.problem.laws import LAWS
@@ -207,12 +209,18 @@ def _found(top: Table, parts: list[Any], reading: Reading) -> list[Table]:
 
 
 def _free(part: Any) -> Any:
-    """The mesh of a part with those boundaries that neither supports nor loads use."""
-    used = {getattr(own, "boundary", "") for own in (*part.supports, *part.loads)}
-    named = part.mesh.boundaries or {}
-    return replace(
-        part.mesh, _boundaries={name: own for name, own in named.items() if name not in used}
-    )
+    """The mesh of a part with those boundaries that share no facet with those of supports and
+    loads, and are not the whole surface where there are others.
+    """
+    named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
+    used = [
+        named[own.boundary] for own in (*part.supports, *part.loads) if hasattr(own, "boundary")
+    ]
+    taken = np.concatenate([np.zeros(0, dtype=int), *used])
+    whole = len(part.mesh.boundary_facets())
+    free = {name: own for name, own in named.items() if not np.isin(own, taken).any()}
+    parts = {name: own for name, own in free.items() if len(np.unique(own)) < whole}
+    return replace(part.mesh, _boundaries=parts or free)
 
 
 def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:
