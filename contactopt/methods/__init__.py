@@ -24,7 +24,7 @@ from contactopt.errors import InputError
 
 if TYPE_CHECKING:
     from contactopt.methods.method import Method
-    from contactopt.problem import Law
+    from contactopt.problem import Infeasible, Law
 
 
 class Repeated(Exception):
@@ -33,6 +33,14 @@ class Repeated(Exception):
 
     A method that has another way to go on catches it. All others end.
     """
+
+
+class NoSolution(Exception):
+    """Raised by a method that has proved that its problem has no solution."""
+
+    def __init__(self, proof: Infeasible):
+        super().__init__(proof.sentence)
+        self.proof = proof
 
 
 # name -> (module in this room, class, what it is)
