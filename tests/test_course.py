@@ -18,7 +18,7 @@ import pytest
 
 from contactopt import InterfaceProblem, laws, solve
 from contactopt.teaching import Slider
-from experiments.course import grader, nbgrader
+from experiments.course import grader
 from experiments.course.feedback import (
     Displacements,
     Forces,
@@ -317,6 +317,8 @@ def test_the_worst_contact_is_drawn(number):
 
 @pytest.mark.parametrize("name", list(CHAPTERS))
 def test_nbgrader_gets_an_answer_and_a_graded_cell_for_each_exercise(name):
+    from experiments.course import nbgrader
+
     marked = [
         (cell["metadata"]["nbgrader"], "".join(cell["source"]))
         for cell in json.loads(nbgrader.source_notebook(CHAPTERS[name].read_text()))["cells"]
@@ -336,6 +338,8 @@ def test_nbgrader_gets_an_answer_and_a_graded_cell_for_each_exercise(name):
 
 
 def test_solutions_stand_in_a_notebook_of_their_own():
+    from experiments.course import nbgrader
+
     for name, path in CHAPTERS.items():
         text = path.read_text()
         solved = nbgrader.solved(text)

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 import test_how_tos
 
+jupytext = pytest.importorskip("jupytext")
+
 EXPERIMENTS = Path(__file__).parents[1] / "experiments"
 SITE = EXPERIMENTS / "site"
 NUMBERS = range(1, 13)
