@@ -6,4 +6,4 @@ class InputError(ValueError):
 
 
 class BackendError(RuntimeError):
-    """A QP or conic backend gave no usable answer; the message names it."""
+    """A QP or conic backend failed; the message names it."""

@@ -220,8 +220,7 @@ assert steps < 20 and np.allclose(
 # the contact force of the last iteration to the force of the spring. By repetition it removes the
 # error, although $\kappa$ is moderate.
 #
-# Now we compare five methods. Each is asked for a certificate of $10^{-2}$, and then for smaller and
-# smaller ones.
+# Now we compare five methods. Each runs to the tolerances $10^{-2}$ to $10^{-8}$ of the certificate.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
