@@ -1,6 +1,6 @@
 """Idioms that were translated from another language, and that the field does not use. They stood on
-pages, in docstrings and in messages; this list keeps them from coming back. The section on English in
-CONTRIBUTING.md says what to write instead.
+pages, in docstrings and in messages; this list keeps them from coming back. CONTRIBUTING.md says
+what to write instead.
 """
 
 import re
