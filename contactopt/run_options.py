@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields
 from importlib.resources import files
 from typing import Any, NamedTuple, TypeVar
 
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
 
 TOGETHER = "accuracy and quantity belong together: the bound, and the name of what it bounds."
 F = TypeVar("F", bound=Callable[..., Any])

@@ -25,6 +25,7 @@ from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.plate_motions import approach
+from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
@@ -304,7 +305,8 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
-    said = [*remarks(reduction, solution), *beyond]
+    known = doubts(reduction.scene, reduction.couplings)
+    said = [*known, *remarks(reduction, solution), *beyond]
     return {
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,

@@ -10,8 +10,10 @@ import pytest
 import skfem
 from deck_shapes import block, element_rows, node_rows
 
+from contactopt import Material, Part, Rigid, Scene, Support, Traction, run
 from contactopt.errors import InputError
 from contactopt.meshes.mesh_files import load_bodies, load_mesh
+from contactopt.scenes.scene_files import read_scene_file
 
 TYPES = {
     **{"CPS3": ("tri", 1), "CPE6": ("tri", 2), "CAX4": ("quad", 1), "CPE4R": ("quad", 1)},
@@ -406,3 +408,44 @@ def test_numbers_of_instances_and_of_the_assembly_are_apart(tmp_path):
     low = check(tmp_path / "deck.inp", "I", 1, {"S": 1, "U": 1}, 8)
     up = check(tmp_path / "deck.inp", "J", 1, {"S": 1, "T": 1}, 8)
     assert low.p[2].max() == 1 and up.p[2].min() == 3 and "T" not in low.boundaries
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_degree_is_that_of_the_mesh_whichever_way_it_comes(tmp_path, order):
+    """A cantilever from a file, through load_mesh and a Scene and through a scene file: the same
+    degree and the same deflection, which linear triangles make too small.
+    """
+    kind, shape = ("CPE3", "CPE6")[order - 1], block("tri", order, (6, 1))
+    sides = "\n".join(
+        f"*NSET, NSET={name}\n" + ",\n".join(map(str, shape.on(axis, at)))
+        for name, axis, at in (("left", 0, 0), ("right", 0, 6), ("low", 1, 0), ("up", 1, 1))
+    )
+    (tmp_path / "beam.inp").write_text(
+        f"*NODE\n{node_rows(shape)}\n*ELEMENT, TYPE={kind}, ELSET=BEAM\n"
+        f"{element_rows(shape.elements)}\n{sides}\n"
+    )
+    (tmp_path / "beam.toml").write_text(
+        '[bodies.beam]\nmesh = "beam.inp"\nmaterial = { E = 1000, nu = 0.3 }\ncontact = "low"\n'
+        'supports = [{ boundary = "left", x = 0, y = 0 }]\n'
+        'tractions = [{ boundary = "right", y = 0.01 }]\n[bodies.floor]\nrigid = {}\n'
+        '[[contacts]]\nupper = "beam"\nlower = "floor"\nmu = 0.0\n'
+    )
+    mesh = load_mesh(tmp_path / "beam.inp")
+    part = Part(
+        "beam",
+        mesh,
+        Material(1000.0, 0.3),
+        (Support("left"),),
+        (Traction("right", (0.0, 0.01)),),
+        contact="low",
+    )
+    scenes = (
+        Scene("beam", part, Rigid("floor"), 0.0),
+        read_scene_file(tmp_path / "beam.toml").states[0],
+    )
+    assert [scene.degree for scene in scenes] == [order] * 2
+    tips = [run(scene, figures=()).fields[0].displacement[1].max() for scene in scenes]
+    np.testing.assert_allclose(tips, tips[0], rtol=1e-9)
+    # beam of Euler and Bernoulli with plane strain: F l^3 / (3 E' I)
+    exact = 0.01 * 6**3 / (3 * 1000 / (1 - 0.09) / 12)
+    assert 0.9 < tips[0] / exact < 1.1 if order == 2 else tips[0] / exact < 0.6

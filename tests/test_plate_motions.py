@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import MATERIAL, block, two_blocks
+from conftest import MATERIAL, block
 
-from contactopt import InputError, Part, Plate, Rigid, Scene, Support, Traction, gradient, run
+from contactopt import Part, Plate, Scene, Support, Traction, gradient, run
 from contactopt.meshes.polar import ring
-from contactopt.readings.plate_motions import approach, motion
+from contactopt.readings.plate_motions import approach
 from contactopt.readings.quantities import value_of
 from contactopt.scenes import PATHS, SCENES
 from contactopt.scenes.scene import BodyForce

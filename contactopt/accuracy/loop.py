@@ -16,9 +16,9 @@ from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.bounds import bounded
 from contactopt.checks import check_number
+from contactopt.defaults import TOL
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
 from contactopt.readings.peaks import Peak, Reading
 from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse

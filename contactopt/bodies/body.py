@@ -8,11 +8,10 @@ are those of the whole body.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 import skfem
-from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
@@ -27,8 +26,9 @@ from contactopt.bodies.elements import (
 )
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
+from contactopt.checks import short
 from contactopt.errors import InputError
-from contactopt.meshes.cells import SHAPES, overlapping, straight
+from contactopt.meshes.cells import SHAPES, joined, overlapping, straight
 from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
@@ -45,13 +45,6 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     weight = (kind.measure(scene.thickness) * scene.copies, kind.revolved)
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
     A = isotropic_stiffness(basis, kind.constants(part.material), weight)
-    touching = sp.csr_matrix((np.ones(len(A.indices), dtype=np.int8), A.indices, A.indptr))
-    pieces = connected_components(touching, directed=False)[0]
-    if pieces > 1:
-        raise InputError(
-            f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to"
-            " no element, merge duplicated nodes, or model each piece as a body of its own."
-        )
     fixed = _constrained(scene, part, basis)
     rigid_motions = free_motions(kind, basis, fixed.held, weight)
     check_free(part.name, A, rigid_motions)
@@ -115,12 +108,13 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension"
             f" {scene.dim} made of triangles, quadrilaterals, tetrahedra or hexahedra; got"
-            f" {type(mesh).__name__}."
+            f" {_words(mesh)}."
         )
     if not np.all(np.isfinite(mesh.p)):
         raise InputError(
             f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers."
         )
+    _check_pieces(part, mesh)
     if (over := overlapping(mesh)) is not None:
         place = ", ".join(f"{x:g}" for x in mesh.p[:, mesh.t[:, over]].mean(axis=1))
         raise InputError(
@@ -144,6 +138,39 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
                 else f"the mesh has no boundary named {name!r}"
             )
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
+
+
+def _words(mesh: Any) -> str:
+    """What a mesh that does not fit is."""
+    if not isinstance(mesh, skfem.Mesh):
+        return short(mesh)
+    kind = {1: "on a line", 2: "in a plane", 3: "in space"}[mesh.p.shape[0]]
+    return f"one {kind}, of {mesh.nelements} elements"
+
+
+def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
+    """Raise InputError unless every element can be reached from every other across facets, and
+    every node belongs to one.
+    """
+    inner = mesh.f2t[:, mesh.f2t[1] >= 0]
+    piece = joined(inner, mesh.nelements)
+    pieces = len(np.unique(piece))
+    lost = mesh.nvertices - len(np.unique(mesh.t))
+    if pieces + lost == 1:
+        return
+    nodes = [np.unique(mesh.t[:, piece == own]) for own in np.unique(piece)]
+    shared = np.flatnonzero(np.bincount(np.concatenate(nodes)) > 1)
+    if len(shared):
+        place = ", ".join(f"{x:g}" for x in mesh.p[:, shared[0]])
+        raise InputError(
+            f"body '{part.name}': its mesh falls into {pieces} pieces that share nodes but no side"
+            f" of an element, such as the node at ({place}), around which they turn as around a"
+            " hinge; let them share a side, or model each piece as a body of its own."
+        )
+    raise InputError(
+        f"body '{part.name}': its mesh falls into {pieces + lost} pieces; remove nodes that belong"
+        " to no element, merge duplicated nodes, or model each piece as a body of its own."
+    )
 
 
 def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:

@@ -10,6 +10,7 @@ import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 
 from contactopt.cli.parser import make_parser
 from contactopt.errors import InputError
@@ -22,7 +23,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     told = sys.argv[1:] if arguments is None else list(arguments)
     options = make_parser().parse_args(told)
     with _logging(options.verbose, options.quiet):
-        return _answered(lambda: options.command(options))
+        return _answered(lambda: _command(options.command)(options))
+
+
+def _command(name: str) -> Callable[..., int]:
+    """The function of a command: the rooms that it needs are imported only now."""
+    home = "test_set" if name == "problems" else "commands"
+    function: Callable[..., int] = getattr(import_module(f"contactopt.cli.{home}"), name)
+    return function
 
 
 def _answered(command: Callable[[], int]) -> int:

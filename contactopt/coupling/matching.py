@@ -6,12 +6,14 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
+from contactopt.coupling.segments import FACING
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
@@ -47,15 +49,19 @@ def couple_nodes(
     -------
     One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
-    names = pair.surfaces
+    names, conforming = pair.surfaces, True
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
         lead, partner = second, _match(first, second)
         normals, gap = lead.normals, 0 * lead.areas
+        conforming = _conforming(lead.cells, first.cells, partner)
     else:
         lead = upper.surface(names[0]) if upper.meshed else lower.surface(names[1])
-        follower, outward = (lower, -lead.normals) if upper.meshed else (upper, lead.normals)
-        other, gap = follower.facing(lead, outward)
+        follower, sign = (lower, -1.0) if upper.meshed else (upper, 1.0)
+        other, gap = follower.facing(lead, sign * lead.normals)
+        if (one := _without_copies(lead, sign * other.normals)) is not lead:
+            lead = one
+            other, gap = follower.facing(lead, sign * lead.normals)
         first, second = (lead, other) if upper.meshed else (other, lead)
         partner, normals = np.arange(len(gap)), other.normals
     held = first.held[:, partner] & second.held
@@ -67,7 +73,49 @@ def couple_nodes(
     _, frames, order = laid_out = _laid_out(scene, lead, points)
     theirs = local_map(first.traces, partner[order], frames)
     maps = theirs, local_map(second.traces, order, frames)
-    return of_contacts("matching", "lower" if lower.meshed else "upper", points, laid_out, maps)
+    side = "lower" if lower.meshed else "upper"
+    made = of_contacts("matching", side, points, laid_out, maps)
+    return replace(made, conforming=conforming)
+
+
+def _conforming(cells: np.ndarray, others: np.ndarray, partner: np.ndarray) -> bool:
+    """Whether all cells (v, c) of a surface have the partners of their corners at the corners of
+    one of the cells of the other surface.
+    """
+    if len(cells) != len(others):
+        return False
+    known = np.unique(np.sort(others, axis=0), axis=1)
+    both = np.unique(np.concatenate([known, np.sort(partner[cells], axis=0)], axis=1), axis=1)
+    return both.shape[1] == known.shape[1]
+
+
+def _without_copies(surface: Surface, outward: np.ndarray) -> Surface:
+    """The surface with one contact, in place of one for each side, at corners where the other body
+    has one normal for all. Their areas are those of the sides that face it: `outward` (dim, k) is
+    the direction to it.
+    """
+    k = surface.points.shape[1]
+    both = np.concatenate([surface.points, outward])
+    known, first, own = np.unique(both, axis=1, return_index=True, return_inverse=True)
+    if known.shape[1] == k:
+        return surface
+    rank = np.argsort(np.argsort(first))  # the contacts keep their order
+    own, first = rank[own.ravel()], np.sort(first)
+    towards = np.sum(surface.normals * outward, axis=0) > -FACING
+    share = np.where(towards | (np.bincount(own, towards) == 0)[own], surface.areas, 0.0)
+    areas = np.bincount(own, share)
+    M = sp.csr_matrix((share / areas[own], (own, np.arange(k))), (len(first), k))
+    normals = surface.normals @ M.T
+    return replace(
+        surface,
+        points=surface.points[:, first],
+        normals=normals / np.linalg.norm(normals, axis=0),
+        areas=areas,
+        weights=sp.csr_matrix(M @ surface.weights),
+        traces=tuple(sp.csr_matrix(M @ trace) for trace in surface.traces),
+        held=surface.held[:, first],
+        cells=own[surface.cells],
+    )
 
 
 def _laid_out(

@@ -173,8 +173,8 @@ def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     """The tables of a summary. 'pairs': for each pair of surfaces its resultant, normal force
-    [force], largest pressure [stress], half-widths [length], coupling and counts of contacts.
-    'holders': the resultant of each support and plate.
+    [force], largest pressure [stress], half-widths [length], coupling with its reason, and counts
+    of contacts. 'holders': the resultant of each support and plate.
     """
     pairs = {}
     for (view, own), (name, found) in zip(
@@ -188,6 +188,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
             "contact_half_width": zone[0],
             "stick_half_width": stick_width(view, own, zone)[0],
             "coupling": view.coupling.kind,
+            "coupled_because": view.coupling.why,
             "carrier": view.coupling.carrier,
             "contacts": problem.contacts,
             "open": int(status.open.sum()),
