@@ -26,6 +26,7 @@ from contactopt.bodies.elements import (
 )
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
+from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
 from contactopt.material import lame
 from contactopt.meshes.cells import SHAPES, overlapping, straight
@@ -57,8 +58,9 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     check_free(part.name, A, rigid_motions)
     traces = {}
     for name in scene.surfaces_of(part):
-        tied = scene.laws_of(part, name) == {"tied"}
-        traces[name] = contact_trace(basis, scene.degree, mesh.boundaries[name], weight, tied)
+        boundary = mesh.boundaries[name]
+        every = scene.laws_of(part, name) == {"tied"} or thin_facets(basis.mesh, boundary).any()
+        traces[name] = contact_trace(basis, scene.degree, boundary, weight, bool(every))
     return Assembly(
         part.name,
         scene.kind,
