@@ -66,9 +66,9 @@ class Coupling:
     carrier       'upper' or 'lower': the side whose nodes carry the contacts
     share         (k,) part of the faces around each contact that the areas cover: less than one
                   where the other surface ends; None: all of them
-    conforming   whether the facets of both sides have the same contacts at their corners
-    why          why surfaces are coupled in this way; empty where this way was asked for
-    remarks      sentences on places where a constant pressure is not passed on
+    conforming    whether the facets of both sides have the same contacts at their corners
+    why           why surfaces are coupled in this way; empty where this way was asked for
+    remarks       sentences for the reader on what this coupling cannot do well
     """
 
     upper: sp.csr_matrix

@@ -15,6 +15,7 @@ from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.protocol import Body
 from contactopt.checks import check_count, check_number
 from contactopt.coupling.coupling import Coupling, couple, law_of
+from contactopt.coupling.crosspoints import independent
 from contactopt.coupling.joined_once import check_once
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
 from contactopt.errors import InputError
@@ -50,7 +51,8 @@ def posed(
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     check_once(scene.pairs, sides)
     pairs = zip(scene.pairs, sides)
-    couplings = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in pairs)
+    made = [couple(scene, pair, *bodies, coupling) for pair, bodies in pairs]
+    couplings = independent(scene.pairs, made)
     maps = tuple(_signed_map(body, sides, couplings) for body in assembled)
     planes: tuple[SymmetryPlane, ...] = ()
     if scene.copies > 1:
