@@ -131,3 +131,23 @@ def test_middle_nodes_of_chords_on_a_rigid_plane_say_so():
         off = np.abs(plain.pressure - curved.pressure).max() / curved.pressure.max()
         assert (off > SHOWN) == large
         assert any(SAID in remark for remark in plain.summary["remarks"]) == large
+
+
+def lame(low, high, E, inside, outside, at, nu=0.3):
+    """Radial displacement of a ring in plane strain under pressures inside and outside."""
+    mean = (inside * low**2 - outside * high**2) / (high**2 - low**2)
+    rest = (inside - outside) * low**2 * high**2 / (high**2 - low**2)
+    return (1 + nu) / E * ((1 - 2 * nu) * mean * at + rest / at)
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_searches_claim_what_an_overlap_leaves_open(degree, adaptive):
+    """Lame's pressure for rings that differ in their radii by nothing, and for those as drawn."""
+    give = lame(1, 2, 50.0, 1, 0, 1) - lame(0.5, 1, 100.0, 0, 1, 1)
+    exact = OVERLAP / give
+    scene = press_fit((8, 5), degree)
+    found = run(scene, accuracy=0.02, quantity="pressure", adaptive=adaptive, figures=()).estimate
+    assert abs(found.value / exact - 1) < found.error < 0.03
+    assert found.geometry_error == pytest.approx(OVERLAP, rel=0.1)
+    assert "overlap as they are drawn" in found.message

@@ -76,7 +76,10 @@ def chord_heights(reduction: Reduction) -> np.ndarray:
 
     def way(name: str, surface: str | None) -> Way | None:
         part = scene.meshed.get(name)
-        if part is None or part.curve_of(surface := surface or part.contact) is not None:
+        if part is None:
+            return None
+        surface = surface or part.contact
+        if part.curve_of(surface) is not None:
             return None
         if name not in known:
             mesh = part.build_mesh(scene.elements, scene.zone)
