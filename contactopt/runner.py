@@ -23,6 +23,7 @@ from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
+from contactopt.readings.chords import chord_remarks
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
@@ -283,6 +284,8 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
         summary = _summary(solved, names)
+        if estimate is None:  # which knows the curves, and refines the chords
+            summary["remarks"] += chord_remarks(reduction, solution)
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
