@@ -103,7 +103,7 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
         rows[f"contact '{name}'"] = (
             f"force on the upper body {force} {newton}; largest pressure"
             f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
-            f" {pair['slip']} slip"
+            f" {pair['slip']} slip; coupled by {pair['coupling']} because {pair['coupled_because']}"
         )
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import count
 from contactopt.checks import meant, said_once
 from contactopt.coupling.back_to_bodies import recover
@@ -25,8 +24,9 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
+from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
-from contactopt.readings.quantities import approach, quantity_of_states
+from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import check_possible, validity
@@ -98,7 +98,6 @@ def run(
     out: str | Path | None = None,
     *,
     note: Note = lambda text: None,
-    team: Team | None = None,
     **changes: Any,
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into a folder if one is given.
@@ -109,8 +108,6 @@ def run(
         scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     note : receives progress messages
-    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
-        live in this process
     OPTIONS
     changes : to the arguments of a named scene, such as `elements`, or to the fields of a Scene
 
@@ -137,16 +134,14 @@ def run(
     for quantity in options.read:
         quantity_of_states(quantity, states)
     restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
-    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
+    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.limits.items()})
     how = _how(options, method, start, restart, note)
     prepared = time.perf_counter() - start
     try:
         solved, estimate = None, None
         if options.simplest:
             states, solved = _simplest(states, how)
-        if team is not None:
-            states = _dealt(states, team, note)
-        if solved is None or team is not None or options.accuracy is not None:
+        if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
         result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
         if options.read:
@@ -250,14 +245,6 @@ def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...
     return (found.scene,), solved
 
 
-def _dealt(states: tuple[Scene, ...], team: Team, note: Note) -> tuple[Scene, ...]:
-    """The states with their elastic bodies on the ranks of a team."""
-    idle = team.size - sum(part.meshed for part in states[-1].parts)
-    if idle > 0:
-        note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
-    return tuple(spread(state, team) for state in states)
-
-
 @said_once()
 def _solved(
     states: tuple[Scene, ...], options: RunOptions, limits: Limits, how: Options
@@ -267,7 +254,15 @@ def _solved(
         return solve_states(states, options=how), None
     from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    return refine(states, options.quantity, options.accuracy, how, limits, options.adaptive)
+    return refine(
+        states,
+        options.quantity,
+        options.accuracy,
+        how,
+        limits,
+        adaptive=options.adaptive,
+        bound=options.bound,
+    )
 
 
 def _too_large(scene: Scene, why: str) -> str:
@@ -327,7 +322,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
-        "approach": approach(problem, solution),
+        "approach": approach(reduction, solution),
         **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,
@@ -370,8 +365,8 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder)
-            if result.path is None:
-                restart.finished(result.solution)
+            states = [result] if result.path is None else result.path.states
+            restart.ended(result.reduction, [state.solution for state in states])
             restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")

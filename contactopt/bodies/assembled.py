@@ -209,10 +209,13 @@ class AssembledBody(ABC):
 class UndividedBody(AssembledBody, Body):
     """A body without a linear system, so that it is both stages, which moves freely as a whole in
     the components of its part that have a total force. In the others it is moved as given.
+
+    whole  (dim,) numbers of the unknowns that are its motion as a whole
     """
 
     part: Any
     components: tuple[str, ...]
+    whole: range
 
     @cached_property
     def name(self) -> str:
@@ -237,6 +240,11 @@ class UndividedBody(AssembledBody, Body):
         """(dim, p) unit translations in the components with a force."""
         columns = [self.components.index(name) for name in self.part.force or {}]
         return np.eye(len(self.components))[:, columns]
+
+    def carried(self, component: int) -> tuple[np.ndarray, np.ndarray]:
+        made = np.zeros(len(self.at_rest))
+        made[self.whole[component]] = 1.0
+        return made, 0 * made
 
     def prepare(self, solver: str, entries: bool) -> Self:
         return self

@@ -15,6 +15,7 @@ import skfem
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import (
     Weight,
     contact_trace,
@@ -26,8 +27,8 @@ from contactopt.bodies.elements import (
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError
-from contactopt.material import lame
 from contactopt.meshes.cells import SHAPES, joined, overlapping, straight
+from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
@@ -39,21 +40,23 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     """
     mesh = part.build_mesh(elements, zone)
     check_mesh(scene, part, mesh)
-    axisymmetric = scene.kind == "axisymmetric"
-    factors = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}
-    weight = (factors[scene.kind] * scene.copies, axisymmetric)
-    basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, axisymmetric)
-    A = isotropic_stiffness(basis, lame(part.material), weight)
+    kind = scene.analysis
+    weight = (kind.measure(scene.thickness) * scene.copies, kind.revolved)
+    basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
+    A = isotropic_stiffness(basis, kind.constants(part.material), weight)
     fixed = _constrained(scene, part, basis)
-    rigid_motions = free_motions(scene.kind, scene.components, basis, fixed.held, weight)
+    rigid_motions = free_motions(kind, basis, fixed.held, weight)
     check_free(part.name, A, rigid_motions)
     traces = {}
     for name in scene.surfaces_of(part):
-        tied = scene.laws_of(part, name) == {"tied"}
-        traces[name] = contact_trace(basis, scene.degree, mesh.boundaries[name], weight, tied)
+        laws = [find_law(law) for law in scene.laws_of(part, name)]
+        tied = bool(laws) and not any(law.bounded for law in laws)
+        facets = np.asarray(mesh.boundaries[name])
+        copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
+        traces[name] = contact_trace(basis, scene.degree, facets, weight, tied, copied)
     return Assembly(
         part.name,
-        scene.kind,
+        kind,
         part.material,
         basis,
         weight,
@@ -117,7 +120,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             f"body '{part.name}': an element of the mesh lies over its neighbour, at ({place});"
             " move its nodes apart, or mesh this place anew."
         )
-    if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
+    if scene.analysis.revolved and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
         raise InputError(
             f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is"
             f" {mesh.p[0].min():g}."

@@ -36,6 +36,10 @@ class RigidBody(UndividedBody):
     unknowns = 0
     meshed = False
 
+    @property
+    def whole(self) -> range:  # type: ignore[override]
+        return range(len(self.components))
+
     @cached_property
     def at_rest(self) -> np.ndarray:
         return np.concatenate([self.given, 0 * self.given])

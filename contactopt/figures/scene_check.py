@@ -76,7 +76,8 @@ def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) ->
     free = _free_problem(scene, made)
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
-    notes = [*_balance(states, made, free), *doubts(scene, made.couplings)]
+    coupled = [text for own in made.couplings for text in own.remarks]
+    notes = [*_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -112,7 +113,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     mean of that of its nodes.
     """
     body = assembled.body
-    R, labels = whole_motions(scene.kind, scene.components, body.basis)
+    R, labels = whole_motions(scene.analysis, body.basis)
     mean = body.motion.T / np.maximum(body.motion.sum(axis=0), 1.0)[:, None]
     held = np.ones(len(R), dtype=bool)
     held[body.free] = False
@@ -189,7 +190,8 @@ def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
     total = float(own.areas.sum())
     lines = [
         f"pair '{pair.name}': {pair.friction}; {count(len(own.gap), 'contact')} by {own.kind},"
-        f" area {total:.5g} {length}^2"
+        f" area {total:.5g} {length}^2",
+        f"  by {own.kind} because {own.why}",
     ]
     normals = own.frames[:, 0]
     mean = np.average(normals, axis=0, weights=own.areas)

@@ -15,7 +15,6 @@ import numpy as np
 from contactopt.checks import check_number, short
 from contactopt.errors import InputError
 from contactopt.scenes.body_kinds import (
-    COMPONENTS,
     Body,
     BodyForce,
     HalfSpace,
@@ -26,9 +25,9 @@ from contactopt.scenes.body_kinds import (
     Traction,
 )
 from contactopt.scenes.contact import Contact
+from contactopt.scenes.kinds import KINDS, Kind
 
 __all__ = [
-    "COMPONENTS",
     "BodyForce",
     "HalfSpace",
     "Part",
@@ -53,8 +52,8 @@ class Scene:
     mu, law    of the short form, as in Contact
     bodies     of the long form
     contacts   of the long form; every body belongs to at least one of them
-    kind       'plane-strain', 'axisymmetric' (coordinates r, z) or 'solid'.
-    thickness  depth of a plane-strain body [length].
+    kind       'plane-strain', 'plane-stress', 'axisymmetric' (coordinates r, z) or 'solid'.
+    thickness  depth of a body in the plane [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter.
                Forces, nodal forces and nodal areas are those of all the images together, as on the
                ring of an axisymmetric body.
@@ -94,8 +93,8 @@ class Scene:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise InputError(f"the scene's name must be a text; got {short(self.name)}.")
-        if not isinstance(self.kind, str) or self.kind not in COMPONENTS:
-            raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
+        if not isinstance(self.kind, str) or self.kind not in KINDS:
+            raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(KINDS)}.")
         self._check_form()
         for part in self.parts:
             if not isinstance(part, Body):
@@ -204,8 +203,13 @@ class Scene:
         ]
 
     @property
+    def analysis(self) -> Kind:
+        """What follows from the kind of the scene."""
+        return KINDS[self.kind]
+
+    @property
     def components(self) -> tuple[str, ...]:
-        return COMPONENTS[self.kind]
+        return self.analysis.components
 
     @property
     def dim(self) -> int:
@@ -250,6 +254,19 @@ class Scene:
                 f" {self.copies}; drop one of them."
             )
 
+    def _check_once(self) -> None:
+        """No two surfaces are joined twice: both pairs would carry a part of one force."""
+        contact = {part.name: getattr(part, "contact", None) for part in self.parts}
+        known: dict[frozenset[tuple[str, str | None]], Contact] = {}
+        for pair in self.pairs:
+            sides = zip(pair.bodies, pair.surfaces)
+            same = known.setdefault(frozenset((b, s or contact[b]) for b, s in sides), pair)
+            if same is not pair:
+                raise self._wrong(
+                    f"contacts '{same.name}' and '{pair.name}' join the same two surfaces, and"
+                    " each would carry a part of their force; keep one of them."
+                )
+
     def _check_pairs(self) -> None:
         """Names are known and given once, each body is in a pair, no pair is of rigid bodies."""
         names = [part.name for part in self.parts]
@@ -278,6 +295,7 @@ class Scene:
                 raise self._wrong(
                     f"both bodies of contact '{pair.name}' are rigid; at least one must be elastic."
                 )
+        self._check_once()
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")

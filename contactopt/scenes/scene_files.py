@@ -22,8 +22,9 @@ from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 from contactopt.scenes.file_bodies import Reading, components_of, function_of, read_body
+from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
-from contactopt.scenes.scene import COMPONENTS, Scene
+from contactopt.scenes.scene import Scene
 
 MOST_STATES = 10_000  # of a step of a load path
 AUTO = "auto"  # in place of the contacts: they are found
@@ -106,7 +107,7 @@ def read_scenes(
 def _scene(
     path: Path, top: Table, reading: Reading | None
 ) -> tuple[Scene, dict[str, Any], Reading]:
-    kind = top.take("kind", str, "plane-strain", among=COMPONENTS)
+    kind = top.take("kind", str, "plane-strain", among=KINDS)
     units = top.table("units")
     length, stress = "length", "stress"
     if units:

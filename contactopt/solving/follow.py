@@ -11,8 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.cards import count
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
+from contactopt.readings.plate_motions import motion
 from contactopt.readings.resultants import columns
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult, State
@@ -118,7 +119,7 @@ def state_of(
     now = [(own, body.external_forces(own)) for body, own in zip(reduction.bodies, U)]
     # before the first state are the unloaded bodies
     u0, r0 = (gap, 0.0) if before is None else (before.displacements, before.solution.reactions)
-    moved = problem.displacements(0 * r, solution.multipliers) + earlier - gap
+    moved = [motion(reduction, U, component) for component in (0, 1)]
     steps = zip(now, last or [(0 * own, 0 * force) for own, force in now])
     here = all(isinstance(own, np.ndarray) for own in U) and sum(own.size for own in U) <= KEPT
     state = State(
@@ -128,7 +129,7 @@ def state_of(
         problem.s,
         slip + earlier,
         slip[:, 1:],
-        np.average(moved, axis=0, weights=problem.areas),
+        *(np.nan if each is None else each.value for each in moved),
         elastic=sum(body.energy(own) for body, own in zip(reduction.bodies, U)),
         external=sum(float((F + F0) @ (own - U0)) for (own, F), (U0, F0) in steps) / 2,
         contact=-float(np.sum((r + r0) * (slip + earlier - u0))) / 2,

@@ -48,12 +48,11 @@ class State:
     q, s           of the step's problem: q_t is measured from the state before [length], [force]
     displacements  u (k, dim), total: gap, tangential displacement [length];  slip (k, dim - 1) of
                    this step [length]
-    apart          (dim,) relative displacement of the bodies, had they no contact: minus approach,
-                   shift [length]
+    risen, shifted   motions of the upper bodies along the mean normal and t1
+                   (contactopt.readings.plate_motions) [length]; not a number where there is none
     elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D
                    [force length]
-    bodies         displacements (n,) of every body [length]; empty for large bodies, and for those
-                   on other ranks
+    bodies         displacements (n,) of every body [length]; empty for large bodies
     columns        name -> number: loads, motions, resultants
                    (contactopt.readings.resultants.columns)
     """
@@ -64,7 +63,8 @@ class State:
     s: np.ndarray
     displacements: np.ndarray
     slip: np.ndarray
-    apart: np.ndarray
+    risen: float
+    shifted: float
     elastic: float
     external: float
     contact: float
@@ -236,8 +236,8 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     return {
         "normal_force": float(r[:, 0].sum()),
         "shear_force": -float(r[:, 1].sum()),
-        "approach": -float(state.apart[0]),
-        "shift": float(state.apart[1]),
+        "approach": 0.0 - state.risen,
+        "shift": state.shifted,
         "contact_half_width": edges[0],
         "stick_half_width": edges[1],
         "contact_nodes": int(status.touching.sum()),

@@ -1,0 +1,118 @@
+"""A run that is killed after any of its steps leaves a file from which it can be resumed, with the
+same answer.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactopt
+from contactopt.files.writing import replace_file
+from contactopt.solving.restart import FILE, Restart, read_known
+
+SMALL = {
+    "a scene": ("punch-3d", {"elements": 4}),
+    "a contact zone": ("cylinder-2d", {"elements": 8}),
+    "several pairs": ("stack", {"elements": 2}),
+    "a path": ("hertz-dissimilar", {"steps": 3, "elements": 6}),
+    "a path of half-spaces": ("rough", {"steps": 2, "points": 40}),
+    "a simplified scene": ("press-fit", {"elements": 4, "simplest": True}),
+    "an accuracy": ("punch-2d", {"accuracy": 0.3, "quantity": "energy"}),
+    "an accuracy of divided meshes": (
+        "punch-2d",
+        {"elements": 4, "accuracy": 0.2, "quantity": "energy", "adaptive": True},
+    ),
+    "a path with an accuracy": (
+        "hertz-dissimilar",
+        {"steps": 2, "elements": 8, "accuracy": 0.3, "quantity": "energy"},
+    ),
+    "a path with an accuracy on divided meshes": (
+        "hertz-dissimilar",
+        {"steps": 2, "elements": 6, "accuracy": 0.5, "quantity": "energy", "adaptive": True},
+    ),
+}  # fmt: skip
+MOST = 3  # snapshots of a quick test from which a run is resumed
+
+
+def kept_at_each_step(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Make runs write their file at every step, and keep a copy: what a kill would leave."""
+    copies: list[Path] = []
+
+    def keep(self: Restart) -> None:
+        if self.file is not None:
+            replace_file(self.file, self.save)
+            copies.append(folder / f"{len(copies)}.npz")
+            shutil.copy(self.file, copies[-1])
+
+    def reached(self: Restart, *point: np.ndarray) -> None:
+        self.now = point
+        keep(self)
+
+    finished = Restart.finished
+
+    def finish(self: Restart, *solution: object) -> None:
+        finished(self, *solution)
+        keep(self)
+
+    monkeypatch.setattr(Restart, "reached", reached)
+    monkeypatch.setattr(Restart, "finished", finish)
+    return copies
+
+
+def numbers(result: Any) -> np.ndarray:
+    """What a run answers: sums over all states, and the quantity that it was asked for."""
+    states = [result] if result.path is None else result.path.states
+    found = [float(np.abs(state.solution.reactions).sum()) for state in states]
+    return np.array([*found, *([result.estimate.value] if result.estimate else [])])
+
+
+@pytest.mark.parametrize("kind", SMALL)
+def test_a_run_goes_on_from_each_of_its_steps(kind, tmp_path, monkeypatch):
+    name, options = SMALL[kind]
+    options = options | {"figures": ()}
+    with monkeypatch.context() as patched:
+        copies = kept_at_each_step(tmp_path, patched)
+        whole = contactopt.run(name, tmp_path / "whole", **options)
+    known = read_known(tmp_path / "whole")
+    assert known.complete and known.reactions[-1].shape == whole.solution.reactions.shape
+    assert len(known.names) == len(whole.problem.pairs) and copies
+    chosen = np.unique(np.linspace(0, len(copies) - 1, MOST).astype(int))
+    for number in chosen:
+        out = tmp_path / f"resumed-{number}"
+        out.mkdir()
+        shutil.copy(copies[number], out / FILE)
+        again = contactopt.run(name, out, resume=True, **options)
+        assert again.solution.solved
+        np.testing.assert_allclose(numbers(again), numbers(whole), rtol=1e-3)
+
+
+@pytest.mark.parametrize("kind, step", [("a contact zone", 2), ("a path with an accuracy", 12)])
+def test_a_process_that_is_killed_leaves_a_run_that_goes_on(kind, step, tmp_path):
+    name, options = SMALL[kind]
+    options = options | {"figures": ()}
+    program = f"""
+import os, signal
+import contactopt
+from contactopt.solving.restart import Restart
+
+steps = 0
+def reached(self, *point):
+    global steps
+    self.now, steps = point, steps + 1
+    self.save(self.file)
+    if steps == {step}:
+        os.kill(os.getpid(), signal.SIGKILL)
+Restart.reached = reached
+contactopt.run({name!r}, {str(tmp_path)!r}, **{options!r})
+"""
+    ended = subprocess.run([sys.executable, "-c", program], env=os.environ, timeout=120)
+    assert ended.returncode == -signal.SIGKILL
+    again = contactopt.run(name, tmp_path, resume=True, **options)
+    np.testing.assert_allclose(numbers(again), numbers(contactopt.run(name, **options)), rtol=1e-3)
