@@ -30,7 +30,7 @@ from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import validity
+from contactopt.readings.validity import check_possible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
@@ -308,6 +308,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
+    check_possible(limits)
     known = doubts(reduction.scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
