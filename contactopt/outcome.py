@@ -80,6 +80,11 @@ def squeeze(t: np.ndarray) -> np.ndarray:
     return t[:, 0] if t.shape[1] == 1 else t
 
 
+def _number(value: float | None, form: str = ".6g") -> str:
+    """A number in words; None stands for one that is not finite."""
+    return "unknown" if value is None else f"{value:{form}}"
+
+
 def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     """The numbers of a run in words and with units, for a terminal, a page or a notebook."""
     length, stress = summary["units"]
@@ -88,13 +93,13 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     by = f" with {' and '.join(sorted(used))}" if used else ""
     rows = {
         "status": f"{summary['status']}: {summary.get('message')}",
-        "residual (certificate)": f"{summary['residual']:.2e}",
+        "residual (certificate)": _number(summary["residual"], ".2e"),
         "unknowns of the bodies": str(summary["dofs"]),
         "contacts": str(summary["contact_nodes"]),
         "friction coefficient": f"{summary['mu']:g}",
         "method": f"{summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
-        "sum of the normal forces": f"{summary['normal_force']:.6g} {newton}",
-        "largest pressure": f"{summary['max_pressure']:.6g} {stress}",
+        "sum of the normal forces": f"{_number(summary['normal_force'])} {newton}",
+        "largest pressure": f"{_number(summary['max_pressure'])} {stress}",
     }
     if summary["q"] == "implicit":
         rows["Q"] = f"{summary['products']} products with vectors"
@@ -102,8 +107,8 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
         pair = summary["pairs"][name]
         rows[f"contact '{name}'"] = (
             f"force on the upper body {force} {newton}; largest pressure"
-            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
-            f" {pair['slip']} slip"
+            f" {_number(pair['max_pressure'])} {stress}; {pair['open']} open,"
+            f" {pair['stick']} stick, {pair['slip']} slip"
         )
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:

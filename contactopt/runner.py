@@ -19,7 +19,7 @@ from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, write
 from contactopt.figures.style import FORMATS
-from contactopt.files.writing import check_folder, whole_folder
+from contactopt.files.writing import check_folder, finite, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
@@ -45,6 +45,11 @@ if TYPE_CHECKING:
 
 Note = Callable[[str], None]
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
+FAR = 1e3  # sizes of a body that it moves in an iterate which nobody can draw
+UNDRAWN = (
+    "no figure and no page was made: the last iterate moves a body by more than a thousand times"
+    " its size."
+)
 PATH_KEYS = (
     "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
 )  # fmt: skip
@@ -295,7 +300,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
         summary |= {key: float(solved.path.history[key][-1]) for key in keys}
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
-    summary["seconds"] = seconds
+    summary = finite(summary) | {"seconds": seconds}
     return Result(
         reduction.scene, reduction, solution, fields, solved.zones, summary, solved.path, estimate
     )
@@ -361,6 +366,9 @@ def _written(
     if out is None:
         seconds["total"] = time.perf_counter() - start
         return result
+    if (options.figures or options.html) and not _drawable(result):
+        options = replace(options, figures=(), html=False)
+        result.summary["remarks"].append(UNDRAWN)
     note("drawing figures, writing files" if options.figures else "writing files")
     with whole_folder(out, earlier_files(Path(out))) as folder:
         if options.figures:
@@ -368,8 +376,8 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder)
-            states = [result] if result.path is None else result.path.states
-            restart.ended(result.reduction, [state.solution for state in states])
+            found = [result.solution] if result.path is None else result.path.solutions
+            restart.ended(result.reduction, found)
             restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
@@ -378,6 +386,14 @@ def _written(
 
             write_page(folder, folder / PAGE)
     return result
+
+
+def _drawable(result: Result) -> bool:
+    """Whether the bodies of an answer stay where a figure can show them."""
+    return result.solution.solved or all(
+        bool(np.abs(own.displacement).max(initial=0.0) <= FAR * np.ptp(own.mesh.p))
+        for own in result.fields
+    )
 
 
 @contextmanager
