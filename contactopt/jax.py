@@ -32,12 +32,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from contactopt.defaults import TOL
 from contactopt.derivatives.factors import UNSEEN, Whole
 from contactopt.derivatives.gradient import gradient
 from contactopt.derivatives.interface import Sensitivity, told_apart
 from contactopt.derivatives.states import chain_of
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
 from contactopt.methods.driver import solve as solve_problem
 from contactopt.problem import InterfaceProblem
 from contactopt.readings.quantities import seeds_of

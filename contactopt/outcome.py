@@ -58,7 +58,8 @@ class Outcome:
         return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
 
     def _repr_html_(self) -> str:
-        return card(f"{self.scene.name}, {self.scene.friction}", summary_rows(self.summary))
+        notes = {f"note {n}": text for n, text in enumerate(self.summary["remarks"], 1)}
+        return card(f"{self.scene.name}, {self.scene.friction}", summary_rows(self.summary) | notes)
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -108,7 +109,8 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
         rows[f"contact '{name}'"] = (
             f"force on the upper body {force} {newton}; largest pressure"
             f" {_number(pair['max_pressure'])} {stress}; {pair['open']} open,"
-            f" {pair['stick']} stick, {pair['slip']} slip"
+            f" {pair['stick']} stick, {pair['slip']} slip; coupled by {pair['coupling']} because"
+            f" {pair['coupled_because']}"
         )
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:

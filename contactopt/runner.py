@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.bodies.ranks import Team, spread
-from contactopt.cards import count
-from contactopt.checks import meant, said_once
+from contactopt.checks import meant, overheard, said_once
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
-from contactopt.figures.output import PAGE, draw, earlier_files, write
+from contactopt.figures.output import PAGE, draw, earlier_files, not_drawable, write
 from contactopt.figures.style import FORMATS
 from contactopt.files.writing import check_folder, finite, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
+from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.plate_motions import approach
+from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
@@ -34,8 +34,7 @@ from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
-from contactopt.solving.limits import Limits
-from contactopt.solving.progress import resident_memory
+from contactopt.solving.limits import Limits, too_large
 from contactopt.solving.restart import FILE, Restart, make_restart
 from contactopt.solving.solve_scene import Options, Solved
 
@@ -45,11 +44,6 @@ if TYPE_CHECKING:
 
 Note = Callable[[str], None]
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
-FAR = 1e3  # sizes of a body that it moves in an iterate which nobody can draw
-UNDRAWN = (
-    "no figure and no page was made: the last iterate moves a body by more than a thousand times"
-    " its size."
-)
 PATH_KEYS = (
     "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
 )  # fmt: skip
@@ -103,7 +97,6 @@ def run(
     out: str | Path | None = None,
     *,
     note: Note = lambda text: None,
-    team: Team | None = None,
     **changes: Any,
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into a folder if one is given.
@@ -114,8 +107,6 @@ def run(
         scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     note : receives progress messages
-    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
-        live in this process
     OPTIONS
     changes : to the arguments of a named scene, such as `elements`, or to the fields of a Scene
 
@@ -131,6 +122,18 @@ def run(
     ------
     InputError : with a sentence that says what to do; nothing is left half-written
     """
+    with overheard() as told, collected() as noted:
+        return _run(scene, out, note, changes, lambda: (*told, *noted))
+
+
+def _run(
+    scene: str | Path | Scene,
+    out: str | Path | None,
+    note: Note,
+    changes: dict[str, Any],
+    told: Callable[[], tuple[str, ...]],
+) -> Result:
+    """As run(); `told` gives the remarks that were made so far outside of the solution."""
     start = time.perf_counter()
     file = _scene_file(scene, changes)
     options, changes = choose(changes, {} if file is None else file.solve)
@@ -142,28 +145,28 @@ def run(
     for quantity in options.read:
         quantity_of_states(quantity, states)
     restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
-    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
+    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.limits.items()})
     how = _how(options, method, start, restart, note)
     prepared = time.perf_counter() - start
     try:
         solved, estimate = None, None
         if options.simplest:
             states, solved = _simplest(states, how)
-        if team is not None:
-            states = _dealt(states, team, note)
-        if solved is None or team is not None or options.accuracy is not None:
+        if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
-        result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
+        names = (name, *method.backends(states[-1].dim))
+        result = _result(solved, estimate, names, told())
         if options.read:
             from contactopt.accuracy.indicators import read_once  # with the room of derivatives
 
             with _clock(result.summary["seconds"], "quantities"):
-                result.summary["quantities"] = {one: read_once(solved, one) for one in options.read}
+                found = {one: read_once(solved, one) for one in options.read}
+                result.summary["quantities"] = finite(found)
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note, restart)
     except MemoryError as error:
         restart.stopped(note)
-        raise InputError(_too_large(states[-1], str(error))) from error
+        raise InputError(too_large(states[-1], str(error))) from error
     except KeyboardInterrupt:
         restart.stopped(note)
         raise
@@ -255,14 +258,6 @@ def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...
     return (found.scene,), solved
 
 
-def _dealt(states: tuple[Scene, ...], team: Team, note: Note) -> tuple[Scene, ...]:
-    """The states with their elastic bodies on the ranks of a team."""
-    idle = team.size - sum(part.meshed for part in states[-1].parts)
-    if idle > 0:
-        note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
-    return tuple(spread(state, team) for state in states)
-
-
 @said_once()
 def _solved(
     states: tuple[Scene, ...], options: RunOptions, limits: Limits, how: Options
@@ -272,27 +267,35 @@ def _solved(
         return solve_states(states, options=how), None
     from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    return refine(states, options.quantity, options.accuracy, how, limits, options.adaptive)
-
-
-def _too_large(scene: Scene, why: str) -> str:
-    """The sentence for a run that took all the memory there was."""
-    bodies = count(len(scene.parts), "body", "bodies")
-    held = f"{resident_memory() / 1e9:.2g} GB were taken when more was asked for"
-    return (
-        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than"
-        f" there is: {held}{f' ({why})' if why else ''}; take fewer elements."
+    return refine(
+        states,
+        options.quantity,
+        options.accuracy,
+        how,
+        limits,
+        adaptive=options.adaptive,
+        bound=options.bound,
     )
 
 
-def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, str]) -> Result:
-    """The result with the fields of the bodies; `names` are of the method and its backends."""
+def _result(
+    solved: Solved,
+    estimate: Estimate | None,
+    names: tuple[str, str, str],
+    told: tuple[str, ...] = (),
+) -> Result:
+    """The result with the fields of the bodies; `names` are of the method and its backends, and
+    `told` are remarks made before.
+    """
     reduction, solution = solved.reduction, solved.solution
     seconds = dict(solution.seconds)
     with _clock(seconds, "recover"):
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
         summary = _summary(solved, names)
+    noted = [solution] if solved.path is None else solved.path.solutions
+    every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
+    summary["remarks"] = list(dict.fromkeys(every))
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
@@ -315,7 +318,8 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
-    said = [*remarks(reduction, solution), *beyond]
+    known = doubts(reduction.scene, reduction.couplings)
+    said = [*known, *remarks(reduction, solution), *beyond]
     return {
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
@@ -366,9 +370,9 @@ def _written(
     if out is None:
         seconds["total"] = time.perf_counter() - start
         return result
-    if (options.figures or options.html) and not _drawable(result):
+    if (options.figures or options.html) and (beyond := not_drawable(result)):
         options = replace(options, figures=(), html=False)
-        result.summary["remarks"].append(UNDRAWN)
+        result.summary["remarks"].append(beyond)
     note("drawing figures, writing files" if options.figures else "writing files")
     with whole_folder(out, earlier_files(Path(out))) as folder:
         if options.figures:
@@ -386,14 +390,6 @@ def _written(
 
             write_page(folder, folder / PAGE)
     return result
-
-
-def _drawable(result: Result) -> bool:
-    """Whether the bodies of an answer stay where a figure can show them."""
-    return result.solution.solved or all(
-        bool(np.abs(own.displacement).max(initial=0.0) <= FAR * np.ptp(own.mesh.p))
-        for own in result.fields
-    )
 
 
 @contextmanager

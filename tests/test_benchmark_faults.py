@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
 from contactopt import InputError, benchmark, solve
@@ -299,6 +298,8 @@ def leaves_children(problem):
 
 def lives(number: int) -> bool:
     """Whether a process is there and not a dead one that nobody has asked for yet."""
+    import psutil
+
     with contextlib.suppress(psutil.NoSuchProcess):
         return psutil.Process(number).status() != psutil.STATUS_ZOMBIE
     return False
@@ -630,6 +631,8 @@ def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
 
 def solvers(campaign: int) -> list[int]:
     """The worker processes of a campaign."""
+    import psutil
+
     with contextlib.suppress(psutil.Error):
         return [
             own.pid

@@ -3,7 +3,6 @@
 import re
 import shutil
 
-import pandas as pd
 import pytest
 from browser import CHROMIUM, Browser
 
@@ -13,6 +12,8 @@ from contactopt.benchmark.store import load, save
 from contactopt.cli import main
 from tests.test_benchmark import SMALL, written
 from tests.test_page import data_of
+
+pd = pytest.importorskip("pandas")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.text import Text
 
@@ -19,6 +18,8 @@ from contactopt.benchmark.report_figures import fitted_exponent
 from contactopt.benchmark.store import COLUMNS
 from contactopt.cli import main
 from tests.test_benchmark import SMALL, written
+
+pd = pytest.importorskip("pandas")
 
 CAMPAIGNS = Path(__file__).parents[1] / "experiments" / "campaigns"
 REPORTS = Path(__file__).parents[1] / "reports"

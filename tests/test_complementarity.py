@@ -238,11 +238,84 @@ def test_a_point_where_states_meet_is_listed_once():
     assert only.reactions == pytest.approx(np.array([[0.0, 0.0], [1.0, -0.5]]))
 
 
-def test_no_finite_bound_no_list():
-    with pytest.raises(InputError, match="positive definite"):
-        all_solutions(InterfaceProblem(np.ones((2, 2)), -np.ones((1, 2)), 0.5))
+def of_kind(kind: str, seed: int) -> InterfaceProblem:
+    """A random problem of 1 to 3 contacts whose Q is of some kind, with or without a plate."""
+    rng = np.random.default_rng(seed)
+    k = int(rng.integers(1, 4))
+    A, skew = rng.normal(size=(2, 2 * k, 2 * k))
+    Q = A @ A.T / (2 * k) + 0.05 * np.eye(2 * k)
+    if kind == "unsymmetric":
+        Q += skew - skew.T
+    if kind == "semidefinite":
+        A = A[:, : max(1, 2 * k - 2)]
+        Q = A @ A.T / (2 * k)
+    if kind == "indefinite":
+        Q -= 0.5 * np.linalg.eigvalsh(Q)[-1] * np.eye(2 * k)
+        Q[np.diag_indices(2 * k)] = np.maximum(np.diag(Q), 1e-3)
+    plate = int(rng.integers(0, 2)) if k > 1 else 0
+    V = np.zeros((2 * k, plate))
+    V[::2] = 1.0
+    mu = rng.choice([0.0, 0.2, 0.7, 1.5, 4.0], size=k)
+    return InterfaceProblem(Q, rng.normal(size=(k, 2)), mu, V, np.full(plate, -1.0))
+
+
+@pytest.mark.parametrize("kind", ["definite", "unsymmetric", "semidefinite", "indefinite"])
+def test_all_solutions_are_those_of_all_states(kind):
+    """Every one of the 4^k states is tried; where a singular Q has a continuum of solutions, each
+    listed point is one of them, and there are some if and only if enumeration finds some.
+    """
+    counts = []
+    for seed in range(125):
+        problem = of_kind(kind, seed)
+        expected, found = by_brute_force(problem), all_solutions(problem)
+        assert bool(found) == bool(expected), seed
+        assert all(s.residual <= 1e-8 for s in found), seed
+        if kind != "semidefinite":
+            assert len(found) == len(expected), seed
+            for s in found:
+                near = [np.abs(s.reactions - r).max() for r in expected]
+                assert min(near) < 1e-6 * max(1.0, np.abs(s.reactions).max()), seed
+        counts.append(len(found))
+    assert min(counts) == (1 if kind == "definite" else 0) or kind == "unsymmetric"
+    assert max(counts) > 1
+
+
+def test_a_continuum_is_listed_by_one_point_of_its_states():
+    """Q = ones couples r_n and r_t by their sum alone: r_n + r_t = 1 with |r_t| <= r_n / 2."""
+    found = all_solutions(InterfaceProblem(np.ones((2, 2)), -np.ones((1, 2)), 0.5))
+    assert found and all(s.residual < 1e-12 for s in found)
+    assert all(s.reactions.sum() == pytest.approx(1.0) for s in found)
+
+
+def test_a_dragged_plate_is_listed_too():
     dragged = InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.5, np.eye(2), np.array([-1.0, 0.2]))
-    with pytest.raises(InputError, match="press"):
-        all_solutions(dragged)
+    (only,) = all_solutions(dragged)
+    assert only.reactions == pytest.approx(np.array([[1.0, -0.2]]))
+
+
+def test_a_limit_of_nothing_is_refused():
     with pytest.raises(InputError, match="limit"):
         all_solutions(one_contact((0.8, 1.0), 1.0), limit=0)
+
+
+def redundant(seed: int) -> InterfaceProblem:
+    """A plane problem of 4 to 12 contacts whose Q has a third of the full rank."""
+    rng = np.random.default_rng(seed)
+    k = int(rng.integers(4, 13))
+    B, q = rng.normal(size=(2 * k, 2 * k // 3)), rng.normal(size=(k, 2))
+    q[:, 0] -= 2.0
+    return InterfaceProblem(B @ B.T, q, rng.uniform(0.0, 1.0, k))
+
+
+def test_redundant_contacts_are_solved_or_proved_to_have_no_solution():
+    """The proof is compared with Lemke's method, which must not find a solution then."""
+    ends = []
+    for seed in range(40):
+        problem = redundant(seed)
+        solution = solve(problem)
+        assert solution.status.label in ("solved", "infeasible"), seed
+        if not solution.solved:
+            assert solution.proof is not None and not solve(problem, Lemke()).solved, seed
+            assert not problem.contacts < 6 or not by_brute_force(problem), seed
+        ends.append(solution.proof.branches > 0 if solution.proof else solution.status.label)
+    assert {"solved", True, False} <= set(ends)

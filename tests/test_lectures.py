@@ -6,9 +6,10 @@ import html
 import re
 from pathlib import Path
 
-import jupytext
 import pytest
 import test_how_tos
+
+jupytext = pytest.importorskip("jupytext")
 
 EXPERIMENTS = Path(__file__).parents[1] / "experiments"
 SITE = EXPERIMENTS / "site"

@@ -56,8 +56,6 @@ def bodies():
 
 
 BODIES = bodies()
-# solvers of packages that the tests do not ask for
-OPTIONAL = {"pardiso": "pypardiso", "petsc": "petsc4py"}
 
 
 def made(name, args):

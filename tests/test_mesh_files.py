@@ -456,7 +456,7 @@ def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path)
         assert len(low.boundaries["BOTH"]) == 6 and "FLOOR" not in up.boundaries
     for old, new, words in (
         ("101,102", "999,102", "names a node that is not there"),
-        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "cannot be read as abaqus"),
+        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "line 25: an element C3D20R lacks"),
         ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
         ("TYPE=C3D20", "TYPE=C3D21", "elements of type C3D21R are not known"),
         ("up, S1", "upper, S1", "there is no set upper of elements"),

@@ -241,7 +241,7 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
         own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
         edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
         size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
-        ring = reduction.scene.kind == "axisymmetric"
+        ring = reduction.scene.analysis.revolved
         p, r = own[cells], points[0][cells] if ring else np.ones(cells.shape)
         (sum_p, sum_r), corner = (x.sum(axis=1, keepdims=True) for x in (p, r)), cells.ravel()
         both = np.sum(p * r, axis=1, keepdims=True)

@@ -9,16 +9,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
 from contactopt.accuracy.estimate import Estimate, Judged, Level, read
 from contactopt.accuracy.everywhere import SWING, Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
+from contactopt.bounds import bounded
 from contactopt.checks import check_number
+from contactopt.defaults import TOL
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
 from contactopt.readings.peaks import Peak, Reading
 from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse
@@ -44,6 +44,7 @@ def refine(
     options: Options | None = None,
     limits: Limits | None = None,
     adaptive: bool = False,
+    bound: bool = False,
 ) -> tuple[Solved, Estimate]:
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
@@ -62,6 +63,7 @@ def refine(
     options : How each mesh is solved.
     limits : On unknowns, time and memory.
     adaptive : Whether meshes are refined only where the quantity needs it.
+    bound : Whether the search ends with a guaranteed bound (contactopt.bounds).
 
     Returns
     -------
@@ -87,7 +89,7 @@ def refine(
         search = Locally(tuple(states), asked, options, not adaptive)
     else:
         search = Everywhere(tuple(states), quantity, options)
-    return _Loop(asked, accuracy, options, limits or Limits(), search).run()
+    return _Loop(asked, accuracy, options, limits or Limits(), search, bound).run()
 
 
 def _in_time(options: Options, accuracy: float) -> Options:
@@ -115,6 +117,7 @@ class _Loop:
     options: Options
     limits: Limits
     search: Everywhere | Locally
+    bound: bool
     levels: list[Level] = field(default_factory=list)
     peaks: list[tuple[Peak, ...]] = field(default_factory=list)
     solved: Solved | None = None
@@ -293,7 +296,7 @@ class _Loop:
             judged.grading / scale if signed else None,
             geometry / scale if np.isfinite(geometry) else 1.0,
             judged.order,
-            bounded(self.solved, self.quantity, value),
+            bounded(self.solved, self.quantity, value) if self.bound else None,
             reached,
             message,
             tuple(self.levels),

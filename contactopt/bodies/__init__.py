@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Any
 
 from contactopt.bodies.assembled import AssembledBody
-from contactopt.bodies.ranks import RemotePart
 from contactopt.errors import InputError
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
@@ -22,7 +21,6 @@ BODIES: dict[type, tuple[str, str, str]] = {
         "assemble_elastic",
         "finite elements with linear elasticity",
     ),
-    RemotePart: (f"{ROOM}.remote", "assemble_remote", "finite elements on another rank"),
     Rigid: (f"{ROOM}.rigid", "assemble_rigid", "a rigid body"),
     HalfSpace: (
         f"{ROOM}.half_space",
@@ -57,6 +55,5 @@ def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> Asse
                 scene, part, elements, zone
             )
             return made
-    # which no user writes
-    known = ", ".join(kind.__name__ for kind in BODIES if kind is not RemotePart)
+    known = ", ".join(kind.__name__ for kind in BODIES)
     raise InputError(f"a body of a scene must be one of {known}; got {type(part).__name__}.")

@@ -13,7 +13,8 @@ import skfem
 from contactopt.bodies.elements import Trace, Weight, node_unknowns
 from contactopt.bodies.motions import Motions
 from contactopt.bodies.stiffness import isotropic_stiffness
-from contactopt.material import Material, lame_by_poisson
+from contactopt.material import Material
+from contactopt.scenes.kinds import Kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Assembly:
     """
 
     name: str
-    kind: str
+    kind: Kind
     material: Material
     basis: skfem.CellBasis
     weight: Weight
@@ -73,7 +74,8 @@ class Assembly:
     @cached_property
     def by_poisson(self) -> sp.csr_matrix:
         """(n, n) derivative of the stiffness A by Poisson's ratio."""
-        return isotropic_stiffness(self.basis, lame_by_poisson(self.material), self.weight)
+        constants = self.kind.constants_by_poisson(self.material)
+        return isotropic_stiffness(self.basis, constants, self.weight)
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
         """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""

@@ -38,7 +38,7 @@ from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.bodies.stress_recovery import StressMap, stress_map
 from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.linear.operators import Product
-from contactopt.linear.saddle_point import LocalTerm
+from contactopt.linear.saddle_point import BodyTerm
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
@@ -147,11 +147,11 @@ class ElasticBody(Body):
 
         return product
 
-    def term(self, T: sp.csr_matrix) -> LocalTerm | None:
+    def term(self, T: sp.csr_matrix) -> BodyTerm | None:
         if not self.solver.iterative or self.solver.iteration is None:
             return None
         entries, low_rank = self.body.A.diagonal()[self.kept], self._low_rank(T)
-        return LocalTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
+        return BodyTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         # T G T' from the block of G on the contact unknowns, and what is of low rank

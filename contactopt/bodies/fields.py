@@ -9,11 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-STRESSES = {
-    "plane-strain": ("xx", "yy", "zz", "xy"),
-    "axisymmetric": ("rr", "zz", "tt", "rz"),
-    "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
-}
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
 
 

@@ -281,7 +281,7 @@ def assemble_half_space(
     scene: Scene, part: HalfSpace, elements: int, zone: float | None
 ) -> HalfSpaceBody:
     """A half-space on its grid; InputError in an axisymmetric or mirrored scene."""
-    if scene.kind == "axisymmetric" or scene.copies > 1:
+    if scene.analysis.revolved or scene.analysis.stretches or scene.copies > 1:
         raise InputError(
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with"
             " copies = 1, because the forces between its points know no symmetry."

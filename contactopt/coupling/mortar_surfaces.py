@@ -56,7 +56,7 @@ def couple_surfaces(
     cells = number[carrier.cell_nodes()]
     cells = cells[np.all(cells >= 0, axis=1)].T  # those whose corners all carry contacts
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
-    laid_out = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
+    laid_out = lay_out(contacts, scene.copies, scene.analysis.revolved)
     _, frames, order = laid_out
     maps = []
     for i, mesh in enumerate(meshes):

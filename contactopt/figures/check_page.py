@@ -21,7 +21,8 @@ from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
-from contactopt.scenes.scene import COMPONENTS, BodyForce, Part, Plate, Scene, Traction
+from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
 
 ROLES = ("no use", "support", "load", "plate", "contact")
 
@@ -51,7 +52,7 @@ def write_mesh_page(
     """
     dim = len(next(iter(meshes.values())).p)
     own: Any = SimpleNamespace(name=name, units=("length", "stress"), dim=dim, kind="solid")
-    own.components = COMPONENTS["solid"][:dim]
+    own.components = KINDS["solid"].components[:dim]
     roles = [
         "none",
         *dict.fromkeys(side for one in meshes.values() for side in one.boundaries or {}),
@@ -88,7 +89,7 @@ def _write(
         "units": units,
         "dim": scene.dim,
         "axes": list(scene.components),
-        "ring": scene.kind == "axisymmetric",
+        "ring": scene.analysis.revolved,
         "mirrors": planes,
         "box": box.tolist(),
         "near": box.tolist(),

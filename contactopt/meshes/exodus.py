@@ -2,7 +2,7 @@
 
 meshio needs netCDF4, and loses side sets and the names of blocks. The files are netCDF: of the
 classic kind, which scipy reads, or HDF5, which h5py reads. Side k of an element is a face of
-contactopt.meshes.inp.FACES, counted from another first one.
+contactopt.meshes.inp_elements.FACES, counted from another first one.
 
 Source: L. Schoof and V. Yarberry, EXODUS II: a finite element data model, SAND92-2137.
 """
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.meshes.inp import FACES, FACET
+from contactopt.meshes.inp_elements import FACES, FACET
 
 # type without its number of nodes -> that number -> type in meshio
 TYPES = {

@@ -23,12 +23,17 @@ class Curve:
     known : Whether the user gave the curve, or the mesh has curved edges that define it. False: it
         was guessed from the nodes of a polygon.
     name : What messages call it.
+    given : Whether the user gave it, so that it may not be that of the mesh.
     """
 
     def __init__(
-        self, place: Callable[[np.ndarray], Any], known: bool, name: str = "the curve"
+        self,
+        place: Callable[[np.ndarray], Any],
+        known: bool,
+        name: str = "the curve",
+        given: bool = False,
     ) -> None:
-        self.place, self.known, self.name = place, known, name
+        self.place, self.known, self.name, self.given = place, known, name, given
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Move points (dim, m) to their places (dim, m); InputError where the function fails."""

@@ -51,8 +51,9 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     -------
     Triangles, quadrilaterals, tetrahedra or hexahedra, curved where the file holds elements of
         second order. Its boundaries are the groups of facets on its surface, and the groups of
-        nodes that hold all corners of such facets. InputError if the file cannot be read, if there
-        is no such group, or if the mesh has a fault that cannot be repaired.
+        nodes that hold all corners of such facets and no node inside the body. InputError if the
+        file cannot be read, if there is no such group, or if the mesh has a fault that cannot be
+        repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
     return _body(Path(path), read_groups(Path(path)), group, scale)
@@ -261,10 +262,14 @@ def _boundaries(
             hits += [place[key] for key in map(tuple, facets.tolist()) if key in place]
         if hits:
             found[name] = outer[np.unique(hits)]
+    skin = np.isin(np.arange(mesh.nvertices), corners)
     for name, nodes in groups.point_sets.items():
-        there = np.zeros(mesh.p.shape[1] + 1, dtype=bool)
-        there[number[nodes]] = True  # nodes of other bodies go to the last place
+        own = number[nodes]  # those of other bodies are -1, those within edges come last
+        there = np.zeros(mesh.nvertices, dtype=bool)
+        there[own[(own >= 0) & (own < mesh.nvertices)]] = True
         inside = np.all(there[corners], axis=0)
-        if inside.any() and name not in found:
+        if np.any(there & ~skin):
+            log.info("the nodes %s fill the body, or a part of it: they are no boundary", name)
+        elif inside.any() and name not in found:
             found[name] = outer[inside]
     return found

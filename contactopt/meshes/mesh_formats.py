@@ -139,6 +139,8 @@ def _read(path: Path) -> Any:
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
                 return reader()
+        except InputError:  # it names what it does not read
+            raise
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
             said = said or " ".join(text.split())[:200] or type(error).__name__

@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contactopt.errors import InputError
-from contactopt.methods.method import Method
-from contactopt.problem import Law
+
+if TYPE_CHECKING:
+    from contactopt.methods.method import Method
+    from contactopt.problem import Infeasible, Law
 
 
 class Repeated(Exception):
@@ -31,6 +33,14 @@ class Repeated(Exception):
 
     A method that has another way to go on catches it. All others end.
     """
+
+
+class NoSolution(Exception):
+    """Raised by a method that has proved that its problem has no solution."""
+
+    def __init__(self, proof: Infeasible):
+        super().__init__(proof.sentence)
+        self.proof = proof
 
 
 # name -> (module in this room, class, what it is)

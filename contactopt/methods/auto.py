@@ -13,6 +13,9 @@ proximal loop.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
+   In the plane a tree over the states of the contacts looks for a solution or for such a proof
+   (contactopt.methods.kernels.states), BRANCHES of it here, and twice as many after each round of
+   stages 6 and 7.
 4. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
    linear systems of it.
 5. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
@@ -32,7 +35,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, islice
 from typing import ClassVar
 
 import numpy as np
@@ -42,13 +45,14 @@ from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import InterfaceOperator
-from contactopt.methods import Repeated, constants
+from contactopt.methods import NoSolution, Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import block_matrix
+from contactopt.methods.kernels.states import StateTree, can
 from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
@@ -178,6 +182,9 @@ class _Robust:
         self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
+        few = can(problem) and problem.contacts <= constants.MOST_STATES
+        self.tree, self.met = StateTree(problem.explicit()) if few else None, False
+        self.branches = self.tree.points() if self.tree else iter(())
 
     def better(self, *points: Iterate) -> Iterate:
         """The point with the least residual, the first of equal ones."""
@@ -204,12 +211,24 @@ class _Robust:
                 reached = yield from self.interior(reached, path)
         if infeasibility(problem) is not None:  # the driver says so
             return
+        yield from self.searched(constants.BRANCHES)
         if self.conic:
             turning = homotopy_iterates(problem, self.matrix, constants.TURNING)
             reached = yield from self.interior(reached, turning)
             if problem.symmetric and not self.loose:
                 reached = yield from self.cones(reached)
         yield from self.jammed(reached) if self.loose else self.restarted(reached)
+
+    def searched(self, branches: int) -> Iterator[Iterate]:
+        """The points among the next branches of the tree; NoSolution if it ends without any."""
+        if self.tree is None or self.tree.done:
+            return
+        for found in islice(self.branches, branches):
+            if found is not None:
+                self.met = True
+                yield found[:2]
+        if self.tree.done and not self.met:
+            raise NoSolution(self.tree.proof)
 
     def restarted(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Without end: the proximal loop from `reached`, and then from random forces."""
@@ -221,6 +240,7 @@ class _Robust:
             r *= constants.LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
             reached = self.problem.law.nearest(r, r[:, 0]), last[1]
             note(logger, "the proximal loop got nowhere and started again from random forces")
+            yield from self.searched(constants.BRANCHES * 2 ** (restarts + 1))
 
     def jammed(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Paths drawn at random and the gentle proximal loop from the best point, without end."""
@@ -239,6 +259,7 @@ class _Robust:
             last = yield from self.proximal(reached, patience, constants.GENTLE_ALPHA, "gentle")
             reached = self.better(reached, last)
             note(logger, NO_PROGRESS_JAMMED)
+            yield from self.searched(constants.BRANCHES * 2 ** (restarts + 1))
 
     def cones(self, start: Iterate) -> Generator[Iterate | Known, None, Iterate]:
         """A few cone programs."""

@@ -11,11 +11,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.checks import check_number, real_array
+from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
 from contactopt.linear.stacked import Stacked
-from contactopt.methods import Repeated, default_method, find_method, solvers_of, solves
+from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.notes import collected, remark
 from contactopt.problem import (
@@ -32,17 +33,16 @@ from contactopt.problem import (
 from contactopt.problem.certificate import Moved
 from contactopt.problem.unbalanced_loads import check_equilibrium
 
-TOL = 1e-8  # largest certificate of an answer that counts as solved, unless another is asked for
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
-PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
+LEAST_PROOF = 0.3  # seconds for a proof past the time limit
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
-DOUBT = 1.0  # seconds of work before the proof is first looked for, then ten times as long, ...
+DOUBT = 30  # iterates before the proof is first looked for, then ten times as many, ...
 SAME = 1e-11  # relative distance at which two iterates are the same state
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
-CONFIRM = 8  # repeated states in a row of a method that goes nowhere; some change course before
+CONFIRM = 8  # repeated states in a row of a method that goes nowhere
 
 
 def solve(
@@ -146,10 +146,9 @@ def _run(
         return _without_contacts(problem, method, limits.tol)
     check_equilibrium(problem)
     if not getattr(method, "unsymmetric", False) and not problem.symmetric:
-        name = type(method).__name__.lower()
         raise InputError(
-            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto"
-            " or proximal."
+            f"method '{type(method).__name__.lower()}' minimises an energy, which an unsymmetric Q"
+            " does not have; use auto or proximal."
         )
     if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
@@ -165,7 +164,7 @@ def _run(
         recorder.return_to_best()
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
-        proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
+        proof = infeasibility(problem, max(recorder.left(), LEAST_PROOF))
     checks = time.perf_counter() - begin - recorder.clock - recorder.certified
     if proof is not None:
         message, status = proof.sentence, Status.INFEASIBLE
@@ -191,42 +190,45 @@ def _follow(
     ended: Status | None = None
     repeated: Status | None = None
     message, proof, doubt = "", None, DOUBT
-    while ended is None and proof is None:
+    while ended is None:
         begin = time.perf_counter()
-        iterate, ended, message = _next(steps, recorder.left(), repeated, recorder.enough)
+        iterate, ended, message, proof = _next(steps, recorder.left(), repeated, recorder.enough)
         recorder.clock += time.perf_counter() - begin
         repeated = None
         if iterate is not None:
             ended = recorder.record(iterate, _counts(scaled.Q))
             if ended in (Status.STALLED, Status.CYCLING) and not recorder.late:
                 ended, repeated = None, ended
-        if ended is None and recorder.residual > FAR and recorder.clock > doubt:
-            proof, doubt = infeasibility(recorder.problem, recorder.clock / 10), 10 * recorder.clock
+        if ended is None and recorder.residual > FAR and len(recorder.history) > doubt:
+            proof, doubt = infeasibility(recorder.problem, recorder.left()), 10 * doubt
+            ended = None if proof is None else Status.INFEASIBLE
     return ended, message, proof
 
 
 def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None, enough: float
-) -> tuple[Iterate | Known | None, Status | None, str]:
-    """The next iterate with `left` seconds to go, or how and why the iteration ended; `repeated`
-    says how the last iterates repeat earlier ones, which ends a method without another way, and
-    `enough` what share of the residual may be left.
+) -> tuple[Iterate | Known | None, Status | None, str, Infeasible | None]:
+    """The next iterate with `left` seconds to go, or how and why the iteration ended, with a proof
+    if there is no solution. `repeated` says how the last iterates repeat earlier ones, and `enough`
+    what share of the residual may be left.
     """
     try:
         # what overflows is seen below
         with np.errstate(all="ignore"), until(time.perf_counter() + left, enough):
             iterate = next(steps, None) if repeated is None else _turned(steps)
+    except NoSolution as found:
+        return None, Status.INFEASIBLE, "", found.proof
     except TimeUp:
-        return None, Status.TIME_LIMIT, ""
+        return None, Status.TIME_LIMIT, "", None
     except BackendError as error:
-        return None, Status.BACKEND_FAILED, str(error)
+        return None, Status.BACKEND_FAILED, str(error), None
     except np.linalg.LinAlgError as error:
-        return None, Status.BACKEND_FAILED, f"the method broke down in its linear algebra: {error}"
+        return None, Status.BACKEND_FAILED, f"its linear algebra broke down: {error}", None
     if iterate is None:
-        return None, repeated or Status.SETTLED, ""
+        return None, repeated or Status.SETTLED, "", None
     if not (np.isfinite(iterate[0]).all() and np.isfinite(iterate[1]).all()):
-        return None, Status.DIVERGED, ""
-    return iterate, None, ""
+        return None, Status.DIVERGED, "", None
+    return iterate, None, "", None
 
 
 def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
@@ -251,8 +253,7 @@ def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> 
     residual = natural_map_residual(problem, r, multipliers)
     status, message = Status.SOLVED, Status.SOLVED.sentence
     if residual > tol:
-        status = Status.SETTLED
-        message = "there is no contact that could balance the load on the plate"
+        status, message = Status.SETTLED, "no contact could balance the load on the plate"
     return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
 
 

@@ -27,6 +27,7 @@ from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import dimensionless, isotropic
 
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
+FEWEST_STEPS, WORK = 300, 1e9  # of the simplex method: its least steps; steps times entries
 EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
 POLISH = 3  # least-squares steps
@@ -37,19 +38,22 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True)
 class Infeasible:
     """A proof that a problem has no solution: the ray (weights y (k,), motions z (p,)) of this
-    module's head.
+    module's head, or the contradictions of all states of the contacts
+    (contactopt.methods.kernels.states), for which y and z are zero.
 
     sentence  what it means, for people
-    margin    -(q' e + s' z) [work], positive
+    margin    -(q' e + s' z) [work], positive; of contradictions: the least of them [-]
+    branches  number of sets of states that are contradicted; 0 where a ray is the proof
     """
 
     weights: np.ndarray
     motions: np.ndarray
     margin: float
     sentence: str
+    branches: int = 0
 
 
-def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasible | None:
+def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infeasible | None:
     """Look for a proof that a problem has no solution.
 
     Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not
@@ -59,7 +63,7 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     Parameters
     ----------
     problem : The interface problem.
-    time_limit : How long the linear program may take [s].
+    time_limit : How long the linear program may take [s]; its steps are limited anyway.
 
     Returns
     -------
@@ -150,6 +154,7 @@ def _program(
     balance = sp.hstack([sp.csr_array(problem.V[normal].T), sp.csr_array((p, p))]) if p else None
     cost = np.concatenate([problem.q[:, 0], problem.s])
     cost = cost / (np.abs(cost).max(initial=0.0) or 1.0)
+    steps = FEWEST_STEPS + int(WORK / (A.nnz or 1))
     exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
     answer = linprog(
         cost,
@@ -159,7 +164,7 @@ def _program(
         np.zeros(p) if p else None,
         [(0, 1)] * k + [(-1, 1)] * p,
         method="highs",
-        options={"time_limit": time_limit} | exact,
+        options={"time_limit": time_limit, "maxiter": steps} | exact,
     )
     if answer.x is None or answer.fun is None or answer.fun > -1e-9:
         return None

@@ -28,7 +28,7 @@ class Status(Enum):
     CYCLING = "cycling", "the iteration came back to an earlier state, so it does not converge"
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
     DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
-    INFEASIBLE = "infeasible", "the problem has no solution, and a ray proves it"
+    INFEASIBLE = "infeasible", "the problem has no solution, which is proved"
     BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
 
     def __init__(self, label: str, sentence: str):
@@ -54,7 +54,7 @@ class Solution:
                  reduction
     notes        sentences about what the solve did otherwise than expected: a fallback, a stage
                  that failed
-    proof        status `infeasible`: the ray that proves that there is no solution
+    proof        status `infeasible`: what proves that there is no solution
     displacements  of the bodies that are solved by iteration, from methods that work on them (the
                    unknowns X of
                  contactopt.linear.saddle_point) [length]; None from all others

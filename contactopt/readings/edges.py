@@ -54,22 +54,6 @@ Read = tuple[float, float]  # a distance and its uncertainty
 Reader = Callable[[End], Read | None]
 
 
-def equivalent_half_width(scene: Scene, area: float) -> float:
-    """Half the width of the strip of the scene's thickness in plane strain, or of the square in
-    space, or the radius of the axisymmetric disc, that has an area [length].
-    """
-    if scene.kind == "plane-strain":
-        return area / (2 * scene.thickness)
-    return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
-
-
-def contact_area(scene: Scene, half_width: float) -> float:
-    """The area of a half-width [length^2], the inverse of `equivalent_half_width`."""
-    if scene.kind == "plane-strain":
-        return 2 * half_width * scene.thickness
-    return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
-
-
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
     """The half-width of the contact zone [length], as contact_zone() reads it."""
     return contact_zone(scene, problem, reactions)[0]
@@ -141,7 +125,8 @@ def stick_edge(
     status = contact_status(problem, reactions)
     if not status.stick.any():  # or on less than what belongs to one contact
         least = problem.areas[problem.law.rough & status.touching]
-        return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
+        area = float(least.max(initial=0.0))
+        return 0.0, scene.analysis.half_width(area, scene.thickness)
     contact, uncertain = zone or contact_zone(scene, problem, reactions)
     if not status.slip.any():
         return contact, uncertain
@@ -186,14 +171,14 @@ def _half_width(
     least    uncertainty of a reading, in elements
     """
     area = float(problem.areas[inside].sum())
-    counted = equivalent_half_width(scene, area)
+    counted = scene.analysis.half_width(area, scene.thickness)
     nodes = inside.sum() * 2.0 ** sum(problem.chart.mirrored)
     # of the nodes at the edge
     share = (1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5) if nodes else 0.0
     coarse = counted, float(counted * min(1.0, share)) if nodes else 0.0
     if inside.all() or not inside.any():
         return coarse
-    if scene.kind == "axisymmetric" and not problem.chart.mirrored[0]:
+    if scene.analysis.revolved and not problem.chart.mirrored[0]:
         return coarse  # a ring: its chart does not tell the distance from the axis
     found = [patch.measure(read) for patch in patches_of(problem, inside, weights)]
     if not found or any(patch is None for patch in found):
@@ -202,7 +187,7 @@ def _half_width(
     if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
         return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
     uncertainty = sum(patch.copies * max(patch.uncertainty, least * patch.step) for patch in ends)
-    if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
+    if scene.analysis.revolved:  # a ring between two distances from the axis, or a disc
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty

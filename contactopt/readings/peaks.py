@@ -77,7 +77,7 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     if not np.any(pressure > 0):
         return Reading(0.0, missing="nothing touches, so that there is no pressure")
     usable = problem.areas > 0
-    if reduction.scene.kind == "axisymmetric":
+    if reduction.scene.analysis.revolved:
         radius = np.abs(problem.coordinates[0])
         beside = usable & (radius > ON_PLANE * radius.max(initial=0.0))
         usable = beside if np.any(pressure[beside] > 0) else usable

@@ -88,8 +88,6 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
     InputError for a body, pair, component or point that the scene does not have.
     """
-    from contactopt.bodies.fields import STRESSES
-
     if not isinstance(name, str):
         return None
     head, at, where = name.partition("@")
@@ -111,8 +109,8 @@ def place_of(name: Any, scene: Scene) -> Place | None:
             f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from"
             f" {', '.join(meshed)}."
         )
-    if kind != LARGEST and stress not in STRESSES[scene.kind]:
-        names = ", ".join(f"stress_{own}" for own in STRESSES[scene.kind])
+    if kind != LARGEST and stress not in scene.analysis.stresses:
+        names = ", ".join(f"stress_{own}" for own in scene.analysis.stresses)
         raise InputError(
             f"quantity {name!r}: there is no stress {kind!r}; choose from {names} and von_mises."
         )
@@ -183,7 +181,7 @@ def read_stress(
 
     InputError for a boundary that the body does not have, and a point outside the body.
     """
-    from contactopt.bodies.fields import STRESSES, von_mises, von_mises_slopes
+    from contactopt.bodies.fields import von_mises, von_mises_slopes
 
     number, recovered = _map_of(place, reduction)
     U = displaced[number]
@@ -195,7 +193,7 @@ def read_stress(
         near = cKDTree(points).query(points, k=count)[1].reshape(-1, count)
         tops = maxima(sizes, sizes[near].max(axis=1)).tolist()
     else:
-        column = STRESSES[reduction.scene.kind].index(place.kind)
+        column = reduction.scene.analysis.stresses.index(place.kind)
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))

@@ -192,7 +192,7 @@ def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
         axis = np.eye(scene.dim)[scene.components.index(component)]
         for plane in state.reduction.planes:  # mirror images balance each other across it
             axis = axis - plane.inward * (plane.inward @ axis)
-        if scene.kind == "axisymmetric" and component == "r":
+        if scene.analysis.revolved and component == "r":
             axis = 0 * axis
         weights, own = np.zeros(state.problem.q.shape), _contacts(state, pair)
         weights[own] = state.reduction.frames[own] @ axis

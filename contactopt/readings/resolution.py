@@ -18,19 +18,20 @@ COVERED = 0.99  # a contact with less than this share of its faces lies where th
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Full sentences on zones of contact that end by themselves and are smaller than the mesh can
-    show, a disc or strip of FEWEST elements across its half-width, and on contacts at the other
-    surface's rim, where only a part of their faces bears the force; none for solutions that are not
-    certified.
+    """Full sentences on couplings that do not pass a constant pressure on. For certified solutions
+    also on zones of contact that end by themselves and are smaller than the mesh can show, a disc
+    or strip of FEWEST elements across its half-width, and on contacts at the other surface's rim,
+    where only a part of their faces bears the force.
     """
+    coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
-        return ()
+        return coupled
     few = [
         f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is"
         " distributed: refine the meshes there, or ask for an accuracy."
         for (name, count), own in coarse(reduction, solution)
     ]
-    return (*few, *_at_rims(reduction, solution))
+    return (*coupled, *few, *_at_rims(reduction, solution))
 
 
 def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:

@@ -15,7 +15,8 @@ from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_zone, stick_width
 from contactopt.readings.peaks import nodal_pressure
-from contactopt.scenes.scene import COMPONENTS, BodyForce, Traction
+from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.scene import BodyForce, Traction
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -41,7 +42,7 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
     together or of whole rings, with components r and z. Mirror images across `planes` and the parts
     of a ring balance each other but for what acts along the planes and along the axis.
     """
-    if reduction.scene.kind == "axisymmetric":
+    if reduction.scene.analysis.revolved:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
     for plane in reduction.planes:
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
@@ -58,7 +59,7 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
     empty where the bodies are whole, and where a plane does not lie across an axis.
     """
     scene = reduction.scene
-    if scene.kind == "axisymmetric":
+    if scene.analysis.revolved:
         return [{"axis": scene.components[0], "place": 0.0}]
     made = []
     for plane in reduction.planes:
@@ -120,7 +121,7 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
     """For the name of each pair the components of the force on its upper body, without their unit,
     from the summary of a result: normal forces of a curved surface add up to more than it.
     """
-    axes = COMPONENTS[summary["kind"]]
+    axes = KINDS[summary["kind"]].components
     words = {}
     for name, pair in summary["pairs"].items():
         known = [f or 0.0 for f in (*pair["force"], pair["normal_force"])]  # None: not finite
@@ -141,7 +142,7 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     force:PAIR:x, moment:PAIR:z                      on the upper body of a pair
     force:body 'block', support 'bottom':x           of a support or plate on its body
     """
-    scene, axes = reduction.scene, COMPONENTS[reduction.scene.kind]
+    scene, axes = reduction.scene, reduction.scene.components
     found: dict[str, float] = {}
     for part in scene.parts:
         for item in (part, *getattr(part, "supports", ()), *getattr(part, "loads", ())):
@@ -173,8 +174,8 @@ def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     """The tables of a summary. 'pairs': for each pair of surfaces its resultant, normal force
-    [force], largest pressure [stress], half-widths [length], coupling and counts of contacts.
-    'holders': the resultant of each support and plate.
+    [force], largest pressure [stress], half-widths [length], coupling with its reason, and counts
+    of contacts. 'holders': the resultant of each support and plate.
     """
     pairs = {}
     for (view, own), (name, found) in zip(
@@ -188,6 +189,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
             "contact_half_width": zone[0],
             "stick_half_width": stick_width(view, own, zone)[0],
             "coupling": view.coupling.kind,
+            "coupled_because": view.coupling.why,
             "carrier": view.coupling.carrier,
             "contacts": problem.contacts,
             "open": int(status.open.sum()),

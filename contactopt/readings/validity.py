@@ -14,6 +14,7 @@ import numpy as np
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
+from contactopt.readings.plausibility import SHARE
 
 # The largest values that draw no remark.
 BOUNDS = {
@@ -26,8 +27,6 @@ BOUNDS = {
     # of the surfaces of the displaced bodies where they touch, relative to their displacement
     "misfit": 1e-3,
 }
-# of the extent of a surface, up to which a closed gap is small, however fine its facets are
-SHARE = 0.02
 UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facets"}
 
 

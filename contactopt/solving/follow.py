@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.cards import count
+from contactopt.defaults import TOL
 from contactopt.errors import InputError, Unbalanced
-from contactopt.methods.driver import TOL
 from contactopt.problem import Solution, Status
 from contactopt.readings.plate_motions import motion
 from contactopt.readings.resultants import columns

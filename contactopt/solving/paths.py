@@ -52,8 +52,7 @@ class State:
                    (contactopt.readings.plate_motions) [length]; not a number where there is none
     elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D
                    [force length]
-    bodies         displacements (n,) of every body [length]; empty for large bodies, and for those
-                   on other ranks
+    bodies         displacements (n,) of every body [length]; empty for large bodies
     columns        name -> number: loads, motions, resultants
                    (contactopt.readings.resultants.columns)
     """

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.linear.budget import NextBest, TooDear, open_budget
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator, loosened
-from contactopt.methods.driver import TOL, solve
+from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.transfer import transfer

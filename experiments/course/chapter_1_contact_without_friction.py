@@ -187,7 +187,8 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 # This program has no constraint any more, but the node sinks into the floor. If the load is large
 # enough to close the gap, $F > k g_0$, the minimum is at $u = -(F - k g_0) / (k + \kappa)$. A
 # larger $\kappa$ makes this error smaller. But when contact begins, the stiffness of the system
-# jumps by the factor $1 + \kappa / k$. Such jumps make large penalty problems hard to solve.
+# jumps by the factor $1 + \kappa / k$. Written in displacements, large penalty problems are therefore
+# badly conditioned. Written in forces they are not, as chapter 3 shows.
 #
 # ## Nitsche: exact without a multiplier
 #

@@ -1,11 +1,12 @@
 # %% [markdown]
 # # Chapter 7. Duality
 #
-# Every chapter so far had two programs, one in displacements and one in forces. Both gave the same
+# Chapters 1 and 2 had two programs each, one in displacements and one in forces. Both gave the same
 # answer, and this chapter derives why. It also shows what the second program is good for: the
 # difference of the two values is an error that you can compute without knowing the solution.
 #
-# You need chapter 2. The chapter takes 50 minutes with its exercises.
+# Read this chapter directly after chapter 2: its number does not say its place. The chapter takes 50
+# minutes with its exercises.
 
 # %%
 import sys
@@ -368,7 +369,7 @@ table(7)
 #   mechanics, *Handbook of Numerical Analysis* 4 (1996),
 #   [doi:10.1016/S1570-8659(96)80005-6](https://doi.org/10.1016/S1570-8659(96)80005-6).
 #
-# This is the end of the course. The tutorials go on from here. Each of them has one subject.
+# Next: [many nodes without friction](chapter_3_a_string_on_a_floor.py).
 
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

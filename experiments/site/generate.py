@@ -123,7 +123,7 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
 GALLERY = """# %% [markdown]
 # # Gallery
 #
-# Thirty programs, each of at most ten statements besides its imports. Each says its class of
+# Short programs, most of at most ten statements besides their imports. Each says its class of
 # mathematical program and its mechanics, asserts what it shows, and draws a figure.
 """
 

@@ -44,6 +44,8 @@ class Law:
     dilatant      slip opens the gap
     bounded       tangential forces have a bound
     directed      a scene may give it a direction of friction
+    opens         contacts may open
+    frictional    its parameter is a friction that can be chosen
     """
 
     convex: bool = False
@@ -51,6 +53,8 @@ class Law:
     dilatant: bool = False
     bounded: bool = True
     directed: bool = False
+    opens: bool = True
+    frictional: bool = True
 
     def __post_init__(self) -> None:
         for name in self.parameters:
@@ -79,7 +83,19 @@ class Law:
     @property
     def lowest(self) -> np.ndarray:
         """(k,) least normal force [force]: 0 where a contact may open, -inf where it cannot."""
-        return np.zeros(self.contacts)
+        return np.full(self.contacts, 0.0 if self.opens else -np.inf)
+
+    @classmethod
+    def plain_coulomb(cls) -> bool:
+        """Tell whether the bound is mu r_n in all directions, and slip does not open the gap.
+
+        Returns
+        -------
+        True for Coulomb's law alone.
+        """
+        return (
+            cls.proportional and cls.frictional and cls.opens and not (cls.dilatant or cls.directed)
+        )
 
     @cached_property
     def unilateral(self) -> bool:
