@@ -83,7 +83,7 @@ def squeeze(t: np.ndarray) -> np.ndarray:
 
 def _number(value: float | None, form: str = ".6g") -> str:
     """A number in words; None stands for one that is not finite."""
-    return "unknown" if value is None else f"{value:{form}}"
+    return "unknown" if value is None else f"{value + 0.0:{form}}"
 
 
 def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
@@ -114,7 +114,7 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
         )
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:
-            rows[words] = f"{summary[key]:.6g} {length}"
+            rows[words] = f"{_number(summary[key])} {length}"
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
         rows[found["quantity"]] = (

@@ -94,7 +94,9 @@ def check_scene(
         lines += _pair_lines(scene, pair, own)
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
-        lines.append(f"{scene.copies} images make the whole, across planes with normals {where}")
+        where = where and f", across planes with normals {where}"
+        none = "; no support holds a plane of symmetry, so that none is known"
+        lines.append(f"{scene.copies} images make the whole{where or none}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))
