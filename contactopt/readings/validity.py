@@ -86,7 +86,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
-        if known["imbalance"] > BOUNDS["imbalance"]:
+        if solution.solved and known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
                 f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces"
                 " on it are left over; it is so thin or so weakly held that rounding moves it."
