@@ -355,8 +355,8 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
-        f"the largest pressure at a node is {largest:.4g}, what its"
-        f" neighbours let expect is {peak.value:.4g}, give or take"
+        f"the largest pressure at a node is {largest:.4g}, and its"
+        f" neighbours suggest {peak.value:.4g}, give or take"
         f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
     ]
 
