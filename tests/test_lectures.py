@@ -80,6 +80,7 @@ def test_the_page_for_lecturers_has_every_lecture_and_dois_of_the_right_form(lec
     assert all(f"| {chapter} | " in page for chapter in range(1, 8))
 
 
+@pytest.mark.slow
 def test_the_seminar_project_runs_as_it_stands(tmp_path, monkeypatch, capsys):
     test_how_tos.test_a_page_runs_as_it_stands("seminar", tmp_path, monkeypatch, capsys)
     assert (tmp_path / "out" / "bench" / "held_back" / "report.html").exists()
