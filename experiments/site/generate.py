@@ -33,7 +33,6 @@ TUTORIALS = (
     "reading_a_strangers_problem",
     "derivatives_with_kinks",
     "half_space_or_finite_elements",
-    "the_programs_of_friction",
 )
 # the order in which the chapters are read: duality comes after the first two
 CHAPTERS = (1, 2, 7, 3, 4, 5, 6)
