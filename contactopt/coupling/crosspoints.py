@@ -32,9 +32,11 @@ Puso, Laursen (2003), Mesh tying on curved interfaces in 3D, Eng. Comput. 20, 30
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,6 +46,7 @@ from contactopt.coupling.coupling import Coupling
 from contactopt.meshes.cells import joined
 from contactopt.scenes.contact import Contact
 
+_Node: TypeAlias = tuple[str, int]  # a body and the first unknown of one of its nodes
 MAIN = 0.5  # a node moves a contact mainly if its weight is more than this part of the largest one
 SAME = 1e-9  # contacts are at one place within this fraction of the size of their surface
 FLAT = 1e-6  # points are on one line within this fraction of their extent
@@ -195,30 +198,28 @@ def _known_already(ties: Sequence[_Seam]) -> dict[int, np.ndarray]:
     """By the number of each tie with matching nodes, those of its contacts whose nodes ties before
     it, or contacts before them, make one node.
     """
-    ends: dict[tuple[int, int], list[tuple[tuple[str, int], ...]]] = {}
-    count: dict[tuple[str, int], int] = {}
+    ends: list[tuple[int, int, tuple[_Node, _Node]]] = []
     for tie in ties:
-        bodies = tie.pair.bodies
-        first = [_first(main) for main in tie.main]
-        for row in np.flatnonzero((first[0] >= 0) & (first[1] >= 0)).tolist():
-            ends[tie.number, row] = tuple((bodies[s], int(first[s][row])) for s in (0, 1))
-            for node in ends[tie.number, row]:
-                count[node] = count.get(node, 0) + 1
-    head: dict[tuple[str, int], tuple[str, int]] = {}
+        (upper, first), (lower, second) = zip(tie.pair.bodies, map(_first, tie.main))
+        for row in np.flatnonzero((first >= 0) & (second >= 0)).tolist():
+            nodes = (upper, int(first[row])), (lower, int(second[row]))
+            ends.append((tie.number, row, nodes))
+    count = Counter(node for *_, nodes in ends for node in nodes)
+    head: dict[_Node, _Node] = {}
 
-    def top(node: tuple[str, int]) -> tuple[str, int]:
+    def top(node: _Node) -> _Node:
         while node in head:
             node = head[node]
         return node
 
     found: dict[int, list[int]] = {}
-    for (number, row), nodes in ends.items():
+    for number, row, nodes in ends:
         if min(count[node] for node in nodes) > 1:
-            upper, lower = map(top, nodes)
-            if upper == lower:
+            one, other = map(top, nodes)
+            if one == other:
                 found.setdefault(number, []).append(row)
             else:
-                head[upper] = lower
+                head[one] = other
     return {number: np.array(rows) for number, rows in found.items()}
 
 
