@@ -9,6 +9,8 @@ import skfem
 from turned import mirror, turn
 
 from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce_bodies, run
+from contactopt.coupling.patch_test import misfit
+from contactopt.coupling.posed import posed
 
 MATERIAL = Material(100.0, 0.3)
 KINDS = {
@@ -165,6 +167,7 @@ def uniform_and_independent(scene, stress):
     and stick do not depend on each other.
     """
     result = run(scene, figures=())
+    assert not any("constant pressure" in text for text in result.summary["remarks"])
     made = result.reduction
     frames = made.frames
     assert np.allclose(result.pressure, -np.abs(frames[:, 0]) @ stress, rtol=0, atol=1e-7)
@@ -249,6 +252,19 @@ def test_four_blocks_in_space_on_a_rough_floor(cells, degree):
     middle = np.linalg.norm(x - [[1.0], [1.0], [0.0]], axis=0) < 1e-9
     assert middle.sum() == 4
     assert np.allclose(result.pressure[middle], 0.9582, rtol=0.15)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_what_is_left_of_a_seam_passes_the_patch_test(degree):
+    flat = [seam((4, 4)), seam((4, 5)), seam((5, 4), kinds=("tri", "quad"), slant=0.3)]
+    spaces = [four_on_floor((2,) * 4), four_on_floor((2, 3, 3, 2))]
+    for scene in [*flat, *spaces, quarters((2, 3, 2, 3), ("tied", "tied"))[0]]:
+        made = posed(replace(scene, degree=degree))
+        bodies = {body.name: body for body in made.bodies}
+        for pair, own in zip(scene.pairs, made.couplings):
+            if pair.law == "tied":
+                sides = [bodies[body].surface(s) for body, s in zip(pair.bodies, pair.surfaces)]
+                assert misfit(own, sides) is None and not own.remarks
 
 
 def test_every_contact_on_the_floor_stays():
