@@ -87,7 +87,7 @@ def _reduced(tie: _Seam, given: np.ndarray) -> Coupling:
             f" bodies too, near ({where}): the forces near its edge are not reliable; refine the"
             " meshes along it.",
         )
-    made = tie.made if kept.all() else _without(tie.made, kept)
+    made = tie.made if kept.all() or not kept.any() else _without(tie.made, kept)
     return replace(made, remarks=remarks)
 
 
@@ -151,7 +151,7 @@ class _Seam:
         """
         points, cells = self.made.positions.T, self.made.cells
         size = np.ptp(points, axis=0).max(initial=0.0)
-        if not len(KDTree(points).query_pairs(SAME * size)):
+        if not cells.size or not len(KDTree(points).query_pairs(SAME * size)):
             return np.zeros(len(points), dtype=int)
         mates = np.concatenate([cells[[0, i]] for i in range(1, len(cells))], axis=1)
         piece, inside = joined(mates, len(points)), np.unique(cells)
