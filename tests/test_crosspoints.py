@@ -302,3 +302,45 @@ def test_a_tie_of_one_element_says_what_it_cannot_do():
     said = [text for text in result.summary["remarks"] if "tie 'R.x--L.x+'" in text]
     assert len(said) == 1 and "(1, 0)" in said[0]
     assert not any("tie" in text for text in run(seam((2, 2)), figures=()).summary["remarks"])
+
+
+@pytest.mark.parametrize(("held", "mu"), [({"y": 0.0}, 0.0), ({"y": 0.0}, 0.3), (None, 0.3)])
+@pytest.mark.parametrize(("cells", "degree"), [((6, 6), 1), ((6, 7), 1), ((8, 7), 1), ((6, 7), 2)])
+def test_a_seam_between_a_support_and_a_floor_is_as_one_body(cells, degree, held, mu):
+    """The support is one with the floor, so that the seam gives up its end there too."""
+
+    def force(bodies, contacts, name, degree=1):
+        made = Scene(name, bodies=bodies, contacts=contacts, degree=degree)
+        return run(made, figures=()).summary["pairs"]["R.y--floor"]["normal_force"]
+
+    guide = (Support("x-", {"x": 0.0}),) if held else ()
+    left = Part(
+        "L",
+        box((0.0, 0.0), (1.0, 1.0), (cells[0],) * 2),
+        MATERIAL,
+        (Support("y-", held), *guide),
+        (Traction("y+", (0.0, -1.5)),),
+    )
+    right = box((1.0, 0.0), (2.0, 1.0), (cells[1],) * 2)
+    right = Part("R", right, MATERIAL, (), (Traction("y+", (0.0, -1.0)),))
+    touch, tie = Contact("R:y-", "floor", mu), Contact("R:x-", "L:x+", 0.0, law="tied")
+    found = force((left, right, Rigid("floor")), (touch, tie), "two", degree)
+
+    def one(n):
+        mesh = box((0.0, 0.0), (2.0, 1.0), (2 * n, n))
+        halves = {
+            f"{name}{side}": partial(
+                lambda x, y, s: (abs(x[1] - y) < 1e-9) & (s * (x[0] - 1) > 0), y=y, s=s
+            )
+            for name, y in (("y-", 0.0), ("y+", 1.0))
+            for side, s in (("l", -1), ("r", 1))
+        }
+        halves["x-"] = lambda x: abs(x[0]) < 1e-9
+        halves["y-"] = halves.pop("y-r")
+        loads = (Traction("y+l", (0.0, -1.5)), Traction("y+r", (0.0, -1.0)))
+        supports = (Support("y-l", held), *guide)
+        part = Part("R", mesh.with_boundaries(halves), MATERIAL, supports, loads)
+        return force((part, Rigid("floor")), (touch,), "one")
+
+    # the support takes half an element of the pressure from one body: of first order
+    assert found == pytest.approx(2 * one(24) - one(12), rel=5e-3)

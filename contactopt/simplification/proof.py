@@ -59,7 +59,9 @@ def certificate_of_whole(
         moves = {each.name: spread.displacement(each, bodies[each.name]) for each in whole.parts}
         forces = {name: np.zeros(len(U)) for name, U in moves.items()}
         sides = [(pair, *(bodies[name] for name in pair.bodies)) for pair in whole.pairs]
-        couplings = independent(whole.pairs, [couple(whole, *both) for both in sides])
+        couplings = independent(
+            whole.pairs, [couple(whole, *both) for both in sides], bodies.values()
+        )
         for pair, made in zip(whole.pairs, couplings):
             upper, lower = pair.bodies
             r, measure = spread.reactions(pair, made)
