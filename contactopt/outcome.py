@@ -98,11 +98,14 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     }
     if summary["q"] == "implicit":
         rows["Q"] = f"{summary['products']} products with vectors"
+    thick = summary.get("thickness")
+    depth = "" if thick is None else f" at a thickness of {thick:g} {length}"
     for name, force in resultant_words(summary).items():
         pair = summary["pairs"][name]
         rows[f"contact '{name}'"] = (
             f"force on the upper body {force} {newton}; largest pressure"
-            f" {pair['max_pressure']:.6g} {stress}; {pair['open']} open, {pair['stick']} stick,"
+            f" {pair['max_pressure']:.6g} {stress}; contact area {pair['contact_area']:.6g}"
+            f" {length}^2{depth}; {pair['open']} open, {pair['stick']} stick,"
             f" {pair['slip']} slip; coupled by {pair['coupling']} because {pair['coupled_because']}"
         )
     for key, words in LENGTHS.items():

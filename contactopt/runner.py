@@ -302,18 +302,19 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     """What is known of the answer on one mesh at one state."""
     reduction, solution = solved.reduction, solved.solution
-    problem = reduction.problem
+    problem, scene = reduction.problem, reduction.scene
     found = tables(reduction, solution)
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
-    known = doubts(reduction.scene, reduction.couplings)
+    known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
-        "scene": reduction.scene.name,
-        "kind": reduction.scene.kind,
-        "units": list(reduction.scene.units),
+        "scene": scene.name,
+        "kind": scene.kind,
+        "units": list(scene.units),
+        "thickness": None if scene.dim == 3 or scene.analysis.revolved else scene.thickness,
         "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
