@@ -24,6 +24,7 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.outcome import Outcome
 from contactopt.readings.chords import chord_remarks
+from contactopt.readings.corners import corner_remarks
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
@@ -286,6 +287,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
         summary = _summary(solved, names)
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
+            summary["remarks"] += corner_remarks(reduction, solution)
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
