@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.meshes.bulk_data import read_bulk_data
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.msh4 import read_msh4, version
@@ -34,7 +35,11 @@ TAGS = (
 # formats whose readers end on damaged text; others may not
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
 # formats of which meshio loses names or sets -> our reader
-OWN: dict[str, Callable[[Path], Any]] = {"abaqus": read_inp, "exodus": read_exodus}
+OWN: dict[str, Callable[[Path], Any]] = {
+    "abaqus": read_inp,
+    "exodus": read_exodus,
+    "nastran": read_bulk_data,
+}
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
