@@ -500,3 +500,26 @@ def test_bulk_data_in_every_form(tmp_path, kind, order, form):
         path.write_text(text.replace(old, new))
         with pytest.raises(InputError, match="line [0-9]+: .*" + words):
             load_mesh(path)
+
+
+def test_bricks_of_27_nodes_in_any_order_of_their_middles(tmp_path):
+    """Gmsh and Abaqus number the middles of the sides and of the brick in orders of their own."""
+    shape, rng = block("hex", 2, (2, 1, 1)), np.random.default_rng(0)
+    middle, sides = {}, [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7)]
+    for number, own in shape.elements.items():
+        for ends in (*sides, (0, 3, 4, 7), range(8)):
+            place = tuple(np.mean([shape.nodes[own[end]] for end in ends], axis=0))
+            middle.setdefault(place, 1000 + len(middle))
+            own.append(middle[place])
+        shape.elements[number] = [*own[:20], *rng.permutation(own[20:]).tolist()]
+    shape.nodes.update({number: place for place, number in middle.items()})
+    path = tmp_path / "deck.inp"
+    text = f"*NODE\n{node_rows(shape)}\n*ELEMENT, TYPE=C3D27, ELSET=B\n"
+    text += element_rows(shape.elements) + "\n*SURFACE, NAME=S\nB, S1\n"
+    path.write_text(text)
+    mesh = check(path, "B", 2, {"S": 2}, 12)
+    assert type(mesh) is skfem.MeshHex2
+    some = next(iter(middle.values()))
+    path.write_text(text.replace(f"\n{some}, ", f"\n{some}, 9"))
+    with pytest.raises(InputError, match="27 nodes"):
+        load_mesh(path)

@@ -27,6 +27,7 @@ _SHAPES = (
     ("CTRIA6 CPLSTN6 CPLSTS6", {6: "triangle6"}),
     ("CQUAD4 CQUADR CSHEAR CPLSTN4 CPLSTS4", {4: "quad"}),
     ("CQUAD8 CPLSTN8 CPLSTS8", {8: "quad8"}),
+    ("CQUAD CQUAD9", {9: "quad9"}),
     ("CTETRA", {4: "tetra", 10: "tetra10"}),
     ("CHEXA", {8: "hexahedron", 20: "hexahedron20"}),
     ("CPENTA", {6: "wedge", 15: "wedge"}),
@@ -34,6 +35,7 @@ _SHAPES = (
     ("CROD CBAR CBEAM CTUBE PLOTEL", {2: "line"}),
 )
 ELEMENTS = {card: shapes for cards, shapes in _SHAPES for card in cards.split()}
+SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM")  # whose cards end with their nodes
 CORNERS = {"wedge": 6, "pyramid": 5}
 # the first node of a card: PLOTEL has no property
 FIRST = {"PLOTEL": 2}
@@ -129,6 +131,8 @@ class _Reader:
         if count not in shapes or len(words) < count or not all(words[:count]):
             raise self.fail(line, f"the element {name} lacks some of its nodes")
         nodes = [self.whole(line, word) for word in words[:count]]
+        if name in SOLIDS and any(card[first + count :]):
+            raise self.fail(line, f"the element {name} has more than {count} nodes")
         number = self.whole(line, card[1])
         if number in self.numbers:
             raise self.fail(line, f"element {number} is there twice")

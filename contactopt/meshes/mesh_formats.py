@@ -159,6 +159,7 @@ def _read(path: Path) -> Any:
             raise
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
+            text = f"{error} in it is not known" if isinstance(error, KeyError) else text
             said = said or " ".join(text.split())[:200] or type(error).__name__
     advice = "; save Gmsh files as text in version 4.1 or 2.2" if "gmsh" in formats else ""
     raise InputError(
