@@ -110,14 +110,14 @@ def read_groups(path: Path) -> FileGroups:
                 for name in own if tag != 0 or key not in TAGS else ():
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
-    for name, nodes in sets.items():
-        if nodes.size and (nodes.min() < 0 or nodes.max() >= len(mesh.points)):
+    for name, found in sets.items():
+        if found.size and (found.min() < 0 or found.max() >= len(mesh.points)):
             raise InputError(
                 f"mesh file '{path}': the set {name!r} names a node that is not there."
             )
     for (name, _), parts in members.items():
-        for i, own in parts.items():
-            if own.min() < 0 or own.max() >= len(blocks[i][1]):
+        for i, found in parts.items():
+            if found.min() < 0 or found.max() >= len(blocks[i][1]):
                 raise InputError(
                     f"mesh file '{path}': the set {name!r} names an element that is not there."
                 )
