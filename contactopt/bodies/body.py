@@ -26,6 +26,7 @@ from contactopt.bodies.elements import (
 )
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
+from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, straight
 from contactopt.problem.laws import find_law
@@ -52,8 +53,9 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         laws = [find_law(law) for law in scene.laws_of(part, name)]
         tied = bool(laws) and not any(law.bounded for law in laws)
         facets = np.asarray(mesh.boundaries[name])
+        every = tied or bool(thin_facets(basis.mesh, facets).any())
         copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
-        traces[name] = contact_trace(basis, scene.degree, facets, weight, tied, copied)
+        traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
     return Assembly(
         part.name,
         kind,

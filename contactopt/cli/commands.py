@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.cards import count
+from contactopt.checks import overheard
 from contactopt.errors import InputError
 from contactopt.files.toml_table import parse
 
@@ -165,8 +166,9 @@ def check(options: argparse.Namespace) -> int:
     from contactopt.figures.scene_check import check_scene
     from contactopt.runner import states_of
 
-    states, solve = states_of(options.scene, **_arguments_of(options.set))
-    found = check_scene(states, solve)
+    with overheard() as told:
+        states, solve = states_of(options.scene, **_arguments_of(options.set))
+    found = check_scene(states, solve, told)
     print(found.text)
     if options.no_page:
         return 0

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.checks import check_number, meant
+from contactopt.defaults import install
 from contactopt.errors import InputError
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -107,9 +108,7 @@ def _kernel() -> Iterator[Any]:
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: a library of the system is missing
-        raise InputError(
-            f"this needs Gmsh ({error}); install it: pip install 'contactopt[mesh]'."
-        ) from error
+        raise InputError(f"this needs Gmsh ({error}); {install('mesh')}.") from error
     begun = not gmsh.isInitialized()
     if begun:
         gmsh.initialize(interruptible=False)
