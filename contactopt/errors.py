@@ -17,4 +17,4 @@ class Unbalanced(InputError):
 
 
 class BackendError(RuntimeError):
-    """A QP or conic backend gave no usable answer; the message names it."""
+    """A QP or conic backend failed; the message names it."""

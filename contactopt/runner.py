@@ -23,13 +23,14 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
+from contactopt.readings.chords import chord_remarks
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import validity
+from contactopt.readings.validity import check_possible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
@@ -293,6 +294,8 @@ def _result(
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
         summary = _summary(solved, names)
+        if estimate is None:  # which knows the curves, and refines the chords
+            summary["remarks"] += chord_remarks(reduction, solution)
     noted = [solution] if solved.path is None else solved.path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
     summary["remarks"] = list(dict.fromkeys(every))
@@ -319,6 +322,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     peak = pressure_reading(reduction, solution) if single else None
     smoothed = [] if peak is None or not solution.solved else _smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
+    check_possible(limits)
     known = doubts(reduction.scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
@@ -352,8 +356,8 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
-        f"the largest pressure at a node is {largest:.4g}, what its"
-        f" neighbours let expect is {peak.value:.4g}, give or take"
+        f"the largest pressure at a node is {largest:.4g}, and its"
+        f" neighbours suggest {peak.value:.4g}, give or take"
         f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
     ]
 

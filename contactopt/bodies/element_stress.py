@@ -30,11 +30,16 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
         unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
     gradient = _middle_gradient(body.basis, U)
     turned = gradient.swapaxes(1, 2)
-    strain = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(initial=0.0)
+    strains = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(axis=1)
+    mean = np.sqrt(np.average(strains**2, weights=np.sum(body.basis.dx, axis=1)))
     rotation = np.linalg.norm(gradient - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
     moved = float(np.abs(U).max(initial=0.0))
     return Validity(
-        unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved
+        unbalanced / size if size > 0 else unbalanced,
+        float(strains.max()),
+        float(rotation),
+        moved,
+        float(mean),
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from contactopt.cards import count
 from contactopt.checks import overheard
 from contactopt.errors import InputError
+from contactopt.files.toml_table import parse
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -26,7 +27,7 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
         if not sign or not name:
             raise InputError(f"--set needs NAME=VALUE, as in --set width=30; got {text!r}.")
         try:
-            found[name] = tomllib.loads(f"value = {value}")["value"]
+            found[name] = parse(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             found[name] = value
     return found
