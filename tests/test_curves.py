@@ -284,3 +284,22 @@ def test_surfaces_that_are_no_spheres_are_met_up_to_their_rims(shape, second):
     height = np.abs(off(chords.p[:, np.unique(chords.facets[:, chords.boundaries["outer"]])])).max()
     assert np.abs(off(fine.p[:, outer])).max() < 0.2 * height
     assert np.abs(fine.p[2, flat]).max() < 1e-12
+
+
+@pytest.mark.parametrize("shape", ["cone", "groove", "spline"])
+def test_what_is_guessed_of_a_surface_has_another_shape(shape):
+    """It lies between the guess and the chords, about as far from the guess as that is wrong."""
+    mesh, off = round_body(shape, False, n=4)
+    curves = boundary_curves(mesh)
+    guess, known = curves["outer"], boundary_curves(round_body(shape, True)[0])["outer"]
+    facets = mesh.facets[:, mesh.boundaries["outer"]]
+    middles = (mesh.p[:, facets] + mesh.p[:, np.roll(facets, 1, axis=0)]).reshape(3, -1) / 2
+    error, doubt = np.abs(off(guess(middles))), guess(middles) - guess.other(middles)
+    assert known.other is None and curves["foot"] is None
+    assert np.abs(doubt).max() > 0.5 * error.max()
+    assert np.abs(doubt).max() < 0.8 * np.abs(guess(middles) - middles).max()
+
+
+def test_a_sphere_and_a_cylinder_have_one_shape():
+    assert boundary_curves(simplices(cylinder_sector()))["inner"].other is None
+    assert boundary_curves(skfem.MeshTet.init_ball(2))[""].other is None

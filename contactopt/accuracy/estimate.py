@@ -62,7 +62,7 @@ class Estimate:
     grading_error   signed part of it that falls with the size of the elements away from the contact
                     [-]
     geometry_error  part of it that no refinement removes, because the meshes do not tell the shape
-                    of a boundary [-]
+                    of a boundary, or because curved surfaces overlap as they are drawn [-]
     order           observed order of convergence; None if it was not observed
     guarantee       what of the error is not estimated but bounded; None if that was not asked for
     reached         whether the error is at most the target

@@ -22,6 +22,7 @@ from contactopt.errors import InputError
 from contactopt.readings.peaks import Peak, Reading
 from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse
+from contactopt.readings.validity import overlap_share
 from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.progress import resident_memory
@@ -34,6 +35,7 @@ WATCHED = 1.5
 SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
 TENTH = 0.1  # of the accuracy may be the solver's (experiments.questions.bounds)
+NEGLIGIBLE = 1e-6  # share of the areas of surfaces that overlap, by which they are the same
 ROUNDING = 1e-15  # least relative error: no reading is exact
 
 
@@ -263,24 +265,13 @@ class _Loop:
         assert self.solved is not None
         value, judged = self.reading.value, self.judged
         last, scale = self.levels[-1], abs(self.reading.value) or 1.0
-        # the error that the shape of guessed boundaries makes [unit of the quantity]
-        geometry, sentence = 0.0, ""
-        if not self.vain and not self.reading.missing:
-            try:
-                geometry, sentence = self.search.geometry(value, self.states)
-            except InputError as failure:
-                log.info("the other shape of guessed boundaries was not solved: %s", failure)
+        geometry, sentence = self._shape()
         known = last.error is not None and not self.vain and np.isfinite(geometry)
-        error = last.error + geometry / scale if known and last.error is not None else None
+        error = last.error + geometry if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy
-        if sentence:
-            if self.reached and not reached:
-                message = "the geometry keeps the target out of reach"
-            if geometry > 0:
-                sentence = (
-                    f"{geometry / scale:.1e} of the error is that of the geometry, since {sentence}"
-                )
-            message = f"{message}; {sentence}"
+        if self.reached and not reached:
+            message = "the geometry keeps the target out of reach"
+        message = f"{message}; {sentence}" if sentence else message
         seconds = dict(self.solved.solution.seconds)
         earlier = max(last.seconds - sum(seconds.values()), 0.0)
         seconds["coarse"] = seconds.get("coarse", 0.0) + earlier
@@ -294,10 +285,36 @@ class _Loop:
             error,
             judged.mesh / scale if signed else None,
             judged.grading / scale if signed else None,
-            geometry / scale if np.isfinite(geometry) else 1.0,
+            geometry if np.isfinite(geometry) else 1.0,
             judged.order,
             bounded(self.solved, self.quantity, value) if self.bound else None,
             reached,
             message,
             tuple(self.levels),
         )
+
+    def _shape(self) -> tuple[float, str]:
+        """The relative error that no mesh removes, since the shape of guessed boundaries is not
+        known, and that of surfaces that overlap is not either; and a sentence on them.
+        """
+        assert self.solved is not None
+        value, geometry, said = self.reading.value, 0.0, []
+        if self.vain or self.reading.missing:
+            return 0.0, ""
+        try:
+            guessed, sentence = self.search.geometry(value, self.states)
+        except InputError as failure:
+            log.info("the other shape of guessed boundaries was not solved: %s", failure)
+            guessed, sentence = 0.0, ""
+        if sentence:
+            geometry = guessed / (abs(value) or 1.0)
+            part = f"{geometry:.1e} of the error is that of the geometry, since "
+            said.append(f"{part if geometry > 0 else ''}{sentence}")
+        overlap = overlap_share(self.solved.reduction, self.solved.solution)
+        if overlap > NEGLIGIBLE:
+            said.append(
+                f"{overlap:.1e} of the error is that of small displacements, since curved surfaces"
+                " overlap as they are drawn, and their areas differ by as much"
+            )
+            geometry += overlap
+        return geometry, "; ".join(said)

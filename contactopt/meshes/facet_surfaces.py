@@ -9,7 +9,8 @@ on a sphere or on a cylinder. Every other region is a patch of quadratic triangl
 where d_ij leads from the middle of an edge to the surface: to the node there, of elements of second
 order; for others by the normals n at its ends, d = n ((n_j - n_i) . (x_j - x_i)) / 8, which a
 quadratic fits to the nodes around a vertex, or which are those of a flat facet there. Points in the
-plane of a flat facet at an edge of the body stay in it.
+plane of a flat facet at an edge of the body stay in it. The two terms of d are what each end tells;
+where these differ, the smaller one gives the other shape that the surface may have.
 
 Source: Nagata (2005), Simple local interpolation of surfaces using normal vectors, Computer Aided
 Geometric Design 22.
@@ -35,6 +36,7 @@ FEWEST = 6  # any so many nodes may lie on a sphere or cylinder
 SAMPLE = 1000  # nodes to which spheres and cylinders are fitted
 NEAREST = 16  # triangles among which the one nearest to a point is looked for
 ALTERNATE = 60  # projections on a surface and on a plane in turn
+SAME = 1e-3  # relative difference of what two ends tell that rounding of files makes
 TRIED = 4  # of these triangles on whose patches a point may lie
 FOOTS = 6  # projections on the triangle below a point of its patch, which gain a digit each
 STRETCHED = 10.0  # times the way to the surface that the way to it within a plane may be
@@ -46,11 +48,13 @@ def space_curves(mesh: Any) -> dict[str, Curve | None]:
     """By the name of each boundary of a solid's mesh, '' for what has none, its surface, or None
     where it is flat.
     """
-    skin, found = _Skin(mesh), dict[str, Curve | None]()
+    skin, found = _Skin(mesh), dict[str, Any]()
     for name, label, mine in shares(mesh, skin.owner):
         found[name] = None
         if np.any(skin.region[mine] >= 0):
-            found[name] = Curve(_Patches(skin, mine), skin.known, label)
+            found[name] = Curve(_Patches(skin, mine, skin.off), skin.known, label)
+            if np.any(skin.other[:, :, mine] != skin.off[:, :, mine]):
+                found[name].other = _Patches(skin, mine, skin.other)
     return found
 
 
@@ -59,7 +63,8 @@ class _Skin:
 
     nodes    (3, t) their corners;   owner  (t,) the facet of the mesh
     corners  (3, 3, t) places of the corners
-    off      (3, 3, t) from the middles of edges 01, 12, 20 to the surface
+    off      (3, 3, t) from the middles of edges 01, 12, 20 to the surface;   other  to its other
+             shape
     planes   (3, 3, t) normals of flat triangles beyond these edges, nan where the body has no edge
     region   (t,) the number of the region, -1 of flat triangles
     shapes   of each region its sphere or cylinder, or None
@@ -90,6 +95,7 @@ class _Skin:
         self.region[~flat] = np.unique(self.region[~flat], return_inverse=True)[1]
         self.shapes = [self._shape(region) for region in range(self.region.max(initial=-1) + 1)]
         free = np.array([shape is None for shape in self.shapes] + [False])[self.region]
+        self.other = self.off.copy()
         if not self.known:
             given = np.full((3, self.nodes.max() + 1), np.nan)
             for here, there in ((0, 1), (1, 0)):  # a flat facet that a curved one continues
@@ -140,8 +146,15 @@ class _Skin:
             normals = _vertex_normals(places, self.nodes[:, mine], self.normals[:, mine], given)
             at = normals[:, self.nodes[:, mine]]
             mean = _between(at) / np.linalg.norm(_between(at), axis=0)
-            bend = np.sum(_along(at) * _along(self.corners[:, :, mine]), axis=0)
-            self.off[:, :, mine] = mean * bend / 8
+            along = _along(self.corners[:, :, mine])
+            told = np.stack(
+                [-np.sum(n * along, axis=0) / 4 for n in (at, -np.roll(at, -1, axis=1))]
+            )
+            self.off[:, :, mine] = mean * told.mean(axis=0)
+            alike = np.ptp(told, axis=0) <= SAME * np.abs(told).max(axis=0)
+            least = np.where(np.prod(told, axis=0) > 0, np.abs(told).min(axis=0), 0.0)
+            least = np.where(alike, told.mean(axis=0), np.sign(told[0]) * least)
+            self.other[:, :, mine] = mean * least
 
 
 def _between(corners: np.ndarray) -> np.ndarray:
@@ -265,8 +278,8 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
 class _Patches:
     """The surface of some of the triangles."""
 
-    def __init__(self, skin: _Skin, mine: np.ndarray) -> None:
-        self.corners, self.off = skin.corners[:, :, mine], skin.off[:, :, mine]
+    def __init__(self, skin: _Skin, mine: np.ndarray, off: np.ndarray) -> None:
+        self.corners, self.off = skin.corners[:, :, mine], off[:, :, mine]
         self.planes = skin.planes[:, :, mine]
         self.rims = _in_planes(self.off, self.planes)
         self.region, self.shapes, self.near = skin.region[mine], skin.shapes, skin.near

@@ -24,7 +24,10 @@ class Curve:
         was guessed from the nodes of a polygon.
     name : What messages call it.
     given : Whether the user gave it, so that it may not be that of the mesh.
+    other : The other shape that a guess may have, a function of points; None where it has none.
     """
+
+    other: Callable[[np.ndarray], np.ndarray] | None = None
 
     def __init__(
         self,

@@ -116,6 +116,8 @@ _ = ax.axis("off")
 #
 # $$ |r_t| \le g, \qquad u_t \ne 0 \;\Rightarrow\; r_t = -g\, \frac{u_t}{|u_t|} . $$
 #
+# (Friction opposes a velocity. Chapter 5 shows why the law of a step asks for $u_t$.)
+#
 # If the friction force is below its bound, the node does not move: it *sticks*. If the node moves,
 # it *slips*. Then the friction force has reached its bound and points against the slip. The two
 # programs in `cvxpy`:
@@ -445,6 +447,9 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
 # mechanics. `hint("2.1")` gives a hint, three times, and then the solution. `table(2)` shows what
 # you have done since the notebook was started.
+#
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
 #
 # **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1.2, 2.5)$ mm/N, $q = (-1.5, 1.1)$ mm and
 # $\mu = 0.3$. Find the normal force and the friction force.

@@ -342,7 +342,7 @@ ax.axhline(np.linalg.cond(Q_c), color="C0", ls="--", lw=1)
 ax.text(4e4, 2e5, "displacements", color="C3", ha="right")
 ax.text(4, 6, "forces", color="C0")
 ax.text(1.2, 1.2 * np.linalg.cond(Q_c), "forces, exact floor", color="C0")
-ax.set(xlabel="spring of one node $k_p$ [N/mm]", ylabel="condition number [-]")
+_ = ax.set(xlabel="spring of one node $k_p$ [N/mm]", ylabel="condition number [-]")
 
 # %% [markdown]
 # So a code that works with displacements pays for a stiff penalty, and a code that works with forces
@@ -392,6 +392,9 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
 # mechanics. `hint("3.1")` gives a hint, three times, and then the solution. `table(3)` shows what
 # you have done since the notebook was started.
+#
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
 #
 # **3.1** (Pen and paper.) The ends of the string are only 0.07 mm above the floor. At which
 # distance from the end does the contact begin?

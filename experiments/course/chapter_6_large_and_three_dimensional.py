@@ -312,8 +312,8 @@ assert products[8][1] < 1.6 * products[4][1]
 # by sums over all pairs of different nodes. The weight of a pair depends only on its distance $l$.
 # A matrix whose rows are shifted copies of each other is a *circulant*. Its eigenvectors are the waves,
 # and its eigenvalues are called its *symbol*. For small $l$ the weight is proportional to $1 / l^2$, so
-# we write it as $(\pi / 2m)^2 / \sin^2 (\pi l / 2m)$. By the sum in step 1, which for $2m$ nodes is
-# exact too, the symbol is
+# we write it as $(\pi / 2m)^2 / \sin^2 (\pi l / 2m)$. The sum over all
+# $l$ from 0 is $2 m j$, by Parseval as in step 1, and its first term is $j^2$. So the symbol is
 #
 # $$ 2 \Bigl(\frac{\pi}{2m}\Bigr)^2 \sum_{l = 1}^{2m - 1} \frac{\sin^2 (\pi j l / 2m)}{\sin^2 (\pi l / 2m)} = \frac{\pi^2}{2 m^2}\, j\, (2m - j), \qquad 0 \le j \le m . $$
 #
@@ -342,7 +342,8 @@ assert products[8][1] < 1.6 * products[4][1]
 # A displacement that vanishes at the ends of the contact is continued smoothly enough. Another one
 # gets a jump. In the double integral, the pairs with one point inside and one outside add a multiple
 # of $\int |u|^2 / \text{(distance to the end)}$. On a mesh this is at most $\max |u|^2$ times $\log N$.
-# And the maximum is bounded by the seminorm, up to another logarithm:
+# Continue $u$ by its mirror image instead, so that there is no jump. The maximum is bounded by the
+# seminorm of this function, up to another logarithm:
 #
 # $$ \max |u| \le |u_0| + \sum_{k \ne 0} |u_k| \le |u_0| + \Bigl( \sum_{0 < |k| \le N} \frac{1}{|k|} \Bigr)^{1/2} |u| \;\lesssim\; |u_0| + (2 \log N)^{1/2}\, |u| . $$
 #
@@ -370,10 +371,10 @@ def circulant(symbol):
 
 def sparse_seminorm(m):
     """First column of equation (27), for m a power of two."""
-    column, l = np.zeros(2 * m), np.arange(1, m)
+    column, distance = np.zeros(2 * m), np.arange(1, m)
     for i in range(1, int(np.log2(m)) + 1):
-        group = (l >= 2 ** (i - 1)) & (l < 2**i)
-        column[[2**i - 1, 1 - 2**i]] = -np.sum(1.0 / l[group] ** 2)
+        group = (distance >= 2 ** (i - 1)) & (distance < 2**i)
+        column[[2**i - 1, 1 - 2**i]] = -np.sum(1.0 / distance[group] ** 2)
     column[0] = -column.sum()
     return column
 
@@ -506,6 +507,9 @@ assert difference > 0.1
 # mechanics. `hint("6.1")` gives a hint, three times, and then the solution. `table(6)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **6.1** (Pen and paper.) A contact surface has $120 \times 80$ nodes in 3D. How many gigabytes
 # ($10^9$ bytes) does $Q$ take as an array of numbers of 8 bytes?
 
@@ -524,7 +528,8 @@ check("6.2", answer)
 # %% [markdown]
 # **6.3** (Program.) By which factor does the peak pressure under the sphere grow when the load
 # grows from 100 N to 260 N? Solve the half-space with 260 N to find the factor. (Make the grid wide
-# enough.) Hertz's exact solution grades your answer.
+# enough.) Hertz's exact solution grades your answer,
+# and 1 percent is close enough.
 
 # %% tags=["exercise"]
 answer = ...  # peak at 260 N / peak at 100 N
