@@ -32,7 +32,6 @@ POLISH = 10  # proximal steps for the last digits, each so many of which must ha
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 SPARSE_ROUND = 100  # of the first of a sparse Q, where random forces lead nowhere
 PATHS = 3  # interior-point paths drawn at random before each proximal loop of a sparse Q
-TURNING = 1000  # linear systems of the first path that turns back
 EAGER_ALPHA = 1e-2  # weight with which the eager loop begins
 GENTLE_ALPHA = 0.1  # weight with which the gentle loop begins
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
