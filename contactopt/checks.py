@@ -199,3 +199,26 @@ def said_once() -> Iterator[None]:
             logger.addFilter(new)
             after.callback(logger.removeFilter, new)
         yield
+
+
+@contextmanager
+def overheard() -> Iterator[list[str]]:
+    """Collect what the package warns of within the block, each sentence once, in a list that grows
+    as it runs. Who listens already goes on hearing it.
+    """
+    told: list[str] = []
+
+    def hear(record: logging.LogRecord) -> None:
+        if (text := record.getMessage()) not in told:
+            told.append(text)
+        if not others and not logging.getLogger().handlers and logging.lastResort is not None:
+            logging.lastResort.handle(record)
+
+    logger, handler = logging.getLogger("contactopt"), logging.Handler(logging.WARNING)
+    others = list(logger.handlers)
+    handler.emit = hear  # type: ignore[method-assign]
+    logger.addHandler(handler)
+    try:
+        yield told
+    finally:
+        logger.removeHandler(handler)

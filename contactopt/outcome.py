@@ -58,7 +58,8 @@ class Outcome:
         return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
 
     def _repr_html_(self) -> str:
-        return card(f"{self.scene.name}, {self.scene.friction}", summary_rows(self.summary))
+        notes = {f"note {n}": text for n, text in enumerate(self.summary["remarks"], 1)}
+        return card(f"{self.scene.name}, {self.scene.friction}", summary_rows(self.summary) | notes)
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -80,6 +81,11 @@ def squeeze(t: np.ndarray) -> np.ndarray:
     return t[:, 0] if t.shape[1] == 1 else t
 
 
+def _number(value: float | None, form: str = ".6g") -> str:
+    """A number in words; None stands for one that is not finite."""
+    return "unknown" if value is None else f"{value + 0.0:{form}}"
+
+
 def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     """The numbers of a run in words and with units, for a terminal, a page or a notebook."""
     length, stress = summary["units"]
@@ -88,13 +94,13 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     by = f" with {' and '.join(sorted(used))}" if used else ""
     rows = {
         "status": f"{summary['status']}: {summary.get('message')}",
-        "residual (certificate)": f"{summary['residual']:.2e}",
+        "residual (certificate)": _number(summary["residual"], ".2e"),
         "unknowns of the bodies": str(summary["dofs"]),
         "contacts": str(summary["contact_nodes"]),
         "friction coefficient": f"{summary['mu']:g}",
         "method": f"{summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
-        "sum of the normal forces": f"{summary['normal_force']:.6g} {newton}",
-        "largest pressure": f"{summary['max_pressure']:.6g} {stress}",
+        "sum of the normal forces": f"{_number(summary['normal_force'])} {newton}",
+        "largest pressure": f"{_number(summary['max_pressure'])} {stress}",
     }
     if summary["q"] == "implicit":
         rows["Q"] = f"{summary['products']} products with vectors"
@@ -104,13 +110,14 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
         pair = summary["pairs"][name]
         rows[f"contact '{name}'"] = (
             f"force on the upper body {force} {newton}; largest pressure"
-            f" {pair['max_pressure']:.6g} {stress}; contact area {pair['contact_area']:.6g}"
-            f" {length}^2{depth}; {pair['open']} open, {pair['stick']} stick,"
-            f" {pair['slip']} slip; coupled by {pair['coupling']} because {pair['coupled_because']}"
+            f" {_number(pair['max_pressure'])} {stress}; contact area"
+            f" {_number(pair['contact_area'])} {length}^2{depth}; {pair['open']} open,"
+            f" {pair['stick']} stick, {pair['slip']} slip; coupled by {pair['coupling']} because"
+            f" {pair['coupled_because']}"
         )
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:
-            rows[words] = f"{summary[key]:.6g} {length}"
+            rows[words] = f"{_number(summary[key])} {length}"
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
         rows[found["quantity"]] = (

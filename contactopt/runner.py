@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.cards import count
-from contactopt.checks import meant, said_once
+from contactopt.checks import meant, overheard, said_once
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
-from contactopt.figures.output import PAGE, draw, earlier_files, write
+from contactopt.figures.output import PAGE, draw, earlier_files, not_drawable, write
 from contactopt.figures.style import FORMATS
-from contactopt.files.writing import check_folder, whole_folder
+from contactopt.files.writing import check_folder, finite, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
+from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
 from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
@@ -31,13 +31,12 @@ from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks
 from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import validity
+from contactopt.readings.validity import check_possible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
-from contactopt.solving.limits import Limits
-from contactopt.solving.progress import resident_memory
+from contactopt.solving.limits import Limits, too_large
 from contactopt.solving.restart import FILE, Restart, make_restart
 from contactopt.solving.solve_scene import Options, Solved
 
@@ -125,6 +124,18 @@ def run(
     ------
     InputError : with a sentence that says what to do; nothing is left half-written
     """
+    with overheard() as told, collected() as noted:
+        return _run(scene, out, note, changes, lambda: (*told, *noted))
+
+
+def _run(
+    scene: str | Path | Scene,
+    out: str | Path | None,
+    note: Note,
+    changes: dict[str, Any],
+    told: Callable[[], tuple[str, ...]],
+) -> Result:
+    """As run(); `told` gives the remarks that were made so far outside of the solution."""
     start = time.perf_counter()
     file = _scene_file(scene, changes)
     options, changes = choose(changes, {} if file is None else file.solve)
@@ -145,17 +156,19 @@ def run(
             states, solved = _simplest(states, how)
         if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
-        result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
+        names = (name, *method.backends(states[-1].dim))
+        result = _result(solved, estimate, names, told())
         if options.read:
             from contactopt.accuracy.indicators import read_once  # with the room of derivatives
 
             with _clock(result.summary["seconds"], "quantities"):
-                result.summary["quantities"] = {one: read_once(solved, one) for one in options.read}
+                found = {one: read_once(solved, one) for one in options.read}
+                result.summary["quantities"] = finite(found)
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note, restart)
     except MemoryError as error:
         restart.stopped(note)
-        raise InputError(_too_large(states[-1], str(error))) from error
+        raise InputError(too_large(states[-1], str(error))) from error
     except KeyboardInterrupt:
         restart.stopped(note)
         raise
@@ -267,18 +280,15 @@ def _solved(
     )
 
 
-def _too_large(scene: Scene, why: str) -> str:
-    """The sentence for a run that took all the memory there was."""
-    bodies = count(len(scene.parts), "body", "bodies")
-    held = f"{resident_memory() / 1e9:.2g} GB were taken when more was asked for"
-    return (
-        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than"
-        f" there is: {held}{f' ({why})' if why else ''}; take fewer elements."
-    )
-
-
-def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, str]) -> Result:
-    """The result with the fields of the bodies; `names` are of the method and its backends."""
+def _result(
+    solved: Solved,
+    estimate: Estimate | None,
+    names: tuple[str, str, str],
+    told: tuple[str, ...] = (),
+) -> Result:
+    """The result with the fields of the bodies; `names` are of the method and its backends, and
+    `told` are remarks made before.
+    """
     reduction, solution = solved.reduction, solved.solution
     seconds = dict(solution.seconds)
     with _clock(seconds, "recover"):
@@ -288,6 +298,9 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
             summary["remarks"] += corner_remarks(reduction, solution)
+    noted = [solution] if solved.path is None else solved.path.solutions
+    every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
+    summary["remarks"] = list(dict.fromkeys(every))
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
@@ -295,7 +308,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
         summary |= {key: float(solved.path.history[key][-1]) for key in keys}
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
-    summary["seconds"] = seconds
+    summary = finite(summary) | {"seconds": seconds}
     return Result(
         reduction.scene, reduction, solution, fields, solved.zones, summary, solved.path, estimate
     )
@@ -310,6 +323,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
+    check_possible(limits)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
@@ -344,8 +358,8 @@ def _smoothed(peak: Reading, largest: float) -> list[str]:
     if abs(largest - peak.value) <= APART * abs(largest):
         return []
     return [
-        f"the largest pressure at a node is {largest:.4g}, what its"
-        f" neighbours let expect is {peak.value:.4g}, give or take"
+        f"the largest pressure at a node is {largest:.4g}, and its"
+        f" neighbours suggest {peak.value:.4g}, give or take"
         f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
     ]
 
@@ -363,6 +377,9 @@ def _written(
     if out is None:
         seconds["total"] = time.perf_counter() - start
         return result
+    if (options.figures or options.html) and (beyond := not_drawable(result)):
+        options = replace(options, figures=(), html=False)
+        result.summary["remarks"].append(beyond)
     note("drawing figures, writing files" if options.figures else "writing files")
     with whole_folder(out, earlier_files(Path(out))) as folder:
         if options.figures:
@@ -370,8 +387,8 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder)
-            states = [result] if result.path is None else result.path.states
-            restart.ended(result.reduction, [state.solution for state in states])
+            found = [result.solution] if result.path is None else result.path.solutions
+            restart.ended(result.reduction, found)
             restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")

@@ -104,6 +104,7 @@ def test_every_reason_of_refusal_is_said_once_with_its_number():
     assert refusals(table) == [f"2 runs were refused: {missing}", "1 run was refused: no"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_a_browser_sorts_and_filters_the_runs_and_follows_links(campaign):
     with Browser(campaign / "report.html", 400) as browser:

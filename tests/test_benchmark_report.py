@@ -272,6 +272,7 @@ def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, 
     assert words in error and "small.toml" in error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
 def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch):
     """Every experiment can be read in both versions, and its report says what its table says.

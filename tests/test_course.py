@@ -143,9 +143,9 @@ def test_no_answer_raises_or_passes_by_its_size(number):
         assert not grade(number, tried).right, tried
 
 
-def test_there_are_sixty_exercises_in_three_levels():
+def test_there_are_sixty_eight_exercises_in_three_levels():
     levels = [exercise(number).level for number in NUMBERS]
-    assert len(NUMBERS) == 60 and set(levels) == {1, 2, 3}
+    assert len(NUMBERS) == 68 and set(levels) == {1, 2, 3}
     assert min(levels.count(level) for level in (1, 2, 3)) >= 12
     kinds = {type(right_answer(number)) for number in NUMBERS}
     assert kinds == {Numbers, Open, State, Forces, Displacements}

@@ -449,3 +449,27 @@ def test_the_degree_is_that_of_the_mesh_whichever_way_it_comes(tmp_path, order):
     # beam of Euler and Bernoulli with plane strain: F l^3 / (3 E' I)
     exact = 0.01 * 6**3 / (3 * 1000 / (1 - 0.09) / 12)
     assert 0.9 < tips[0] / exact < 1.1 if order == 2 else tips[0] / exact < 0.6
+
+
+def test_a_mix_of_elements_is_told_with_groups_that_are_none(tmp_path):
+    text = (
+        SQUARE
+        + "5,2,0\n*ELEMENT, TYPE=CPE4, ELSET=FOUR\n1,1,2,3,4\n*ELEMENT, TYPE=CPE3, ELSET=THREE"
+    )
+    path = tmp_path / "deck.inp"
+    path.write_text(text + "\n2,2,5,3\n*ELSET, ELSET=MIX\n1,2\n")
+    with pytest.raises(InputError, match=r"choose one of its groups: FOUR, THREE\.$"):
+        load_mesh(path)
+    with pytest.raises(InputError, match=r"make all of one type\.$"):
+        load_mesh(path, "MIX")
+    path.write_text(
+        text.replace("ELSET=FOUR", "ELSET=A").replace("ELSET=THREE", "ELSET=A") + "\n2,2,5,3\n"
+    )
+    with pytest.raises(InputError, match=r"make all of one type\.$"):
+        load_mesh(path)
+
+
+def test_facets_inside_a_body_are_told(tmp_path, caplog):
+    (tmp_path / "deck.inp").write_text(GROWN + "*SURFACE, NAME=S\n1, S1\n1, S2\n")
+    assert measure(load_mesh(tmp_path / "deck.inp"), "S") == pytest.approx(1.0)
+    assert "1 facets of S lie inside the body" in caplog.text

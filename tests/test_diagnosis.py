@@ -360,3 +360,138 @@ def test_forces_that_are_not_unique_have_no_condition():
     assert amplification(shared, r, lam) > 1e12
     loose = InterfaceProblem(np.eye(4), -r, 0.0, free, [-2.0, 0.0])
     assert amplification(loose, r, np.zeros(2)) < 10
+
+
+def any_problem(seed: int) -> InterfaceProblem:
+    """1 to 3 contacts in the plane or in space; Q definite, unsymmetric or semidefinite."""
+    rng = np.random.default_rng(seed)
+    dim, k = int(rng.integers(2, 4)) if seed % 3 == 0 else 2, int(rng.integers(1, 4))
+    n, kind = k * dim, seed % 4
+    A, skew = rng.normal(size=(n, n)), rng.normal(size=(n, n))
+    Q = A @ A.T / n + 0.05 * np.eye(n)
+    if kind == 1:
+        Q += rng.choice([1e-4, 0.1, 0.5]) * (skew - skew.T)
+    if kind == 2:
+        A = A[:, : max(1, n - 2)]
+        Q = A @ A.T / n
+    plate = int(rng.integers(0, 2)) if k > 1 else 0
+    V = np.zeros((n, plate))
+    V[::dim] = 1.0
+    mu = rng.choice([0.0, 0.3, 0.7, 1.5], size=k)
+    return InterfaceProblem(Q, rng.normal(size=(k, dim)), mu, V, np.full(plate, -1.0))
+
+
+def with_friction(problem: InterfaceProblem, largest: float, q: np.ndarray | None = None):
+    """The problem with all coefficients scaled together, as thresholds mean it."""
+    mu, top = problem.mu, problem.mu.max()
+    return changed(problem, mu / top * largest if top > 0 else np.full(len(mu), largest), q)
+
+
+def forces(problem: InterfaceProblem) -> list[np.ndarray]:
+    return [s.reactions for s in all_solutions(problem)]
+
+
+def kinds_of_load(problem: InterfaceProblem, rng: np.random.Generator):
+    """Loads at random, and those under which all contacts slip one way with random forces."""
+    for _ in range(2):
+        yield rng.normal(size=problem.q.shape)
+    k = problem.contacts
+    for way in (1.0, -1.0):
+        r_n = rng.exponential(size=k)
+        # the plate's force is given
+        r_n *= -problem.s[0] / r_n.sum() if len(problem.s) else 1.0
+        r = np.stack([r_n, -way * problem.mu * r_n], axis=1)
+        u = np.stack([np.zeros(k), way * rng.exponential(size=k)], axis=1)
+        yield u - (problem.Q @ r.ravel()).reshape(k, 2)
+
+
+def number_after(text: str, words: str) -> float | None:
+    """The number that follows these words, if they are there."""
+    _, found, rest = text.partition(words)
+    return float(rest.split()[0].strip(";,)")) if found else None
+
+
+def check_uniqueness(problem: InterfaceProblem, said: str, seed: int) -> None:
+    """Below the guaranteed threshold every load has one solution; where it is lost some has
+    another.
+    """
+    rng = np.random.default_rng(seed)
+    exact = number_after(said, "if and only if mu < ")
+    sure = exact or number_after(said, "for every load if mu < ")
+    if sure and problem.dim == 2:
+        below = with_friction(problem, min(0.999 * sure, 50.0))
+        for q in kinds_of_load(below, rng):
+            assert len(all_solutions(changed(below, below.mu, q))) == 1, (seed, said)
+    lost = exact or number_after(said, "lost for some load at mu = ")
+    if lost and np.isfinite(lost) and lost < 1e3 and problem.dim == 2:
+        # beyond it the slipping solution's index changes sign, so there are others
+        above = with_friction(problem, 1.01 * lost)
+        counts = []
+        for _ in range(4):
+            loads = list(kinds_of_load(above, rng))[2:]
+            counts += [len(all_solutions(changed(above, above.mu, q))) for q in loads]
+        assert max(counts) != 1 or min(counts) != 1, (seed, said, counts)
+
+
+def check_iterations(problem: InterfaceProblem, said: str, method, seed: int) -> None:
+    sure = number_after(said, "for every load if mu < ")
+    if sure:
+        q = np.random.default_rng(seed).normal(size=problem.q.shape)
+        loaded = with_friction(problem, min(0.98 * sure, 20.0), q)
+        assert solve(loaded, method, max_iterations=2000, tol=1e-6).solved, (seed, said)
+
+
+def check_relaxation(problem: InterfaceProblem, said: str, seed: int) -> None:
+    """Tight: some solution of Coulomb's problem is one of the cone program, u_n >= mu |u_t| and
+    r . u = 0; not tight: none is.
+    """
+    if said not in ("tight", "not tight") or problem.dim > 2:
+        return
+    shared = False
+    for found in all_solutions(problem):
+        u = problem.displacements(found.reactions, found.multipliers)
+        dual = u[:, 0] - problem.mu * np.abs(u[:, 1]) >= -1e-7
+        shared |= bool(dual.all() and abs(np.sum(found.reactions * u)) < 1e-7)
+    assert shared == (said == "tight"), seed
+
+
+def check_states(problem: InterfaceProblem, solution: Solution, said: str, seed: int) -> None:
+    """Counts of states, against forces and displacements; the bound of the error, against a
+    solution of all digits.
+    """
+    r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
+    touching = r[:, 0] > 1e-6
+    slipping = touching & (np.linalg.norm(u[:, 1:], axis=1) > 1e-6)
+    smooth = touching & (problem.mu == 0)
+    slipping &= ~smooth
+    sticking = touching & ~slipping & ~smooth
+    counts = [sticking.sum(), slipping.sum(), (~touching).sum(), smooth.sum()]
+    told = [int(part.split()[0]) for part in said.split(": ")[1].split(";")[0].split(", ")]
+    assert [*told, 0][:4] == counts, (seed, said)
+
+
+def test_five_hundred_statements_are_true():
+    """Each line that `diagnose` prints, by enumeration, by the iterations, and by NumPy."""
+    tried = 0
+    for seed in [*range(100), 410]:
+        problem = any_problem(seed)
+        lines = str(diagnose(problem)).splitlines()
+        singular = np.linalg.svd(problem.Q)[1]
+        rank = int(lines[1].split()[2])
+        assert rank == np.linalg.matrix_rank(problem.Q), seed
+        assert number_after(lines[1], "condition ") == pytest.approx(
+            singular[0] / singular[rank - 1], rel=0.06
+        ), seed
+        least = np.linalg.eigvalsh((problem.Q + problem.Q.T) / 2)[0]
+        assert ("not positive semidefinite" in lines[1]) == (least < -1e-12), seed
+        check_uniqueness(problem, lines[2], seed)
+        check_iterations(problem, lines[3], Tresca(), seed)
+        check_iterations(problem, lines[4], Alternating(), seed)
+        check_relaxation(problem, lines[5].split(": ")[1], seed)
+        tried += 6
+        answer = solve(problem, tol=1e-11)
+        if answer.solved:
+            said = str(diagnose(problem, answer)).splitlines()[6:]
+            check_states(problem, answer, said[0], seed)
+            tried += 2
+    assert tried > 500

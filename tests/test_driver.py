@@ -259,3 +259,33 @@ def test_the_default_method_gives_the_best_point_that_it_met():
     assert found.residual == min(row["residual"] for row in found.history) < 1e-13
     assert natural_map_residual(problem, found.reactions, found.multipliers) == found.residual
     assert max(row["residual"] for row in found.history[-5:]) > found.residual
+
+
+def problems_of_the_clock() -> dict[str, InterfaceProblem]:
+    """A problem of each end: solved by Newton's steps, late, without a solution, not decided."""
+    rng = np.random.default_rng(2)
+    B, q = rng.normal(size=(30, 10)), rng.normal(size=(10, 3))
+    q[:, 0] -= 2.0
+    A = rng.normal(size=(16, 8))
+    squeezed = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2))
+    return {
+        "punch": reduce(scenes.flat_punch(2, elements=6, mu=0.3)),
+        "redundant in space": InterfaceProblem(B @ B.T, q, rng.uniform(0.2, 1.0, 10)),
+        "redundant in the plane": InterfaceProblem(A @ A.T, q[:8, :2], 0.5),
+        "squeezed": InterfaceProblem(squeezed, [[-1.0, 0.0], [-1.0, 0.0]], 0.3),
+    }
+
+
+@pytest.mark.parametrize("method", ["auto", "nsgs", "proximal", "tresca"])
+@pytest.mark.parametrize("name", problems_of_the_clock())
+def test_steps_do_not_depend_on_the_clock(name, method, monkeypatch):
+    """A clock that runs a thousand times faster or slower: the same iterates to the last digit."""
+    problem, runs = problems_of_the_clock()[name], []
+    clocks = {each: getattr(time, each) for each in ("perf_counter", "monotonic", "process_time")}
+    for speed in (1.0, 1e3, 1e-3):
+        for each, clock in clocks.items():
+            monkeypatch.setattr(time, each, lambda clock=clock, speed=speed: speed * clock())
+        solution = solve(problem, method, max_iterations=150)
+        steps = [(row["residual"], row["change"]) for row in solution.history]
+        runs.append((solution.status, steps, solution.reactions.tobytes(), solution.notes))
+    assert runs[0] == runs[1] == runs[2]

@@ -93,6 +93,7 @@ def test_a_run_goes_on_from_each_of_its_steps(kind, tmp_path, monkeypatch):
         np.testing.assert_allclose(numbers(again), numbers(whole), rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, step", [("a contact zone", 2), ("a path with an accuracy", 12)])
 def test_a_process_that_is_killed_leaves_a_run_that_goes_on(kind, step, tmp_path):
     name, options = SMALL[kind]

@@ -341,6 +341,7 @@ ON_SCREEN = """(() => {
 })()"""
 
 
+@pytest.mark.slow
 @browser_needed
 @pytest.mark.parametrize("size", [(1280, 720), (400, 800)])
 @pytest.mark.parametrize("name", ROOMS)
@@ -358,6 +359,7 @@ def test_picture_sliders_and_numbers_share_the_screen(name, size, museum, tmp_pa
             assert float(letters.removesuffix("px")) * shown >= 11.5
 
 
+@pytest.mark.slow
 @browser_needed
 @pytest.mark.parametrize("name", ROOMS)
 def test_a_room_can_be_read_and_used(name, museum, tmp_path):

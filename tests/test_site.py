@@ -227,6 +227,7 @@ def test_every_entry_of_every_table_is_on_its_page(reference):
 
 # tests/test_plugins.py runs the page of plug-ins, tests/test_own_mesh_page.py and
 # tests/test_how_tos.py run the pages that need files or build on themselves.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path",
     [path for path in sorted(SITE.glob("*.md")) if path.stem not in {*HOW_TOS, "add_a_plug_in"}],

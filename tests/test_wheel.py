@@ -31,7 +31,9 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """Built from a copy of the sources, so that nothing is left behind in the repository."""
+    """Built from the source distribution of a copy of the sources, so that nothing is left behind in
+    the repository.
+    """
     source = tmp_path_factory.mktemp("source")
     names = [
         *ROOT.joinpath("contactopt").rglob("*"),
@@ -42,7 +44,7 @@ def wheel(tmp_path_factory) -> Path:
             target = source / path.relative_to(ROOT)
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(path.read_bytes())
-    run(sys.executable, "-m", "build", "--wheel", "--outdir", source / "dist", source, cwd=source)
+    run(sys.executable, "-m", "build", "--outdir", source / "dist", source, cwd=source)
     (path,) = (source / "dist").glob("contactopt-*.whl")
     return path
 
@@ -74,6 +76,13 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     code = "import contactopt; print(contactopt.__version__, contactopt.__file__)"
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
     assert version in wheel.name and str(tmp_path) in place
+    user = tmp_path / "user.py"
+    user.write_text(
+        "import contactopt\nreveal_type(contactopt.run('punch-2d').solution.residual)\n"
+    )
+    told = run(sys.executable, "-m", "mypy", "--python-executable", binaries / "python", user,
+               cwd=tmp_path)  # fmt: skip
+    assert '"builtins.float"' in told, "users' type checkers see the types"
 
 
 # what each extra is for, tried in an environment that has this extra alone

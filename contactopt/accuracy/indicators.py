@@ -150,7 +150,7 @@ def _of_shape(
 
 
 def read_once(solved: Solved, name: str) -> dict[str, Any]:
-    """Read a quantity from a solution, with the error that this one mesh lets expect.
+    """Read a quantity from a solution, with an error estimate for this mesh.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def read_once(solved: Solved, name: str) -> dict[str, Any]:
     Returns
     -------
     "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
-        Of a load path it is the error of the last state, after the slip that the states before it
+        For a load path it is the error of the last state, after the slip that the states before it
         found on this mesh. "message" is a sentence where the quantity is infinite or missing.
 
     Raises

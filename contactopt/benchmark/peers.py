@@ -1,4 +1,4 @@
-"""Solvers of others that live in another Python: one process of it answers many problems.
+"""External solvers that live in another Python: one process of it answers many problems.
 
 A peer is a plug-in file with three functions that the other Python runs. They import what they
 need, and use no name from outside themselves. `version()` returns the version of the solver.

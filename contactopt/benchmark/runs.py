@@ -22,7 +22,7 @@ SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method or plug-in with settings, and the solver of others that it calls."""
+    """A method or plug-in with settings, and the external solver that it calls."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)

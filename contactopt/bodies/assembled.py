@@ -35,6 +35,7 @@ class Mesh:
     picked     for each component the sparse matrix (s, n) that takes the body's unknowns to it
     curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the
                mesh stands for; None: the facets are this surface
+    thin       (f,) faces beneath which the body is thin (contactopt.bodies.thickness)
     """
 
     kind: str
@@ -46,6 +47,7 @@ class Mesh:
     held: np.ndarray
     picked: tuple[sp.csr_matrix, ...]
     curve: Callable[[np.ndarray], np.ndarray] | None
+    thin: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from contactopt.bodies.elastic import ElasticBody, condense
 from contactopt.bodies.elements import mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
+from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve, check_curve
 from contactopt.scenes.scene import Part, Scene
@@ -105,7 +106,8 @@ class AssembledElastic(AssembledBody):
         )
         kind = body.basis.mesh.refdom.__name__
         places = body.locations[:, nodes], held[unknowns], tuple(picked)
-        return Mesh(kind, body.degree, trace.faces, outward, body.weight, *places, curve)
+        thin = thin_facets(body.basis.mesh, facets)
+        return Mesh(kind, body.degree, trace.faces, outward, body.weight, *places, curve, thin)
 
     def guides(self) -> Guides:
         """Coordinate planes, the body on one side, that supports hold along the axis alone."""

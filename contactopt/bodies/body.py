@@ -26,7 +26,7 @@ from contactopt.bodies.elements import (
 )
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
-from contactopt.checks import short
+from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, straight
 from contactopt.problem.laws import find_law
@@ -53,8 +53,9 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         laws = [find_law(law) for law in scene.laws_of(part, name)]
         tied = bool(laws) and not any(law.bounded for law in laws)
         facets = np.asarray(mesh.boundaries[name])
+        every = tied or bool(thin_facets(basis.mesh, facets).any())
         copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
-        traces[name] = contact_trace(basis, scene.degree, facets, weight, tied, copied)
+        traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
     return Assembly(
         part.name,
         kind,
@@ -105,10 +106,10 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         or mesh.p.shape[0] != scene.dim
         or mesh.refdom.__name__ not in SHAPES
     ):
+        shapes = ("triangles or quadrilaterals", "tetrahedra or hexahedra")[scene.dim - 2]
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension"
-            f" {scene.dim} made of triangles, quadrilaterals, tetrahedra or hexahedra; got"
-            f" {_words(mesh)}."
+            f" {scene.dim}, of {shapes}; got {_words(mesh)}."
         )
     if not np.all(np.isfinite(mesh.p)):
         raise InputError(
@@ -143,9 +144,9 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
 def _words(mesh: Any) -> str:
     """What a mesh that does not fit is."""
     if not isinstance(mesh, skfem.Mesh):
-        return short(mesh)
-    kind = {1: "on a line", 2: "in a plane", 3: "in space"}[mesh.p.shape[0]]
-    return f"one {kind}, of {mesh.nelements} elements"
+        return type(mesh).__name__
+    where = {1: "on a line", 2: "in a plane", 3: "in space"}[mesh.p.shape[0]]
+    return f"one of {mesh.nelements} elements {where}"
 
 
 def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:

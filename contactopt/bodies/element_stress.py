@@ -13,6 +13,7 @@ from contactopt.scenes.kinds import Kind
 
 # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 BLOCK = 2000
+ROUNDING = 1e-12  # share of |A| |U| below which internal forces A U are rounding
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
@@ -22,19 +23,23 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
     internal = body.A @ U
     missing = internal - body.load - force
     plates = body.motion.T @ missing - body.plate_forces
-    sizes = (
-        np.abs(part).sum()
-        for part in (force, body.load, body.plate_forces, np.delete(internal, body.free))
-    )
-    size = max(sizes)
+    applied = max(np.abs(part).sum() for part in (force, body.load, body.plate_forces))
+    size = max(applied, np.abs(np.delete(internal, body.free)).sum())
     unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
+    if applied == 0 and size <= ROUNDING * float((abs(body.A) @ np.abs(U)).sum()):
+        unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
     gradient = _middle_gradient(body.basis, U)
     turned = gradient.swapaxes(1, 2)
-    strain = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(initial=0.0)
+    strains = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(axis=1)
+    mean = np.sqrt(np.average(strains**2, weights=np.sum(body.basis.dx, axis=1)))
     rotation = np.linalg.norm(gradient - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
     moved = float(np.abs(U).max(initial=0.0))
     return Validity(
-        unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved
+        unbalanced / size if size > 0 else unbalanced,
+        float(strains.max()),
+        float(rotation),
+        moved,
+        float(mean),
     )
 
 

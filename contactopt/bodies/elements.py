@@ -50,11 +50,11 @@ FACES = {
     "RefTet": (*_TRIANGLE, np.array([[0, 1, 2]])),
     "RefHex": (*_SQUARE, np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])),
 }
-# cells whose nodes are all those of a quadratic face: a tied surface must leave no node of it
-# behind
+# cells whose nodes are all those of a quadratic face: a surface that is tied, or that of a thin
+# body, must leave no node of it behind
 TIED = {
     "RefTri": FACES["RefQuad"][3],
-    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]),
+    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
 }
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
 NOISE = 1e-14  # what rounding leaves of a zero
@@ -176,19 +176,19 @@ def contact_trace(
     degree: int,
     boundary: np.ndarray,
     weight: Weight,
-    tied: bool = False,
+    every: bool = False,
     copied: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Trace:
     """The trace of the displacement on a boundary of facets (f,), with the measure `weight`. If
-    `tied`, every node of the boundary is a contact, as where it is tied to another body. Nodes at
-    corners are `copied` (contactopt.bodies.corners.copies).
+    `every`, every node of the boundary is a contact, as where it is tied to another body, or thin.
+    Nodes at corners are `copied` (contactopt.bodies.corners.copies).
     """
     name = basis.mesh.refdom.__name__
     places, cells = FACES[name][2:]
     if degree == 1:
         cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
-    elif tied:
+    elif every:
         cells = TIED.get(name, cells)
     # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape
     # functions at all of them.

@@ -75,12 +75,14 @@ class Validity(NamedTuple):
     strain     largest principal strain, and rotation  largest rotation [rad], in the middle of an
                element
     moved      largest displacement [length]
+    mean_strain  root mean square of the largest principal strains over the body
     """
 
     imbalance: float = 0.0
     strain: float = 0.0
     rotation: float = 0.0
     moved: float = 0.0
+    mean_strain: float = 0.0
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

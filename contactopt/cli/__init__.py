@@ -63,9 +63,11 @@ def _logging(verbose: int, quiet: bool) -> Iterator[None]:
     logger = logging.getLogger("contactopt")
     before, handler = logger.level, logging.StreamHandler()
     handler.setFormatter(logging.Formatter("  %(name)s: %(message)s"))
+    if quiet:  # what is not printed is still a remark of the summary
+        handler.setLevel(logging.ERROR)
+    elif verbose:
+        logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
     if verbose or quiet:
-        logger.setLevel(logging.ERROR if quiet else logging.INFO if verbose == 1 else logging.DEBUG)
-    if verbose:
         logger.addHandler(handler)
     try:
         yield

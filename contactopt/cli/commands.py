@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.cards import count
+from contactopt.checks import overheard
 from contactopt.errors import InputError
+from contactopt.files.toml_table import parse
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -25,7 +27,7 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
         if not sign or not name:
             raise InputError(f"--set needs NAME=VALUE, as in --set width=30; got {text!r}.")
         try:
-            found[name] = tomllib.loads(f"value = {value}")["value"]
+            found[name] = parse(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             found[name] = value
     return found
@@ -165,8 +167,9 @@ def check(options: argparse.Namespace) -> int:
     from contactopt.figures.scene_check import check_scene
     from contactopt.runner import states_of
 
-    states, solve = states_of(options.scene, **_arguments_of(options.set))
-    found = check_scene(states, solve)
+    with overheard() as told:
+        states, solve = states_of(options.scene, **_arguments_of(options.set))
+    found = check_scene(states, solve, told)
     print(found.text)
     if options.no_page:
         return 0

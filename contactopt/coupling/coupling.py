@@ -135,7 +135,7 @@ def _tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, Assemble
         f" '{bodies[found.side].name}' wrong forces, by {found.error:.2g} of a node's near"
         f" ({where})"
     )
-    return replace(made, remarks=(said,))
+    return replace(made, remarks=(*made.remarks, said))
 
 
 def _kind(name: str) -> Callable[..., Coupling]:

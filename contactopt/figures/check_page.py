@@ -51,7 +51,9 @@ def write_mesh_page(
     InputError if the file cannot be written.
     """
     dim = len(next(iter(meshes.values())).p)
-    own: Any = SimpleNamespace(name=name, units=("length", "stress"), dim=dim, kind="solid")
+    own: Any = SimpleNamespace(
+        name=name, units=("length", "stress"), dim=dim, analysis=KINDS["solid"]
+    )
     own.components = KINDS["solid"].components[:dim]
     roles = [
         "none",

@@ -16,6 +16,7 @@ from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.motions import kernel, whole_motions
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
+from contactopt.checks import overheard
 from contactopt.coupling.compliance import filling
 from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling
@@ -65,19 +66,23 @@ class SceneCheck:
     text: str
 
 
-def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) -> SceneCheck:
+def check_scene(
+    states: Sequence[Scene], solve: dict[str, Any] | None = None, told: Sequence[str] = ()
+) -> SceneCheck:
     """Look at a scene without solving it. InputError for a scene that cannot be solved at all.
 
     states  the scene, or the states of its load path, of which the last one is described
     solve   options of the run that it is meant for: method, Q, solver
+    told    remarks that were made before, when the scene was read
     """
     scene, options = states[-1], solve or {}
-    made = posed(scene)
+    with overheard() as heard:
+        made = posed(scene)
     free = _free_problem(scene, made)
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
-    notes = [*_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
+    notes = [*told, *heard, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -89,7 +94,9 @@ def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) ->
         lines += _pair_lines(scene, pair, own)
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
-        lines.append(f"{scene.copies} images make the whole, across planes with normals {where}")
+        where = where and f", across planes with normals {where}"
+        none = "; no support holds a plane of symmetry, so that none is known"
+        lines.append(f"{scene.copies} images make the whole{where or none}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))

@@ -6,6 +6,7 @@ Also pipes to other processes, which may be dead when one writes to them.
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import signal
@@ -14,11 +15,21 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 
 OLD = 86400.0  # s after which a hidden folder was left behind by a program that was killed
+
+
+def finite(value: Any) -> Any:
+    """The same tables and lists with None for every number that is not finite, as JSON has it."""
+    if isinstance(value, dict):
+        return {key: finite(own) for key, own in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(own) for own in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def check_folder(out: Path) -> None:

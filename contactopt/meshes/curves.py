@@ -35,7 +35,7 @@ CORNER = np.deg2rad(35)
 # unless it is an arc that is tangent to the edges beside it, and turns by less
 LARGEST = np.deg2rad(75)
 ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
-# a smaller turn is a corner if it is more than this, and times what its neighbours let expect
+# a smaller turn is a corner if it is more than this, and times what its neighbours suggest
 KINK = np.deg2rad(5), 5.0
 # the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
 STRAIGHT = 1e-9

@@ -110,6 +110,17 @@ def read_groups(path: Path) -> FileGroups:
         for name in own:
             there = np.flatnonzero(families == tag)
             sets[name] = np.union1d(sets.get(name, there), there)
+    for name, nodes in sets.items():
+        if nodes.size and (nodes.min() < 0 or nodes.max() >= len(mesh.points)):
+            raise InputError(
+                f"mesh file '{path}': the set {name!r} names a node that is not there."
+            )
+    for (name, _), parts in members.items():
+        for i, own in parts.items():
+            if own.min() < 0 or own.max() >= len(blocks[i][1]):
+                raise InputError(
+                    f"mesh file '{path}': the set {name!r} names an element that is not there."
+                )
     return FileGroups(np.asarray(mesh.points), blocks, members, sets)
 
 

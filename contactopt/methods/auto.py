@@ -138,7 +138,7 @@ class _Swept:
 
     def points(self, most: int, budget: float) -> Iterator[Iterate]:
         """Points that `most` sweeps reach within a number of multiplications, if they converge: the
-        second has all digits, and the first most of them where each sweep is dear.
+        second has all digits, and the first most of them where each sweep is expensive.
         """
         problem = self.problem
         explicit = isinstance(problem.Q, np.ndarray) or sp.issparse(problem.Q)

@@ -136,7 +136,9 @@ class Diagnosis:
 
     def _states(self, at: Local) -> str:
         """The states at the solution, and what their linear maps say."""
+        smooth = self.contacts - at.stick - at.slip - at.open
         said = f"at the solution: {at.stick} stick, {at.slip} slip, {at.open} open"
+        said += f", {smooth} touch without friction" if smooth else ""
         if np.isnan(at.singular):
             return f"{said}; the linear system of these states is singular"
         about = "about " if self.dim == 3 and at.slip else ""
@@ -237,11 +239,11 @@ def _relaxation(problem: InterfaceProblem) -> str:
     if not Relaxation().solves(problem.law):
         return "none"
     answer = solve(problem, Relaxation(), tol=CERTIFIED)
-    if answer.solved:
-        return "tight"
     r, u = answer.reactions, problem.displacements(answer.reactions, answer.multipliers)
     error = float(np.linalg.norm(r - coulomb_cone(r - u, problem.mu)))
     optimal = error <= CERTIFIED * np.linalg.norm(r) and balance_residual(problem, r) <= CERTIFIED
+    if answer.solved:  # perhaps by the point before the program, which has no minimiser
+        return "tight" if error <= DISTINCT * max(1.0, float(np.linalg.norm(r))) else "undecided"
     Z = la.null_space(problem.V.T) if len(problem.s) else np.eye(len(problem.Q))
     try:
         check_definite(Z.T @ problem.Q @ Z, problem.Q)

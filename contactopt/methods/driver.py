@@ -31,7 +31,7 @@ from contactopt.problem import (
     natural_map_residual,
 )
 from contactopt.problem.certificate import Moved
-from contactopt.problem.unbalanced_loads import escape, sentence
+from contactopt.problem.unbalanced_loads import check_equilibrium
 
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
@@ -41,6 +41,7 @@ FAR = 0.1  # residual above which a method that works for long may be at one wit
 DOUBT = 30  # iterates before the proof is first looked for, then ten times as many, ...
 SAME = 1e-11  # relative distance at which two iterates are the same state
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
+LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
 CONFIRM = 8  # repeated states in a row of a method that goes nowhere
 
 
@@ -143,7 +144,7 @@ def _run(
     begin = time.perf_counter()
     if problem.contacts == 0:
         return _without_contacts(problem, method, limits.tol)
-    _check_equilibrium(problem)
+    check_equilibrium(problem)
     if not getattr(method, "unsymmetric", False) and not problem.symmetric:
         raise InputError(
             f"method '{type(method).__name__.lower()}' minimises an energy, which an unsymmetric Q"
@@ -159,7 +160,7 @@ def _run(
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
     if not recorder.history:
         recorder.certify([])
-    if getattr(method, "wanders", False):
+    if getattr(method, "wanders", False) or recorder.lost:
         recorder.return_to_best()
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
@@ -196,7 +197,7 @@ def _follow(
         repeated = None
         if iterate is not None:
             ended = recorder.record(iterate, _counts(scaled.Q))
-            if ended in (Status.STALLED, Status.CYCLING):
+            if ended in (Status.STALLED, Status.CYCLING) and not recorder.late:
                 ended, repeated = None, ended
         if ended is None and recorder.residual > FAR and len(recorder.history) > doubt:
             proof, doubt = infeasibility(recorder.problem, recorder.left()), 10 * doubt
@@ -275,7 +276,7 @@ class _Recorder:
     """Certificate, history and stopping rule of one solve.
 
     clock counts the method's own seconds, certified those of the certificate. Without an iterate
-    the answer is the dimensionless point `first`.
+    the answer is the dimensionless point `first`. An iterate that is `lost` is none.
     """
 
     def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits, first: Iterate):
@@ -283,7 +284,7 @@ class _Recorder:
         self.problem, self.scales, self.limits = problem, scales, limits
         self.reactions, self.multipliers = scales.to_physical(*first)
         self.displacements: Stacked | None = None
-        self.residual = np.inf
+        self.residual, self.lost = np.inf, False
         self.history: list[dict[str, float]] = []
         self.recent: list[State] = [(np.zeros(problem.q.size + len(problem.s)), 0.0)]
         self.best = self._now()
@@ -295,7 +296,8 @@ class _Recorder:
         """Judge the present iterate."""
         begin = time.perf_counter()
         self.residual = self._certificate(known)
-        self.best = min(self.best, self._now(), key=lambda point: point[0])
+        if not self.lost:
+            self.best = min(self.best, self._now(), key=lambda point: point[0])
         self.certified += time.perf_counter() - begin
 
     def _now(self) -> tuple[float, np.ndarray, np.ndarray, Stacked | None]:
@@ -326,6 +328,7 @@ class _Recorder:
     def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
+        self.lost = bool(max(np.abs(r).max(initial=0.0), np.abs(lam).max(initial=0.0)) > LOST)
         previous, limits = self.reactions, self.limits
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         if self.lengthless:
@@ -351,7 +354,12 @@ class _Recorder:
         self.repeated = self.repeated + 1 if any(same) else 0
         if self.repeated >= CONFIRM:
             return Status.STALLED if same[0] else Status.CYCLING
-        if len(self.history) >= limits.max_iterations:
+        return self.late
+
+    @property
+    def late(self) -> Status | None:
+        """Which limit is reached, if one is."""
+        if len(self.history) >= self.limits.max_iterations:
             return Status.ITERATION_LIMIT
         return Status.TIME_LIMIT if self.left() <= 0 else None
 
@@ -376,25 +384,3 @@ def _same(new: State, old: State) -> bool:
 def _relative(new: np.ndarray, old: np.ndarray) -> float:
     size = float(np.linalg.norm(new))
     return float(np.linalg.norm(new - old)) / size if size > 0 else float(np.linalg.norm(old) > 0)
-
-
-def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """InputError for a load that no contacts can balance: bodies escape along a named motion, or a
-    plate is pulled off along the normals.
-    """
-    if problem.motions:
-        found = escape(problem)
-        if found is not None:
-            raise InputError(sentence(problem, found))
-        return
-    if not len(problem.s) or not problem.law.unilateral:
-        return
-    V = problem.V.reshape(problem.contacts, problem.dim, -1)
-    for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
-        rounding = 1e-9 * np.abs(column).max(initial=0.0)
-        along = rounding > 0 and np.all(np.abs(column[:, 1:]) <= rounding)
-        # what normal reactions add to s
-        if s != 0 and along and np.all(column[:, 0] * np.sign(s) >= -rounding):
-            raise InputError(
-                "the load on the plate pulls the bodies apart: no equilibrium; press them together."
-            )

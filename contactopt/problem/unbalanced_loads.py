@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.errors import Unbalanced
 from contactopt.problem.cones import polygon
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import isotropic
@@ -178,3 +179,25 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
         f"the load is more than the contacts can hold: {body} slides off ({motion}); press the"
         " bodies together, or add friction or a support."
     )
+
+
+def check_equilibrium(problem: InterfaceProblem) -> None:
+    """Raise Unbalanced for a load that no contacts can balance: bodies escape along a named motion,
+    or a plate is pulled off along the normals.
+    """
+    if problem.motions:
+        found = escape(problem)
+        if found is not None:
+            raise Unbalanced(sentence(problem, found))
+        return
+    if not len(problem.s) or not problem.law.unilateral:
+        return
+    V = problem.V.reshape(problem.contacts, problem.dim, -1)
+    for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
+        rounding = 1e-9 * np.abs(column).max(initial=0.0)
+        along = rounding > 0 and np.all(np.abs(column[:, 1:]) <= rounding)
+        # what normal reactions add to s
+        if s != 0 and along and np.all(column[:, 0] * np.sign(s) >= -rounding):
+            raise Unbalanced(
+                "the load on the plate pulls the bodies apart: no equilibrium; press them together."
+            )

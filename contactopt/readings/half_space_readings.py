@@ -28,7 +28,7 @@ class SurfaceContact:
     largest_pressure    [stress];  mean_gap  of the open contacts [length]
     slip_work           work of friction if the slip happened in this state's step, sum -r_t'u_t
                         [force length]: the dissipated energy of a state reached in one step from
-                        contact without slip. Of a load path it is
+                        contact without slip. For a load path it is
                         PathResult.history["friction_work"]
     """
 

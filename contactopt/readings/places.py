@@ -105,10 +105,8 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     body, _, boundary = rest.partition(":")
     meshed = {part.name: part for part in scene.parts if hasattr(part, "build_mesh")}
     if body not in meshed:
-        raise InputError(
-            f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from"
-            f" {', '.join(meshed)}."
-        )
+        wrong = f"there is no elastic body {body!r} with a mesh" if body else "it needs a body"
+        raise InputError(f"quantity {name!r}: {wrong}; choose from {', '.join(meshed)}.")
     if kind != LARGEST and stress not in scene.analysis.stresses:
         names = ", ".join(f"stress_{own}" for own in scene.analysis.stresses)
         raise InputError(

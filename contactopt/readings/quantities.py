@@ -184,6 +184,12 @@ def _pair_force(name: str, rest: str, scene: Scene) -> Quantity:
 
 def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
     pair, _, component = rest.rpartition(":")
+    if not pair:
+        raise InputError(
+            f"a resultant needs a contact and a component, as in"
+            f" resultant:{scene.pairs[0].name}:{scene.components[-1]}; the contacts are"
+            f" {', '.join(own.name for own in scene.pairs)}."
+        )
     _check_pair(pair, scene)
     if component not in scene.components:
         raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")

@@ -124,9 +124,10 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
     axes = KINDS[summary["kind"]].components
     words = {}
     for name, pair in summary["pairs"].items():
-        least = ROUNDING * max(map(abs, (*pair["force"], pair["normal_force"])))
+        known = [f or 0.0 for f in (*pair["force"], pair["normal_force"])]  # None: not finite
+        least = ROUNDING * max(map(abs, known))
         words[name] = ", ".join(
-            f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, pair["force"])
+            f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, known)
         )
     return words
 

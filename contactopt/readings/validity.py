@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction
+from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.plausibility import SHARE
@@ -27,6 +28,7 @@ BOUNDS = {
     # of the surfaces of the displaced bodies where they touch, relative to their displacement
     "misfit": 1e-3,
 }
+IMPOSSIBLE = 0.9  # strain from which on an element is squeezed to nothing
 UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facets"}
 
 
@@ -84,7 +86,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
-        if known["imbalance"] > BOUNDS["imbalance"]:
+        if solution.solved and known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
                 f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces"
                 " on it are left over; it is so thin or so weakly held that rounding moves it."
@@ -116,6 +118,19 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
                 " rounding moves it."
             )
     return {"bodies": bodies, "pairs": pairs}, remarks
+
+
+def check_possible(limits: dict[str, Any]) -> None:
+    """Raise InputError where a body is squeezed to nothing, and not at the tip of a corner alone,
+    by the tables of validity().
+    """
+    for name, known in limits["bodies"].items():
+        if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > IMPOSSIBLE:
+            raise InputError(
+                f"no body can deform like this: the answer has a strain of {known['strain']:.3g} in"
+                f" body '{name}'; see whether E and the loads are in the same unit, whether the"
+                " surfaces that may touch are the right ones, and how far they overlap."
+            )
 
 
 def _beyond(key: str, where: str, value: float) -> list[str]:

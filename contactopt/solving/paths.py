@@ -81,11 +81,14 @@ class State:
 class PathResult:
     """A solved path; `reduction` belongs to its last state, with the problem of the last step.
 
-    If a step is not solved the path ends with it: what would follow has no state to start from.
+    If a step is not solved the path ends before it: what would follow has no state to start from.
+    `failed` is then how that step ended, with its last iterate. A path whose first step is not
+    solved has that one alone.
     """
 
     states: tuple[State, ...]
     reduction: Reduction
+    failed: Solution | None = None
 
     def __repr__(self) -> str:
         scene, solved = self.states[-1].scene, sum(state.solution.solved for state in self.states)
@@ -102,15 +105,30 @@ class PathResult:
 
     @property
     def solved(self) -> bool:
-        return all(state.solution.solved for state in self.states)
+        return self.failed is None and all(state.solution.solved for state in self.states)
 
     @property
     def solution(self) -> Solution:
-        """The last state's, with the seconds of the whole path."""
+        """The last state's, with the seconds of the whole path. Where a step failed, it says how:
+        status, residual, message and iterations are those of that step.
+        """
         seconds: Counter[str] = Counter()
-        for state in self.states:
-            seconds.update(state.solution.seconds)
-        return replace(self.states[-1].solution, seconds=dict(seconds))
+        for own in self.solutions:
+            seconds.update(own.seconds)
+        found = replace(self.states[-1].solution, seconds=dict(seconds))
+        if self.failed is None:
+            return found
+        how = {
+            key: getattr(self.failed, key)
+            for key in ("status", "residual", "message", "iterations")
+        }
+        return replace(found, **how)
+
+    @property
+    def solutions(self) -> list[Solution]:
+        """Those of all states, and that of the step that failed."""
+        failed = [] if self.failed is None else [self.failed]
+        return [*(state.solution for state in self.states), *failed]
 
     def problem(self, step: int) -> InterfaceProblem:
         """Make the static problem of one step, which its solution is certified against.

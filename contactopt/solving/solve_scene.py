@@ -31,6 +31,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 from contactopt.solving.progress import progress_lines
 from contactopt.solving.restart import Restart, certified
+from contactopt.solving.sliding import sliding, sliding_words
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
@@ -229,6 +230,8 @@ def _solved(
     doubts = [0.0] if len(found) == 1 else [_doubt(*pair) for pair in found]
     ranks = range(len(found), 0, -1) if doubts[0] > BEARABLE else doubts
     reduction, solution = min(zip(ranks, found), key=lambda one: (not one[1][1].solved, one[0]))[1]
+    if not solution.solved and (slid := sliding(reduction.problem, solution, None)):
+        solution = replace(solution, message=sliding_words(slid, reduction.scene))
     return Solved(
         _knowing(reduction, solution, options.tol), replace(solution, seconds=dict(seconds))
     )

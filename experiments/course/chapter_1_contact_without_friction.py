@@ -316,6 +316,9 @@ assert (
 # mechanics. `hint("1.1")` gives a hint, three times, and then the solution. `table(1)` shows what
 # you have done since the notebook was started. The first three need pen and paper only.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **1.1** (Pen and paper.) A spring of stiffness 4.4 N/mm holds a node 0.6 mm above the floor. A
 # load of 6.5 N pulls it down. How large are the gap and the contact force?
 

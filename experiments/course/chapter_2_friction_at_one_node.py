@@ -446,6 +446,9 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # mechanics. `hint("2.1")` gives a hint, three times, and then the solution. `table(2)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1.2, 2.5)$ mm/N, $q = (-1.5, 1.1)$ mm and
 # $\mu = 0.3$. Find the normal force and the friction force.
 

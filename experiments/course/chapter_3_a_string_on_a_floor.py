@@ -393,6 +393,9 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # mechanics. `hint("3.1")` gives a hint, three times, and then the solution. `table(3)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **3.1** (Pen and paper.) The ends of the string are only 0.07 mm above the floor. At which
 # distance from the end does the contact begin?
 

@@ -280,6 +280,9 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 # mechanics. `hint("7.1")` gives a hint, three times, and then the solution. `table(7)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4.3$ N/mm replaces the floor: it costs
 # $f(u_n) = \tfrac12 \kappa \max(-u_n, 0)^2$. Its conjugate enters the dual problem as $f^*(-r_n)$.
 # What is $f^*(-r_n)$ for $r_n = 2.9$ N?

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 
 from contactopt import InterfaceProblem, diagnose, laws, reduce, scenes, solve
-from experiments.course.feedback import Forces, Numbers, Open
+from experiments.course.feedback import Forces, Open
+from experiments.course.quantities import Numbers, by_hand
 
 
 @cache
@@ -14,7 +15,10 @@ def punch(law: float | str = 0.2) -> InterfaceProblem:
     one = reduce(scenes.flat_punch(2, mu=0.2, elements=24))
     other = laws.Associated(0.35) if law == "associated" else law
     return InterfaceProblem(
-        one.Q, one.q, other, one.V, one.s, coordinates=one.coordinates, motions=("the plate",)
+        *(one.Q, one.q, other, one.V, one.s),
+        areas=one.areas,
+        coordinates=one.coordinates,
+        motions=("the plate",),
     )
 
 
@@ -40,13 +44,6 @@ def on_the_cone(shift: float) -> np.ndarray:
     return (y @ edge) / (edge @ edge) * edge
 
 
-def unknowns() -> tuple[float, ...]:
-    """r_n, r_plus, r_minus and sigma of the node of chapter 2 with mu = 0.6."""
-    node = InterfaceProblem([[1.0, -1.0], [-1.0, 2.0]], [[-3.0, 5.0]], 0.6)
-    r = solve(node).reactions
-    return r[0, 0], max(r[0, 1], 0.0), max(-r[0, 1], 0.0), abs(node.displacements(r, [])[0, 1])
-
-
 def slides(motion: np.ndarray) -> str | None:
     """Whether a motion proves that no forces hold the sledge."""
     up, along = motion
@@ -60,13 +57,23 @@ def slides(motion: np.ndarray) -> str | None:
 
 GRADED = {
     "5.1": (
-        lambda: 23 / 130,
+        lambda: by_hand(
+            "pull / load",
+            **{"pull": 23.0, "load": 130.0},
+            least=(0.0, "A friction coefficient is positive."),
+            most=(1.0, "The pull is smaller than the load, so that mu < 1 is enough."),
+        ),
         (130 / 23, "You divided the normal force by the friction force."),
         (23 / 65, "One runner carries half of the weight, but both runners hold."),
         (23 / 260, "Two runners carry the weight once, not twice."),
     ),
     "5.2": (
-        lambda: 0.06 * 82 + 0.45 * 21,
+        lambda: by_hand(
+            "mu_ice * front + mu_stone * back",
+            **{"mu_ice": 0.06, "front": 82.0, "mu_stone": 0.45, "back": 21.0},
+            least=(0.0, "Give the pull as a positive number."),
+            most=(0.45 * 103, "Even if all the weight stood on stone, it would hold less."),
+        ),
         ((0.06 + 0.45) / 2 * 103, "The mean coefficient does not count: most weight is on ice."),
         (0.45 * 21, "The runner on ice holds something as well."),
         (0.06 * 103, "The runner on stone holds more than that."),
@@ -79,20 +86,33 @@ GRADED = {
         (lambda: (slipping(0.2),) * 2, "`newton` reads mu and the problem: change both for 0.1."),
     ),
     "5.4": (
-        lambda: Numbers(rate(), close=0.04),
+        lambda: Numbers(
+            rate(),
+            close=0.04,
+            least=(0.0, "Certificates are positive, and so is their ratio."),
+            most=(1.0, "The certificate falls: the factor is below one."),
+        ),
         (lambda: rate() ** 4, "This is the factor of four steps. Take the fourth root."),
         (lambda: 1 / rate(), "The certificate falls: divide the later by the earlier one."),
         (lambda: rate() / 4, "Factors multiply. Take a root, and do not divide."),
     ),
     "5.5": (
-        lambda: (2.1, -0.4 * 2.1),
+        lambda: by_hand(
+            "r_n - rho * u_n",
+            "-mu * (r_n - rho * u_n)",
+            **{"r_n": 2.3, "rho": 2.0, "u_n": 0.1, "mu": 0.4, "r_t": -1.5, "u_t": 0.3},
+        ),
         ((2.1, -0.4 * 2.3), "The bound comes from the trial force y_n, and not from r_n."),
         (lambda: on_the_cone(0.0), "This is the projection on the cone: associated friction."),
         ((2.1, -2.1), "The tangential part exceeds the bound mu y_n: cut it off."),
         ((2.1, 0.84), "Cutting off keeps the direction of y_t."),
     ),
     "5.6": (
-        lambda: tuple(on_the_cone(0.4 * 0.3)),
+        lambda: by_hand(
+            "(r_n - rho * (u_n + mu * u_t) - mu * (r_t - rho * u_t)) / (1 + mu**2)",
+            "-mu * (r_n - rho * (u_n + mu * u_t) - mu * (r_t - rho * u_t)) / (1 + mu**2)",
+            **{"r_n": 2.3, "r_t": -1.5, "rho": 2.0, "u_n": 0.1, "u_t": 0.3, "mu": 0.4},
+        ),
         (lambda: on_the_cone(0.0), "The shift mu |u_t| n is missing: this is associated friction."),
         (lambda: on_the_cone(-0.4 * 0.3), "The shift makes u_n larger, so that y_n is smaller."),
         ((1.86, -0.4 * 1.86), "This cuts off y_t. The nearest point of the cone is another one."),
@@ -104,6 +124,7 @@ GRADED = {
         (lambda: forces_of(0.35) * [1, -1], "along"),
         (lambda: 0.98 * forces_of(0.35), "balance"),
         (lambda: forces_of(0.5), "bound"),
+        (lambda: forces_of(0.35) / punch().areas[:, None], "pressure"),
     ),
     "5.8": (
         lambda: Open((0.27, 1.0), slides),
@@ -113,9 +134,44 @@ GRADED = {
         ((0.0, 0.0), "The load does the work"),
     ),
     "5.9": (
-        unknowns,
+        lambda: by_hand(
+            "-q_n / (Q_nn - mu * Q_nt)",
+            "0 * q_n",
+            "mu * (-q_n / (Q_nn - mu * Q_nt))",
+            "q_t + (Q_nt - mu * Q_tt) * (-q_n / (Q_nn - mu * Q_nt))",
+            **{"Q_nn": 1.0, "Q_nt": -1.0, "Q_tt": 2.0, "q_n": -3.0, "q_t": 5.0, "mu": 0.6},
+            least=(0.0, "The unknowns of an LCP are never negative."),
+        ),
         ((1.875, 1.125, 0.0, 0.875), "r_plus pushes to the right, along the slip."),
         ((1.875, 0.0, -1.125, 0.875), "The unknowns of an LCP are never negative."),
         ((1.875, 0.0, 1.125, 0.0), "The node slips, and sigma is its slip."),
+    ),
+    "5.10": (
+        lambda: by_hand(
+            "(q_1 - mu * N * Q_tt - q_2) / Q_tt",
+            **{"q_1": 2.0, "q_2": 1.3, "mu": 0.4, "N": 1.5, "Q_tt": 0.8},
+            most=(0.6, "The friction force cannot exceed its bound mu r_n = 0.6 N."),
+            least=(-0.6, "The friction force cannot exceed its bound mu r_n = 0.6 N."),
+        ),
+        (-0.6, "This is a single step from the beginning. The node has slipped before."),
+        (0.6, "On the way back the node sticks: it does not reach the bound."),
+        (-1.3 / 0.8, "Without the bound, and without what has slipped before."),
+        ((2.0 - 1.3) / 0.8, "The node has not slipped 2 mm: friction held it back by Q_tt mu r_n."),
+        ((2.0 - 1.3) / 0.8 - 1.2, "Count the change of the force from -0.6 N, in units of Q_tt."),
+    ),
+    "5.11": (
+        lambda: by_hand(
+            "4 * mu * N * (A - mu * N * Q_tt)",
+            **{"mu": 0.4, "N": 1.5, "A": 2.0, "Q_tt": 0.8},
+            least=(0.0, "Friction takes work: give it as a positive number."),
+            most=(4.8, "This would be the work if the node slipped on the whole way."),
+        ),
+        (4 * 0.6 * 2.0, "Not the whole way is slip: near the turning points the node sticks."),
+        (2 * 0.6 * (2.0 - 0.48), "This is half a cycle: there and back are two ways."),
+        (
+            4 * 0.6 * (2.0 - 0.96),
+            "At each turn the force changes from +mu r_n to -mu r_n only once.",
+        ),
+        (0.6 * (2.0 - 0.48), "This is the first pull."),
     ),
 }

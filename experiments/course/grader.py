@@ -21,7 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.course.feedback import Numbers, Right, Verdict, as_numbers, draw, wrong
+from experiments.course.feedback import Right, as_numbers, draw
+from experiments.course.quantities import Numbers
+from experiments.course.verdict import Verdict
 
 FOLDER = Path(__file__).parent
 LEVELS = {1: "pen and paper", 2: "program", 3: "think"}
@@ -87,7 +89,8 @@ def exercise(number: str) -> Exercise:
 def right_answer(number: str) -> Right:
     """The right answer as a kind of `feedback`; it is computed once."""
     value = exercise(number).right()
-    return Numbers(value) if isinstance(value, (int, float, tuple, list, np.ndarray)) else value
+    plain = isinstance(value, (int, float, tuple, list, np.ndarray))
+    return Numbers(value) if plain else value
 
 
 @cache
@@ -103,13 +106,9 @@ def grade(number: str, answer: Any) -> Verdict:
     given = as_numbers(answer, right, task.asks)
     if isinstance(given, Verdict):
         return given
-    verdict = right.verdict(given)
-    if verdict.right or not isinstance(right, Numbers):
-        return verdict
-    for value, told in mistakes(number):
-        if " " in told and right.agrees(given, value):
-            return wrong("mistake", told)
-    return verdict
+    if isinstance(right, Numbers):
+        return right.verdict(given, mistakes(number))
+    return right.verdict(given)
 
 
 def check(number: str, answer: Any) -> None:
