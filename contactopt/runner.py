@@ -322,6 +322,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
+    smoothed = [] if peak is None or not solution.solved else _smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
     check_possible(limits)
     known = doubts(scene, reduction.couplings)
@@ -347,7 +348,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": said if peak is None else [*said, *_smoothed(peak, largest)],
+        "remarks": [*said, *smoothed],
         **found,
         "limits": limits,
     }

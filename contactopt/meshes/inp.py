@@ -27,6 +27,7 @@ from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
 from contactopt.meshes.inp_elements import CORNERS, FACET, dimension, kind_of, side_of
 from contactopt.meshes.inp_text import LARGEST, Block, Named, bare, blocks, set_of
+from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
 
@@ -80,6 +81,7 @@ def read_inp(path: Path) -> Any:
     }
     of_points = {n: np.searchsorted(tags, sorted(f)) for n, f in whole.node_sets.items()}
     rows = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in cells]
+    rows = [(k, in_order(points, n) if k == "hexahedron27" else n) for k, n in rows]
     return meshio.Mesh(points, rows, cell_sets=of_cells, point_sets=of_points)
 
 
