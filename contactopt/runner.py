@@ -321,7 +321,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
     limits, beyond = validity(reduction, solution)
-    check_possible(limits)
+    check_possible(limits, reduction.couplings)
     known = doubts(reduction.scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
