@@ -24,6 +24,7 @@ from contactopt.methods.method import Method
 from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
 from contactopt.readings.chords import chord_remarks
+from contactopt.readings.corners import corner_remarks
 from contactopt.readings.peaks import Reading, pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
@@ -296,6 +297,7 @@ def _result(
         summary = _summary(solved, names)
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
+            summary["remarks"] += corner_remarks(reduction, solution)
     noted = [solution] if solved.path is None else solved.path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
     summary["remarks"] = list(dict.fromkeys(every))
@@ -315,19 +317,21 @@ def _result(
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     """What is known of the answer on one mesh at one state."""
     reduction, solution = solved.reduction, solved.solution
-    problem = reduction.problem
+    problem, scene = reduction.problem, reduction.scene
     found = tables(reduction, solution)
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
+    smoothed = [] if peak is None or not solution.solved else _smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
     check_possible(limits, reduction.couplings)
-    known = doubts(reduction.scene, reduction.couplings)
+    known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
-        "scene": reduction.scene.name,
-        "kind": reduction.scene.kind,
-        "units": list(reduction.scene.units),
+        "scene": scene.name,
+        "kind": scene.kind,
+        "units": list(scene.units),
+        "thickness": None if scene.dim == 3 or scene.analysis.revolved else scene.thickness,
         "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
@@ -344,7 +348,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": said if peak is None else [*said, *_smoothed(peak, largest)],
+        "remarks": [*said, *smoothed],
         **found,
         "limits": limits,
     }

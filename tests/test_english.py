@@ -1,6 +1,6 @@
 """Idioms that were translated from another language, and that the field does not use. They stood on
-pages, in docstrings and in messages; this list keeps them from coming back. The section on English in
-CONTRIBUTING.md says what to write instead.
+pages, in docstrings and in messages; this list keeps them from coming back. CONTRIBUTING.md says
+what to write instead.
 """
 
 import re
@@ -13,6 +13,9 @@ CALQUES = (
     r"\b(?:solver|code|peer|method)s? of others\b",
     r"\bstraight between (?:two|them|these)\b",
     r"\bdrawn anew\b",
+    r"\bprograms? of others\b",
+    r"\bask it before\b",
+    r"\bwhat it spoils\b",
     r"\btimes the least of\b",
     r"\bof a load path (?:it|this|the deck) (?:is|has)\b",
     r"\bfrom here on (?:it|the|some)\b",

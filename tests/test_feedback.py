@@ -113,7 +113,7 @@ def test_a_formula_says_what_was_changed():
 
 
 def test_a_value_that_a_mistake_cannot_give_is_told_by_its_bounds_or_its_size():
-    right = by_hand("2 * a", a=1.7, least=(0.0, "This is positive."))
+    right = by_hand(["2 * a"], {"a": 1.7}, least=(0.0, "This is positive."))
     assert right.verdict(np.array(-7.77)).sentence.endswith("This is positive.")
     assert right.verdict(np.array(7.77)).kind == "size"
     assert Numbers(3.0).verdict(np.array(3.05)).kind == "near"

@@ -1,4 +1,4 @@
-"""The lectures can be taught with: few words, one idea, a figure, a question and the minutes of every
+"""The lectures can be taught with: few words, one idea, a figure, a question and minutes on every
 slide; the page for lecturers keeps its promises. tests/test_site.py looks at the slides in the
 browser.
 """

@@ -52,7 +52,7 @@ def posed(
     check_once(scene.pairs, sides)
     pairs = zip(scene.pairs, sides)
     made = [couple(scene, pair, *bodies, coupling) for pair, bodies in pairs]
-    couplings = independent(scene.pairs, made)
+    couplings = independent(scene.pairs, made, assembled)
     maps = tuple(_signed_map(body, sides, couplings) for body in assembled)
     planes: tuple[SymmetryPlane, ...] = ()
     if scene.copies > 1:

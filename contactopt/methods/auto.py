@@ -13,7 +13,7 @@ proximal loop.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-   In the plane a tree over the states of the contacts looks for a solution or for such a proof
+   A tree over the states of the contacts looks for a solution or for such a proof
    (contactopt.methods.kernels.states), BRANCHES of it here, and twice as many after each round of
    stages 6 and 7.
 4. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
@@ -182,7 +182,7 @@ class _Robust:
         self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
-        few = can(problem) and problem.contacts <= constants.MOST_STATES
+        few = can(problem) and problem.contacts <= constants.MOST_STATES[problem.dim]
         self.tree, self.met = StateTree(problem.explicit()) if few else None, False
         self.branches = self.tree.points() if self.tree else iter(())
 
@@ -226,7 +226,7 @@ class _Robust:
         for found in islice(self.branches, branches):
             if found is not None:
                 self.met = True
-                yield found[:2]
+                yield from self.proximal(found[:2], constants.POLISH, constants.LEAST_ALPHA)
         if self.tree.done and not self.met:
             raise NoSolution(self.tree.proof)
 

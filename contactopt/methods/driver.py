@@ -31,6 +31,7 @@ from contactopt.problem import (
     natural_map_residual,
 )
 from contactopt.problem.certificate import Moved
+from contactopt.problem.feasibility import held_apart
 from contactopt.problem.unbalanced_loads import check_equilibrium
 
 CYCLE = 12  # longest cycle that is looked for
@@ -187,9 +188,9 @@ def _follow(
     steps: Iterator[Iterate | Known], scaled: InterfaceProblem, recorder: _Recorder
 ) -> tuple[Status | None, str, Infeasible | None]:
     """Take iterates until they end, or a proof ends them: how, why, and the proof."""
-    ended: Status | None = None
     repeated: Status | None = None
-    message, proof, doubt = "", None, DOUBT
+    message, proof, doubt = "", held_apart(recorder.problem), DOUBT
+    ended = None if proof is None else Status.INFEASIBLE
     while ended is None:
         begin = time.perf_counter()
         iterate, ended, message, proof = _next(steps, recorder.left(), repeated, recorder.enough)

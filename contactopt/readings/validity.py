@@ -90,7 +90,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
-        if solution.solved and known["imbalance"] > BOUNDS["imbalance"]:
+        if known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
                 f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces"
                 " on it are left over; it is so thin or so weakly held that rounding moves it."
@@ -115,13 +115,14 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         pairs[pair.name] = largest | {"misfit": misfit}
         for key in ("slip", "closure"):
             remarks += _beyond(key, f"pair '{pair.name}'", largest[key])
-        if solution.solved and misfit > BOUNDS["misfit"]:
+        if misfit > BOUNDS["misfit"]:
             remarks.append(
                 f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other"
                 f" by {misfit:.1e} of their displacement: a body is so thin or so weakly held that"
                 " rounding moves it."
             )
-    return {"bodies": bodies, "pairs": pairs}, remarks
+    # the last iterate of what was not solved says nothing of the bodies
+    return {"bodies": bodies, "pairs": pairs}, remarks if solution.solved else []
 
 
 def check_possible(limits: dict[str, Any], couplings: Sequence[Coupling]) -> None:

@@ -50,13 +50,16 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
     return found
 
 
-def sliding_words(found: Sliding, scene: Scene, state: str = "", before: str = "") -> str:
-    """One sentence on a state that slides, after the state `before` if there is one."""
-    force = force_unit(scene.units)
-    most = float(f"{found.most:.3g}")
-    held = f"it held up to about {most:.6g} {force}" + (f" in {before}" if before else "")
-    last = f"; numbers and files are those of {before}" if before else ""
-    return (
-        f"{state or 'the scene'} slides, every touching contact slips: the load along"
-        f" {found.motion} is {found.load:.6g} {force}, and {held}{last}"
-    )
+def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
+    """One sentence on a state that slides, after the state `before`; without one the forces are
+    known too badly to say what friction holds.
+    """
+    force, most = force_unit(scene.units), float(f"{found.most:.3g}")
+    load = f"the load along {found.motion} is {found.load:.6g} {force}"
+    held = "more than friction holds"
+    if before:
+        held = (
+            f"and it held up to about {most:.6g} {force} in {before}; numbers and files are those"
+            f" of {before}"
+        )
+    return f"{state} slides, every touching contact slips: {load}, {held}"

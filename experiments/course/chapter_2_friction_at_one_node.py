@@ -116,6 +116,8 @@ _ = ax.axis("off")
 #
 # $$ |r_t| \le g, \qquad u_t \ne 0 \;\Rightarrow\; r_t = -g\, \frac{u_t}{|u_t|} . $$
 #
+# (Friction opposes a velocity. Chapter 5 shows why the law of a step asks for $u_t$.)
+#
 # If the friction force is below its bound, the node does not move: it *sticks*. If the node moves,
 # it *slips*. Then the friction force has reached its bound and points against the slip. The two
 # programs in `cvxpy`:

@@ -312,8 +312,8 @@ assert products[8][1] < 1.6 * products[4][1]
 # by sums over all pairs of different nodes. The weight of a pair depends only on its distance $l$.
 # A matrix whose rows are shifted copies of each other is a *circulant*. Its eigenvectors are the waves,
 # and its eigenvalues are called its *symbol*. For small $l$ the weight is proportional to $1 / l^2$, so
-# we write it as $(\pi / 2m)^2 / \sin^2 (\pi l / 2m)$. By the sum in step 1, which for $2m$ nodes is
-# exact too, the symbol is
+# we write it as $(\pi / 2m)^2 / \sin^2 (\pi l / 2m)$. The sum over all
+# $l$ from 0 is $2 m j$, by Parseval as in step 1, and its first term is $j^2$. So the symbol is
 #
 # $$ 2 \Bigl(\frac{\pi}{2m}\Bigr)^2 \sum_{l = 1}^{2m - 1} \frac{\sin^2 (\pi j l / 2m)}{\sin^2 (\pi l / 2m)} = \frac{\pi^2}{2 m^2}\, j\, (2m - j), \qquad 0 \le j \le m . $$
 #
@@ -342,7 +342,8 @@ assert products[8][1] < 1.6 * products[4][1]
 # A displacement that vanishes at the ends of the contact is continued smoothly enough. Another one
 # gets a jump. In the double integral, the pairs with one point inside and one outside add a multiple
 # of $\int |u|^2 / \text{(distance to the end)}$. On a mesh this is at most $\max |u|^2$ times $\log N$.
-# And the maximum is bounded by the seminorm, up to another logarithm:
+# Continue $u$ by its mirror image instead, so that there is no jump. The maximum is bounded by the
+# seminorm of this function, up to another logarithm:
 #
 # $$ \max |u| \le |u_0| + \sum_{k \ne 0} |u_k| \le |u_0| + \Bigl( \sum_{0 < |k| \le N} \frac{1}{|k|} \Bigr)^{1/2} |u| \;\lesssim\; |u_0| + (2 \log N)^{1/2}\, |u| . $$
 #

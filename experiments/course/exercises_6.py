@@ -55,33 +55,19 @@ def moved(law: laws.Law | float = 0.45, factor: float = 1.0) -> np.ndarray:
 
 GRADED = {
     "6.1": (
-        lambda: by_hand(
-            "bytes * (components * rows * columns)**2 / 10**9",
-            **{"bytes": 8.0, "components": 3.0, "rows": 120.0, "columns": 80.0},
-            least=(0.0, "A memory is positive."),
-        ),
+        None,
         (gigabytes(120 * 80, 1), "Each node has three components of force."),
         (gigabytes(120 * 80) / 8, "A number takes 8 bytes."),
         (gigabytes(120 * 80) / 1.024**3, "These are GiB, 1024^3 bytes. Asked are 10^9 bytes."),
     ),
     "6.2": (
-        lambda: by_hand(
-            "ceil(pi / arccos(1 - lost))",
-            **{"lost": 0.007},
-            least=(3, "A polygon has at least three edges."),
-        ),
+        None,
         (26, "With 26 facets a little more than 0.7 % is lost."),
         (54, "From the middle of a facet to its corner it is pi / m, and not 2 pi / m."),
         (14, "From the middle of a facet to its corner it is pi / m, and not pi / (2 m)."),
     ),
     "6.3": (
-        lambda: by_hand(
-            "(P_2 / P_1)**(1 / 3)",
-            close=0.01,
-            **{"P_2": 260.0, "P_1": 100.0},
-            least=(1.0, "A larger load makes a larger peak."),
-            most=(2.6, "The peak grows more slowly than the load."),
-        ),
+        None,
         (2.6, "The area grows, too, so that the peak grows more slowly than the load."),
         (2.6**0.5, "This is Hertz's law for a cylinder. Under a sphere the area grows faster."),
         (2.6 ** (2 / 3), "This is the factor of the area."),
@@ -98,32 +84,20 @@ GRADED = {
         (45.0, "This is the middle of a facet. Friction goes into a corner."),
     ),
     "6.5": (
-        lambda: by_hand(
-            "E / (1 - nu**2)",
-            **{"E": 5.5, "nu": 0.42},
-            least=(5.5, "Held in the plane, the surface is stiffer: E* is larger than E."),
-        ),
+        None,
         (5.5 / (1 - 0.42**2) / 2, "This holds for two equal bodies. A rigid one gives no way."),
         (5.5 / (2 * (1 + 0.42)), "This is the shear modulus."),
         (5.5 / (1 - 0.42), "It is 1 - nu^2, and not 1 - nu."),
     ),
     "6.6": (
-        lambda: by_hand(
-            "2 * p / (E * (2 * pi / wavelength))",
-            **{"p": 0.2, "E": 6.0, "wavelength": 3.0},
-            least=(0.0, "An amplitude is positive."),
-        ),
+        None,
         (0.2 / (6.0 * 2 * np.pi / 3.0), "half"),
         (2 * 0.2 / (6.0 * 3.0), "The wave number is 2 pi over the wavelength."),
         (2 * 0.2 / 6.0 / (2 * np.pi / 3) ** 2, "This divides by the square: that is the string."),
         (2 * 0.2 / 6.0 * (2 * np.pi / 3), "A surface gives way *less* to short waves."),
     ),
     "6.7": (
-        lambda: by_hand(
-            "ceil(sqrt(kappa) / 2 * log(2 / error))",
-            **{"kappa": 900.0, "error": 1e-6},
-            least=(0, "A number of steps is positive."),
-        ),
+        None,
         (6529, "Conjugate gradients feel the square root of the condition number."),
         (436, "half"),
         (208, "The bound is 2 q^j, and the 2 counts."),
@@ -137,11 +111,7 @@ GRADED = {
         (lambda: node().q[0], "penetration"),
     ),
     "6.9": (
-        lambda: by_hand(
-            "3 * a**2 / 2 + 7 * b**2 / 2",
-            **{"a": 0.8, "b": 0.6},
-            least=(0.0, "A squared seminorm is positive."),
-        ),
+        None,
         (1.5**2 + 2.22, "A constant has no seminorm: its wave number is zero."),
         (9 * 0.32 + 49 * 0.18, "The wave number itself counts, and not its square."),
         (0.32 + 0.18, "Each wave counts with its wave number."),

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from experiments.course.feedback import Right, as_numbers, draw
-from experiments.course.quantities import Numbers
-from experiments.course.verdict import Verdict
+from experiments.course.quantities import Numbers, by_hand
+from experiments.course.verdict import CLOSE, Verdict
 
 FOLDER = Path(__file__).parent
 LEVELS = {1: "pen and paper", 2: "program", 3: "think"}
@@ -34,22 +34,31 @@ class Exercise:
     """One exercise.
 
     number    chapter.number
-    right     computes the right answer: numbers, or one of the kinds of `feedback`
+    right     computes the right answer: numbers, or one of the kinds of `feedback`; None where the
+              record has formulas
     mistakes  answers that are typically wrong, or functions that compute them; and what to tell
               about each of them, or the kind of error that `feedback` finds by itself
     level     1 to 3, in LEVELS
     asks      what the answer holds, with units
     hints     three, each says more
     solution  lines that a student can run in the chapter; they end with the answer
+    formulas  of the numbers of the answer, in the quantities that are given, from which mistakes
+              are made; close is the relative error that counts as right, least and most are bounds
+              that mechanics gives, each with its reason
     """
 
     number: str
-    right: Callable[[], Any]
+    right: Callable[[], Any] | None
     mistakes: tuple[tuple[Any, str], ...]
     level: int
     asks: str
     hints: list[str]
     solution: str
+    formulas: tuple[str, ...] = ()
+    given: dict[str, float] = field(default_factory=dict)
+    close: float = CLOSE
+    least: tuple[float, str] | None = None
+    most: tuple[float, str] | None = None
 
 
 @dataclass
@@ -88,7 +97,10 @@ def exercise(number: str) -> Exercise:
 @cache
 def right_answer(number: str) -> Right:
     """The right answer as a kind of `feedback`; it is computed once."""
-    value = exercise(number).right()
+    task = exercise(number)
+    if task.right is None:
+        return by_hand(task.formulas, task.given, task.close, task.least, task.most)
+    value = task.right()
     plain = isinstance(value, (int, float, tuple, list, np.ndarray))
     return Numbers(value) if plain else value
 

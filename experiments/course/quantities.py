@@ -220,18 +220,17 @@ class Numbers:
 
 
 def by_hand(
-    *formulas: str,
+    formulas: Sequence[str],
+    given: dict[str, float],
     close: float = CLOSE,
     least: tuple[float, str] | None = None,
     most: tuple[float, str] | None = None,
-    **given: float,
 ) -> Numbers:
-    """Numbers that have formulas; a formula that ends in ceil gives an integer."""
+    """Numbers that have formulas; formulas that begin with ceil give integers."""
     found = [value(formula, given) for formula in formulas]
     numbers: Any = [int(x) for x in found] if formulas[0].startswith("ceil") else found
-    return Numbers(
-        numbers[0] if len(numbers) == 1 else tuple(numbers), close, formulas, given, least, most
-    )
+    whole = numbers[0] if len(numbers) == 1 else tuple(numbers)
+    return Numbers(whole, close, tuple(formulas), given, least, most)
 
 
 def _same_digits(answer: float, value: float, close: float) -> bool:

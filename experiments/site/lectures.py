@@ -2,8 +2,8 @@
 
 A slide is a section. Its lines that begin with > are the notes for the speaker: minutes first, last
 the question to ask. `![](FOLDER/NAME#K)` is figure K of an executed chapter or tutorial, so that no
-figure is drawn twice. A lecture is one file that loads nothing: formulas are set by MathJax, which it
-contains.
+figure is drawn twice. A lecture is one file that loads nothing: it contains MathJax for its
+formulas.
 """
 
 from __future__ import annotations
