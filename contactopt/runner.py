@@ -324,7 +324,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     peak = pressure_reading(reduction, solution) if single else None
     smoothed = [] if peak is None or not solution.solved else _smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    check_possible(limits)
+    check_possible(limits, reduction.couplings)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
