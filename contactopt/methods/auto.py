@@ -217,6 +217,7 @@ class _Robust:
         """The points among the next branches of the tree; NoSolution if it ends without any."""
         if self.tree is None or self.tree.done:
             return
+        branches = min(branches, int(constants.BRANCH_WORK / self.problem.contacts**3))
         for found in islice(self.branches, branches):
             if found is not None:
                 self.met = True

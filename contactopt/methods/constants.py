@@ -23,6 +23,7 @@ FEW_ENTRIES = 5000  # unknowns of an operator whose entries are asked for withou
 PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
 BRANCHES = 300  # of the tree over the states of the contacts, at first
 MOST_STATES = {2: 100, 3: 10}  # contacts up to which it is tried, by the dimension
+BRANCH_WORK = 3e7  # branches at a time, times the cube of the contacts, which each costs
 CONE_PROGRAMS = 5  # of the fixed point of Acary and Cadoux
 CLOSE = 1e-3  # error of an interior point from which the proximal loop finds the last digits
 LEAST_ALPHA = 1e-4  # weight with which it begins there
