@@ -3,7 +3,7 @@ proximal loop.
 
 0. Where the problem has no plates, and the package was installed with a compiler: FIRST_SWEEPS
    sweeps of the nonsmooth Gauss-Seidel method, accelerated after Anderson, if they cost little.
-   Where stages 1 and 2 fail, the sweeps go on for ten times as long. Where Q is a convolution,
+   Where stages 1 and 2 fail, the sweeps go on for twice as long. Where Q is a convolution,
    as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a

@@ -11,7 +11,7 @@ from __future__ import annotations
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
 # Sweeps at first, and where Newton's method or the first proximal loop has failed; multiplications
 # that they may cost at first (1e6 take about a millisecond).
-FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 5000, 1e9
+FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
 SWEEPS_KEPT = 16  # last sweeps that the next one starts from
