@@ -306,3 +306,10 @@ def test_a_tip_on_an_elastic_floor_has_one_contact_for_each_normal(degree, names
     assert result.solution.solved
     at = np.linalg.norm(result.problem.coordinates, axis=0) < 1e-9
     assert at.sum() == (1 if names[1] == "floor" else 2)
+
+
+def test_the_peak_of_the_pressure_is_read_on_its_own_side():
+    scene = seated((4, 4), ("quad", "quad"), 2, 1, (Contact("block", "seat", 0.0),))
+    found = run(scene, figures=(), accuracy=0.01, quantity="pressure")
+    assert found.estimate.reached and found.estimate.value == pytest.approx(1.0, abs=1e-8)
+    assert not any("largest pressure" in text for text in found.summary["remarks"])

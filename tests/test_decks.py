@@ -240,6 +240,9 @@ MEANT = {
     "skin of shells": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN, SPOS\n", 1, {"S": 1}, 8),
     "skin without a side": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN,\n", 1, {"S": 1}, 8),
     "all sides": (BRICK + "\n*SURFACE, NAME=S\nB\n", 1, {"S": 6}, 8),
+    "free sides": (
+        GROWN + "*SURFACE, NAME=S\nB,\n", 3, {"S": 8}, 8,
+    ),
     "surface in two blocks": (
         BRICK + "\n*SURFACE, NAME=S\nB, S1\n*SURFACE, NAME=s\nB, S2\n", 1, {"S": 2}, 8,
     ),

@@ -15,8 +15,9 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from contactopt.coupling.reduction import Reduction
+from contactopt.meshes.cells import joined
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.chart import ON_PLANE
+from contactopt.problem.chart import ON_PLANE, Chart
 from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
 from contactopt.readings.patches import least
 
@@ -169,6 +170,19 @@ def _fitted_top(
     return replace(best, contacts=first.contacts, size=first.size)
 
 
+def _same_side(chart: Chart, contact: int) -> np.ndarray:
+    """Whether contacts (k,) are on the same side as one of them of a surface that is cut at
+    corners, where two contacts have one place; all are on a surface that is not.
+    """
+    k = chart.places.shape[1]
+    place = chart.places[0] + 1j * chart.places[-1]  # one number sorts faster than two
+    if chart.cells is None or len(np.unique(place)) == k:
+        return np.ones(k, dtype=bool)
+    mates = [chart.cells[[0, i]] for i in range(1, len(chart.cells))]
+    piece = joined(np.concatenate(mates, axis=1), k)
+    return np.asarray(piece == piece[contact])
+
+
 def _fit_to(
     count: int, problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
 ) -> Peak:
@@ -180,6 +194,7 @@ def _fit_to(
     """
     places, node = _surroundings(problem)
     dim, offset = len(places), places - problem.chart.places[:, [top]]
+    usable = usable & _same_side(problem.chart, top)
     distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
     near = least(distance, min(count, int(usable[node].sum())))
     # of a zone that is long, and narrower than this, the contacts within it
