@@ -104,11 +104,14 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     }
     if summary["q"] == "implicit":
         rows["Q"] = f"{summary['products']} products with vectors"
+    thick = summary.get("thickness")
+    depth = "" if thick is None else f" at a thickness of {thick:g} {length}"
     for name, force in resultant_words(summary).items():
         pair = summary["pairs"][name]
         rows[f"contact '{name}'"] = (
             f"force on the upper body {force} {newton}; largest pressure"
-            f" {_number(pair['max_pressure'])} {stress}; {pair['open']} open,"
+            f" {_number(pair['max_pressure'])} {stress}; contact area"
+            f" {_number(pair['contact_area'])} {length}^2{depth}; {pair['open']} open,"
             f" {pair['stick']} stick, {pair['slip']} slip; coupled by {pair['coupling']} because"
             f" {pair['coupled_because']}"
         )

@@ -24,11 +24,12 @@ from contactopt.methods.method import Method
 from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
 from contactopt.readings.chords import chord_remarks
-from contactopt.readings.peaks import Reading, pressure_reading
+from contactopt.readings.corners import corner_remarks
+from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
-from contactopt.readings.resolution import remarks
+from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import check_possible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
-APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = (
     "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
 )  # fmt: skip
@@ -296,6 +296,7 @@ def _result(
         summary = _summary(solved, names)
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
+            summary["remarks"] += corner_remarks(reduction, solution)
     noted = [solution] if solved.path is None else solved.path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
     summary["remarks"] = list(dict.fromkeys(every))
@@ -315,19 +316,22 @@ def _result(
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     """What is known of the answer on one mesh at one state."""
     reduction, solution = solved.reduction, solved.solution
-    problem = reduction.problem
+    problem, scene = reduction.problem, reduction.scene
     found = tables(reduction, solution)
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
+    more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    check_possible(limits)
-    known = doubts(reduction.scene, reduction.couplings)
+    if solution.solved and solved.path is None:  # the states of a path before are kept
+        check_possible(limits, reduction.couplings)
+    known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
-        "scene": reduction.scene.name,
-        "kind": reduction.scene.kind,
-        "units": list(reduction.scene.units),
+        "scene": scene.name,
+        "kind": scene.kind,
+        "units": list(scene.units),
+        "thickness": None if scene.dim == 3 or scene.analysis.revolved else scene.thickness,
         "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
@@ -344,21 +348,10 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": said if peak is None else [*said, *_smoothed(peak, largest)],
+        "remarks": [*said, *more],
         **found,
         "limits": limits,
     }
-
-
-def _smoothed(peak: Reading, largest: float) -> list[str]:
-    """One sentence where the largest pressure at a node is not the one that is read around it."""
-    if abs(largest - peak.value) <= APART * abs(largest):
-        return []
-    return [
-        f"the largest pressure at a node is {largest:.4g}, and its"
-        f" neighbours suggest {peak.value:.4g}, give or take"
-        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
-    ]
 
 
 def _written(

@@ -105,3 +105,37 @@ def element_rows(rows, first=None, width=16) -> str:
         lines = [", ".join(words[i : i + width]) for i in range(0, len(words), width)]
         made.append(",\n".join(lines))
     return "\n".join(made)
+
+
+def bulk_data(shape: Shape, order: int, form: str) -> str:
+    """The block as bulk data of Nastran in small or large fields or with commas: the body has the
+    property 7, its lower side 8.
+    """
+    card = {"tri": "CTRIA", "quad": "CQUAD", "tet": "CTETRA", "hex": "CHEXA"}[shape.kind]
+    plane = len(shape.size) == 2
+    card += str(shape.width * order) if plane else ""
+    cards = [("GRID", n, "", *place) for n, place in shape.nodes.items()]
+    for number, own in shape.elements.items():
+        if shape.kind == "hex" and order == 2:  # the edges along z come before those above
+            own = [*own[:12], *own[16:], *own[12:16]]
+        cards.append((card, number, 7, *own))
+    skin = {2: "CBAR", 3: "CTRIA3", 4: "CQUAD4"}
+    for i, facet in enumerate(shape.facets(len(shape.size) - 1, 0)):
+        ends = [facet[0], facet[-1]] if plane else facet
+        cards.append((skin[len(ends)], 5000 + i, 8, *ends, *(["0.", "0.", "1."] * plane)))
+    return "\n".join(_card(own, form) for own in cards) + "\nENDDATA\n"
+
+
+def _card(words, form: str) -> str:
+    words = [f"{word:.6f}"[:8] if isinstance(word, float) else str(word) for word in words]
+    name, rest = words[0], words[1:]
+    if form == "commas":
+        lines = [rest[i : i + 8] for i in range(0, len(rest), 8)]
+        return "\n".join(",".join(["" if i else name, *own]) for i, own in enumerate(lines))
+    width, count, mark = (16, 4, "*") if form == "large" else (8, 8, "+")
+    lines = [rest[i : i + count] for i in range(0, len(rest), count)]
+    first = name + ("*" if form == "large" else "")
+    return "\n".join(
+        f"{mark if i else first:8}" + "".join(f"{word:{width}}" for word in own)
+        for i, own in enumerate(lines)
+    )

@@ -12,11 +12,12 @@ from conftest import MATERIAL, block, two_blocks
 
 from contactopt import InputError, Part, Plate, Rigid, Scene, Support, run
 from contactopt.accuracy import refine
-from contactopt.accuracy.corners import filled, grows, re_entrant
+from contactopt.accuracy.corners import grows
 from contactopt.accuracy.indicators import element_errors, pressure_errors, read_once
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.meshes.mesh_refinement import bent, boundary_curves
+from contactopt.readings.corners import filled, re_entrant
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.scenes.refined_scenes import split_scene

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -100,8 +101,15 @@ def bench(path: Path, out: Path, *more: str, jobs: int = 2) -> list[str]:
     return [*command, "--jobs", str(jobs), *more]
 
 
-def test_every_run_is_a_row_with_every_column(tmp_path):
-    table = run(tmp_path, SMALL)
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """The folder of a small campaign, and its table."""
+    folder = tmp_path_factory.mktemp("small")
+    return folder, run(folder, SMALL)
+
+
+def test_every_run_is_a_row_with_every_column(campaign):
+    _, table = campaign
     assert len(table) == 3 * 2 * 2 and table["key"].is_unique
     assert list(table.columns[: len(COLUMNS)]) == list(COLUMNS)
     assert set(table["status"]) == {"solved"} and table["success"].all()
@@ -122,9 +130,9 @@ def test_every_run_is_a_row_with_every_column(tmp_path):
     )
 
 
-def test_tables_survive_parquet_and_csv(tmp_path):
-    table = run(tmp_path, SMALL)
-    folder = tmp_path / "out"
+def test_tables_survive_parquet_and_csv(campaign, tmp_path):
+    folder, table = campaign
+    folder = shutil.copytree(folder / "out", tmp_path / "out")
     for name in ("rows.parquet", "rows.csv"):
         if name == "rows.csv":
             benchmark.save(table, folder / name)

@@ -7,7 +7,8 @@ from conftest import one_contact
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
 from contactopt.methods.complementarity import Lemke, complementarity_problem, lemke
 from contactopt.methods.enumeration import all_solutions
-from contactopt.problem import dimensionless
+from contactopt.methods.kernels.states import StateTree
+from contactopt.problem import Status, dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
 
 
@@ -298,11 +299,11 @@ def test_a_limit_of_nothing_is_refused():
         all_solutions(one_contact((0.8, 1.0), 1.0), limit=0)
 
 
-def redundant(seed: int) -> InterfaceProblem:
-    """A plane problem of 4 to 12 contacts whose Q has a third of the full rank."""
+def redundant(seed: int, dim: int, most: int) -> InterfaceProblem:
+    """A problem of 4 to `most` contacts whose Q has a third of the full rank."""
     rng = np.random.default_rng(seed)
-    k = int(rng.integers(4, 13))
-    B, q = rng.normal(size=(2 * k, 2 * k // 3)), rng.normal(size=(k, 2))
+    k = int(rng.integers(4, most + 1))
+    B, q = rng.normal(size=(dim * k, dim * k // 3)), rng.normal(size=(k, dim))
     q[:, 0] -= 2.0
     return InterfaceProblem(B @ B.T, q, rng.uniform(0.0, 1.0, k))
 
@@ -311,7 +312,7 @@ def test_redundant_contacts_are_solved_or_proved_to_have_no_solution():
     """The proof is compared with Lemke's method, which must not find a solution then."""
     ends = []
     for seed in range(40):
-        problem = redundant(seed)
+        problem = redundant(seed, 2, 12)
         solution = solve(problem)
         assert solution.status.label in ("solved", "infeasible"), seed
         if not solution.solved:
@@ -319,3 +320,42 @@ def test_redundant_contacts_are_solved_or_proved_to_have_no_solution():
             assert not problem.contacts < 6 or not by_brute_force(problem), seed
         ends.append(solution.proof.branches > 0 if solution.proof else solution.status.label)
     assert {"solved", True, False} <= set(ends)
+
+
+def test_redundant_contacts_in_space_are_solved_or_proved_to_have_no_solution():
+    """The proof is compared with Gauss-Seidel sweeps, which must not find a solution then."""
+    ends = []
+    for seed in range(25):
+        problem = redundant(seed, 3, 6)
+        solution = solve(problem)
+        assert solution.status.label in ("solved", "infeasible"), seed
+        if not solution.solved:
+            assert not solve(problem, "nsgs", max_iterations=300).solved, seed
+        ends.append(solution.proof.branches > 0 if solution.proof else solution.status.label)
+    assert {"solved", True} <= set(ends)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_tree_never_contradicts_a_solution_that_exists(dim):
+    """Open, sticking and slipping contacts are drawn first, and then q, so that they solve it."""
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        problem = redundant(seed, dim, 5)
+        k = problem.contacts
+        state = rng.integers(0, 3, size=k)  # open, stick, slip
+        way = rng.normal(size=(k, dim - 1))
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        r, u = np.zeros((2, k, dim))
+        r[state > 0, 0] = rng.exponential(size=(state > 0).sum())
+        share = np.where(state == 1, rng.uniform(size=k), 1.0)
+        r[:, 1:] = -(share * problem.mu * r[:, 0])[:, None] * way
+        u[state == 0] = rng.normal(size=((state == 0).sum(), dim))
+        u[:, 0] = np.abs(u[:, 0])
+        u[state == 2, 1:] = (rng.exponential(size=k)[:, None] * way)[state == 2]
+        q = u - (problem.Q @ r.ravel()).reshape(k, dim)
+        solvable = InterfaceProblem(problem.Q, q, problem.mu)
+        assert natural_map_residual(solvable, r) < 1e-12
+        tree = StateTree(dimensionless(solvable)[0])
+        assert any(tree.points()), seed
+        solution = solve(solvable)
+        assert solution.status is not Status.INFEASIBLE, seed

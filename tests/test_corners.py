@@ -92,6 +92,7 @@ def test_a_block_in_a_seat_bears_its_uniform_stress(cells, kinds, names, degree)
     assert np.all(on[normal > 0.5])
     assert np.allclose(result.pressure, np.where(normal > 0.5, 0.6, 1.0), rtol=1e-8)
     assert np.isclose(result.problem.areas.sum(), 2.0)
+    assert not any("constant pressure" in text for text in result.summary["remarks"])
 
 
 @pytest.mark.parametrize(
@@ -105,6 +106,7 @@ def test_three_faces_of_a_cube_are_three_sides(cells, kinds, degree):
     for body in result.fields:
         error = body.displacement - exact * (body.mesh.p + 1)
         assert np.abs(error).max() < 1e-8 * np.abs(exact).max()
+    assert not any("constant pressure" in text for text in result.summary["remarks"])
     axis = np.argmax(np.abs(result.reduction.frames[:, 0]), axis=1)
     assert np.allclose(result.pressure, -STRESS[3][axis], rtol=1e-7)
     assert np.isclose(result.problem.areas.sum(), 3.0)
@@ -284,3 +286,30 @@ def test_a_side_wall_bears_nothing_on_a_floor(degree):
     below = problem.coordinates[1] < 1e-9
     assert below.sum() == (5 if degree == 1 else 9)
     assert np.allclose(pressure[below], 1.0, rtol=1e-7)
+
+
+@pytest.mark.parametrize("names", [("tip", "floor"), ("floor", "tip")])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_tip_on_an_elastic_floor_has_one_contact_for_each_normal(degree, names):
+    outline = bent(60.0, 3)
+    tip = walled(outline, "quad", 2)
+    tip = replace(tip, doflocs=tip.p * [[1.0], [-1.0]] + [[0.0], [1.0]])
+    floor = box(-1.0, 1.0, 5, "quad", 2)
+    floor = replace(floor, doflocs=floor.p - [[0.0], [1.0]])
+    material = Material(E, NU)
+    load, guide = Traction("inner", (0.0, -1.0)), Support("inner", {"x": 0.0})
+    parts = (
+        Part("tip", tip, material, (guide,), (load,), contact="outer"),
+        Part("floor", floor, material, (Support("low1"),), contact="high1"),
+    )
+    result = run(Scene("tip", bodies=parts, contacts=(Contact(*names, 0.0),), degree=degree))
+    assert result.solution.solved
+    at = np.linalg.norm(result.problem.coordinates, axis=0) < 1e-9
+    assert at.sum() == (1 if names[1] == "floor" else 2)
+
+
+def test_the_peak_of_the_pressure_is_read_on_its_own_side():
+    scene = seated((4, 4), ("quad", "quad"), 2, 1, (Contact("block", "seat", 0.0),))
+    found = run(scene, figures=(), accuracy=0.01, quantity="pressure")
+    assert found.estimate.reached and found.estimate.value == pytest.approx(1.0, abs=1e-8)
+    assert not any("largest pressure" in text for text in found.summary["remarks"])

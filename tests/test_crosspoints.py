@@ -9,6 +9,8 @@ import skfem
 from turned import mirror, turn
 
 from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce_bodies, run
+from contactopt.coupling.patch_test import misfit
+from contactopt.coupling.posed import posed
 
 MATERIAL = Material(100.0, 0.3)
 KINDS = {
@@ -165,6 +167,7 @@ def uniform_and_independent(scene, stress):
     and stick do not depend on each other.
     """
     result = run(scene, figures=())
+    assert not any("constant pressure" in text for text in result.summary["remarks"])
     made = result.reduction
     frames = made.frames
     assert np.allclose(result.pressure, -np.abs(frames[:, 0]) @ stress, rtol=0, atol=1e-7)
@@ -251,6 +254,19 @@ def test_four_blocks_in_space_on_a_rough_floor(cells, degree):
     assert np.allclose(result.pressure[middle], 0.9582, rtol=0.15)
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_what_is_left_of_a_seam_passes_the_patch_test(degree):
+    flat = [seam((4, 4)), seam((4, 5)), seam((5, 4), kinds=("tri", "quad"), slant=0.3)]
+    spaces = [four_on_floor((2,) * 4), four_on_floor((2, 3, 3, 2))]
+    for scene in [*flat, *spaces, quarters((2, 3, 2, 3), ("tied", "tied"))[0]]:
+        made = posed(replace(scene, degree=degree))
+        bodies = {body.name: body for body in made.bodies}
+        for pair, own in zip(scene.pairs, made.couplings):
+            if pair.law == "tied":
+                sides = [bodies[body].surface(s) for body, s in zip(pair.bodies, pair.surfaces)]
+                assert misfit(own, sides) is None and not own.remarks
+
+
 def test_every_contact_on_the_floor_stays():
     for cells in ((6, 6), (6, 7)):
         made = reduce_bodies(seam(cells))
@@ -286,3 +302,45 @@ def test_a_tie_of_one_element_says_what_it_cannot_do():
     said = [text for text in result.summary["remarks"] if "tie 'R.x--L.x+'" in text]
     assert len(said) == 1 and "(1, 0)" in said[0]
     assert not any("tie" in text for text in run(seam((2, 2)), figures=()).summary["remarks"])
+
+
+@pytest.mark.parametrize(("held", "mu"), [({"y": 0.0}, 0.0), ({"y": 0.0}, 0.3), (None, 0.3)])
+@pytest.mark.parametrize(("cells", "degree"), [((6, 6), 1), ((6, 7), 1), ((8, 7), 1), ((6, 7), 2)])
+def test_a_seam_between_a_support_and_a_floor_is_as_one_body(cells, degree, held, mu):
+    """The support is one with the floor, so that the seam gives up its end there too."""
+
+    def force(bodies, contacts, name, degree=1):
+        made = Scene(name, bodies=bodies, contacts=contacts, degree=degree)
+        return run(made, figures=()).summary["pairs"]["R.y--floor"]["normal_force"]
+
+    guide = (Support("x-", {"x": 0.0}),) if held else ()
+    left = Part(
+        "L",
+        box((0.0, 0.0), (1.0, 1.0), (cells[0],) * 2),
+        MATERIAL,
+        (Support("y-", held), *guide),
+        (Traction("y+", (0.0, -1.5)),),
+    )
+    right = box((1.0, 0.0), (2.0, 1.0), (cells[1],) * 2)
+    right = Part("R", right, MATERIAL, (), (Traction("y+", (0.0, -1.0)),))
+    touch, tie = Contact("R:y-", "floor", mu), Contact("R:x-", "L:x+", 0.0, law="tied")
+    found = force((left, right, Rigid("floor")), (touch, tie), "two", degree)
+
+    def one(n):
+        mesh = box((0.0, 0.0), (2.0, 1.0), (2 * n, n))
+        halves = {
+            f"{name}{side}": partial(
+                lambda x, y, s: (abs(x[1] - y) < 1e-9) & (s * (x[0] - 1) > 0), y=y, s=s
+            )
+            for name, y in (("y-", 0.0), ("y+", 1.0))
+            for side, s in (("l", -1), ("r", 1))
+        }
+        halves["x-"] = lambda x: abs(x[0]) < 1e-9
+        halves["y-"] = halves.pop("y-r")
+        loads = (Traction("y+l", (0.0, -1.5)), Traction("y+r", (0.0, -1.0)))
+        supports = (Support("y-l", held), *guide)
+        part = Part("R", mesh.with_boundaries(halves), MATERIAL, supports, loads)
+        return force((part, Rigid("floor")), (touch,), "one")
+
+    # the support takes half an element of the pressure from one body: of first order
+    assert found == pytest.approx(2 * one(24) - one(12), rel=5e-3)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import skfem
-from deck_shapes import block, element_rows, node_rows
+from deck_shapes import block, bulk_data, element_rows, node_rows
 
 from contactopt import Material, Part, Rigid, Scene, Support, Traction, run
 from contactopt.errors import InputError
@@ -240,6 +240,9 @@ MEANT = {
     "skin of shells": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN, SPOS\n", 1, {"S": 1}, 8),
     "skin without a side": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN,\n", 1, {"S": 1}, 8),
     "all sides": (BRICK + "\n*SURFACE, NAME=S\nB\n", 1, {"S": 6}, 8),
+    "free sides": (
+        GROWN + "*SURFACE, NAME=S\nB,\n", 3, {"S": 8}, 8,
+    ),
     "surface in two blocks": (
         BRICK + "\n*SURFACE, NAME=S\nB, S1\n*SURFACE, NAME=s\nB, S2\n", 1, {"S": 2}, 8,
     ),
@@ -473,3 +476,53 @@ def test_facets_inside_a_body_are_told(tmp_path, caplog):
     (tmp_path / "deck.inp").write_text(GROWN + "*SURFACE, NAME=S\n1, S1\n1, S2\n")
     assert measure(load_mesh(tmp_path / "deck.inp"), "S") == pytest.approx(1.0)
     assert "1 facets of S lie inside the body" in caplog.text
+
+
+@pytest.mark.parametrize("kind", ["tri", "quad", "tet", "hex"])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("form", ["small", "large", "commas"])
+def test_bulk_data_in_every_form(tmp_path, kind, order, form):
+    shape = block(kind, order, first=11, step=2)
+    path = tmp_path / "mesh.bdf"
+    size = np.array(shape.size, dtype=float)
+    text = bulk_data(shape, order, form)
+    for head in ("", "SOL 101\nCEND\nTITLE = GRID\nBEGIN BULK\n$ nodes\n"):
+        path.write_text(head + "CELAS2,9000,1.,11,1\n" + text)
+        check(path, "7", np.prod(size), {"8": np.prod(size[:-1])}, shape.corners)
+    last = max(shape.nodes)
+    for old, new, words in (
+        ("ENDDATA", "", "it ends before ENDDATA"),
+        ("ENDDATA", "CIHEX1,9001,7,1,2,3,4,5,6\nENDDATA", "the card CIHEX1 is not known"),
+        ("ENDDATA", "GRID,9002,3,0.,0.,0.\nENDDATA", "in coordinate system 3"),
+        ("ENDDATA", "INCLUDE 'more.bdf'\nENDDATA", "INCLUDE"),
+        ("ENDDATA", "CTETRA,9003,7,11,13,15,9999\nENDDATA", "names node 9999"),
+        ("ENDDATA", f"GRID,{last},,0.,0.,0.\nENDDATA", f"node {last} is there twice"),
+        ("ENDDATA", "CTETRA,9003,7,11,13,15\nENDDATA", "CTETRA lacks some of its nodes"),
+        ("ENDDATA", "GRID,9004,,0.,x,0.\nENDDATA", "'X' is no number"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match="line [0-9]+: .*" + words):
+            load_mesh(path)
+
+
+def test_bricks_of_27_nodes_in_any_order_of_their_middles(tmp_path):
+    """Gmsh and Abaqus number the middles of the sides and of the brick in orders of their own."""
+    shape, rng = block("hex", 2, (2, 1, 1)), np.random.default_rng(0)
+    middle, sides = {}, [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7)]
+    for number, own in shape.elements.items():
+        for ends in (*sides, (0, 3, 4, 7), range(8)):
+            place = tuple(np.mean([shape.nodes[own[end]] for end in ends], axis=0))
+            middle.setdefault(place, 1000 + len(middle))
+            own.append(middle[place])
+        shape.elements[number] = [*own[:20], *rng.permutation(own[20:]).tolist()]
+    shape.nodes.update({number: place for place, number in middle.items()})
+    path = tmp_path / "deck.inp"
+    text = f"*NODE\n{node_rows(shape)}\n*ELEMENT, TYPE=C3D27, ELSET=B\n"
+    text += element_rows(shape.elements) + "\n*SURFACE, NAME=S\nB, S1\n"
+    path.write_text(text)
+    mesh = check(path, "B", 2, {"S": 2}, 12)
+    assert type(mesh) is skfem.MeshHex2
+    some = next(iter(middle.values()))
+    path.write_text(text.replace(f"\n{some}, ", f"\n{some}, 9"))
+    with pytest.raises(InputError, match="27 nodes"):
+        load_mesh(path)

@@ -14,6 +14,7 @@ KEYS = [
     "scene",
     "kind",
     "units",
+    "thickness",
     "mirrors",
     "dofs",
     "contact_nodes",

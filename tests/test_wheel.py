@@ -31,9 +31,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """Built from the source distribution of a copy of the sources, so that nothing is left behind in
-    the repository.
-    """
+    """Built from the source distribution of a copy of the sources: nothing is left behind here."""
     source = tmp_path_factory.mktemp("source")
     names = [
         *ROOT.joinpath("contactopt").rglob("*"),
@@ -77,7 +75,9 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
     assert version in wheel.name and str(tmp_path) in place
     user = tmp_path / "user.py"
-    user.write_text("import contactopt\nreveal_type(contactopt.run('punch-2d').solution.residual)\n")
+    user.write_text(
+        "import contactopt\nreveal_type(contactopt.run('punch-2d').solution.residual)\n"
+    )
     told = run(sys.executable, "-m", "mypy", "--python-executable", binaries / "python", user,
                cwd=tmp_path)  # fmt: skip
     assert '"builtins.float"' in told, "users' type checkers see the types"

@@ -16,6 +16,7 @@ from contactopt.bodies.protocol import Body
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import duals_of
 from contactopt.errors import InputError
+from contactopt.readings.corners import infinite
 from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
 from contactopt.scenes.scene import BodyForce
@@ -148,7 +149,7 @@ def _of_shape(
     return np.asarray(work - curved * energy)
 
 
-def read_once(solved: Solved, name: str) -> dict[str, float | None]:
+def read_once(solved: Solved, name: str) -> dict[str, Any]:
     """Read a quantity from a solution, with an error estimate for this mesh.
 
     Parameters
@@ -160,7 +161,7 @@ def read_once(solved: Solved, name: str) -> dict[str, float | None]:
     -------
     "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
         For a load path it is the error of the last state, after the slip that the states before it
-        found on this mesh.
+        found on this mesh. "message" is a sentence where the quantity is infinite or missing.
 
     Raises
     ------
@@ -175,8 +176,10 @@ def read_once(solved: Solved, name: str) -> dict[str, float | None]:
         errors = element_errors(last, quantity, reading.value)
         size = np.inf if errors.unsigned else errors.size
     size += reading.uncertainty
-    known = np.isfinite(size) and reading.value != 0 and not reading.missing
-    return {"value": reading.value, "error": size / abs(reading.value) if known else None}
+    message = reading.missing or infinite(solved.reduction, solved.solution, reading)
+    known = np.isfinite(size) and reading.value != 0 and not message
+    error = size / abs(reading.value) if known else None
+    return {"value": reading.value, "error": error} | ({"message": message} if message else {})
 
 
 def along_path(

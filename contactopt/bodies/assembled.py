@@ -180,6 +180,11 @@ class AssembledBody(ABC):
         """
         return None
 
+    @property
+    def held(self) -> np.ndarray:
+        """Numbers (p,) of its displacement unknowns that are prescribed."""
+        return np.zeros(0, dtype=int)
+
     def iterates(self, solver: str) -> bool:
         """Say whether a solver of linear systems works by iteration on this body.
 

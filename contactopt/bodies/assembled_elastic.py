@@ -38,6 +38,10 @@ class AssembledElastic(AssembledBody):
     def unknowns(self) -> int:
         return len(self.body.free)
 
+    @cached_property
+    def held(self) -> np.ndarray:
+        return np.setdiff1d(np.arange(len(self.body.load)), self.body.free)
+
     def iterates(self, solver: str) -> bool:
         return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
 

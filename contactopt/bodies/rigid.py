@@ -48,6 +48,11 @@ class RigidBody(UndividedBody):
     def motions(self) -> np.ndarray:
         return np.concatenate([self.shifts, 0 * self.shifts])
 
+    @property
+    def held(self) -> np.ndarray:
+        free = self.part.force or {}
+        return np.array([i for i, c in enumerate(self.components) if c not in free], dtype=int)
+
     def surface(self, name: str | None = None) -> Surface:
         raise InputError(
             f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a"

@@ -90,6 +90,8 @@ def interval(bound: Any, quantity: Quantity) -> tuple[float, float]:
         raise InputError(reason)
     state = State(scene.reduction, scene.solution)
     seeds = quantity.slopes(state)
+    if seeds.bodies and quantity.name.partition(":")[0] != ENERGY:
+        raise InputError(f"there is no bound of the {quantity.name} of a plate on a held body.")
     duals = duals_of(state, seeds)
     omega, motions = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     if seeds.multipliers is not None:

@@ -83,7 +83,8 @@ def _print_result(result: Any, out: str) -> None:
         print(f"{name}: {words}")
     for name, found in s.get("quantities", {}).items():
         error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
-        print(f"{name} {found['value']:.6g}; its relative error on this mesh: {error}")
+        said = found.get("message") or f"its relative error on this mesh: {error}"
+        print(f"{name} {found['value']:.6g}; {said}")
     for remark in s["remarks"]:
         print(f"note: {remark}")
     if (estimate := result.estimate) is not None:

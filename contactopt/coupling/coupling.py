@@ -106,7 +106,7 @@ def couple(
         why = "nodes and facets match" if free else "the contact names the side that carries it"
     for way in ways:
         try:
-            made = _tested(_kind(way)(scene, pair, upper, lower), pair, (upper, lower))
+            made = tested(_kind(way)(scene, pair, upper, lower), pair, (upper, lower))
         except InputError as error:
             if way == ways[-1]:
                 raise
@@ -120,7 +120,7 @@ def couple(
     return replace(made, why=why)
 
 
-def _tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, AssembledBody]) -> Coupling:
+def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, AssembledBody]) -> Coupling:
     """The contract of every coupling: a constant pressure gives both sides their consistent nodal
     forces. Where it does not, a remark says so.
     """

@@ -17,7 +17,8 @@ Which contacts give up:
 1. Nodes that ties join one to one become one node. A tie whose two nodes are one already, by ties
    before it, gives up. What is left of these ties joins the same nodes.
 2. A contact of a tie at its edge gives up if other contacts join its two bodies there: directly, or
-   through further bodies. A chain of contacts that have nodes in common shows that.
+   through further bodies. A chain of contacts that have nodes in common shows that. What a support
+   holds is joined to the rigid bodies that do not move.
 
 A tie that keeps fewer contacts than hold a body gives up none of them; a remark names it.
 
@@ -32,26 +33,32 @@ Puso, Laursen (2003), Mesh tying on curved interfaces in 3D, Eng. Comput. 20, 30
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import KDTree
 
+from contactopt.bodies.assembled import AssembledBody
 from contactopt.coupling.coupling import Coupling
 from contactopt.meshes.cells import joined
 from contactopt.scenes.contact import Contact
 
+_Node: TypeAlias = tuple[str, int]  # a body and the first unknown of one of its nodes
 MAIN = 0.5  # a node moves a contact mainly if its weight is more than this part of the largest one
 SAME = 1e-9  # contacts are at one place within this fraction of the size of their surface
 FLAT = 1e-6  # points are on one line within this fraction of their extent
 
 
-def independent(pairs: Sequence[Contact], couplings: Sequence[Coupling]) -> tuple[Coupling, ...]:
-    """The couplings of pairs of surfaces, of which ties gave up contacts at cross-points; a remark
-    is on those that could not.
+def independent(
+    pairs: Sequence[Contact], couplings: Sequence[Coupling], bodies: Iterable[AssembledBody]
+) -> tuple[Coupling, ...]:
+    """The couplings of pairs of surfaces of bodies, of which ties gave up contacts at cross-points;
+    a remark is on those that could not.
     """
     tied = [number for number, pair in enumerate(pairs) if pair.law == "tied"]
     if not tied:
@@ -65,7 +72,8 @@ def independent(pairs: Sequence[Contact], couplings: Sequence[Coupling]) -> tupl
         for piece in np.unique(seam.pieces)
         if len(rows := np.flatnonzero((seam.pieces == piece) & seam.left))
     ]
-    given = {number: _joined_elsewhere(seams[number], pieces) for number in tied}
+    held = {body.name: (body.held, body.meshed) for body in bodies}
+    given = {number: _joined_elsewhere(seams[number], pieces, held) for number in tied}
     return tuple(
         _reduced(seams[number], given[number]) if number in given else made
         for number, made in enumerate(couplings)
@@ -84,7 +92,7 @@ def _reduced(tie: _Seam, given: np.ndarray) -> Coupling:
             f" bodies too, near ({where}): the forces near its edge are not reliable; refine the"
             " meshes along it.",
         )
-    made = tie.made if kept.all() else _without(tie.made, kept)
+    made = tie.made if kept.all() or not kept.any() else _without(tie.made, kept)
     return replace(made, remarks=remarks)
 
 
@@ -148,7 +156,7 @@ class _Seam:
         """
         points, cells = self.made.positions.T, self.made.cells
         size = np.ptp(points, axis=0).max(initial=0.0)
-        if not len(KDTree(points).query_pairs(SAME * size)):
+        if not cells.size or not len(KDTree(points).query_pairs(SAME * size)):
             return np.zeros(len(points), dtype=int)
         mates = np.concatenate([cells[[0, i]] for i in range(1, len(cells))], axis=1)
         piece, inside = joined(mates, len(points)), np.unique(cells)
@@ -195,30 +203,28 @@ def _known_already(ties: Sequence[_Seam]) -> dict[int, np.ndarray]:
     """By the number of each tie with matching nodes, those of its contacts whose nodes ties before
     it, or contacts before them, make one node.
     """
-    ends: dict[tuple[int, int], list[tuple[tuple[str, int], ...]]] = {}
-    count: dict[tuple[str, int], int] = {}
+    ends: list[tuple[int, int, tuple[_Node, _Node]]] = []
     for tie in ties:
-        bodies = tie.pair.bodies
-        first = [_first(main) for main in tie.main]
-        for row in np.flatnonzero((first[0] >= 0) & (first[1] >= 0)).tolist():
-            ends[tie.number, row] = tuple((bodies[s], int(first[s][row])) for s in (0, 1))
-            for node in ends[tie.number, row]:
-                count[node] = count.get(node, 0) + 1
-    head: dict[tuple[str, int], tuple[str, int]] = {}
+        (upper, first), (lower, second) = zip(tie.pair.bodies, map(_first, tie.main))
+        for row in np.flatnonzero((first >= 0) & (second >= 0)).tolist():
+            nodes = (upper, int(first[row])), (lower, int(second[row]))
+            ends.append((tie.number, row, nodes))
+    count = Counter(node for *_, nodes in ends for node in nodes)
+    head: dict[_Node, _Node] = {}
 
-    def top(node: tuple[str, int]) -> tuple[str, int]:
+    def top(node: _Node) -> _Node:
         while node in head:
             node = head[node]
         return node
 
     found: dict[int, list[int]] = {}
-    for (number, row), nodes in ends.items():
+    for number, row, nodes in ends:
         if min(count[node] for node in nodes) > 1:
-            upper, lower = map(top, nodes)
-            if upper == lower:
+            one, other = map(top, nodes)
+            if one == other:
                 found.setdefault(number, []).append(row)
             else:
-                head[upper] = lower
+                head[one] = other
     return {number: np.array(rows) for number, rows in found.items()}
 
 
@@ -231,10 +237,18 @@ def _first(main: sp.csr_matrix) -> np.ndarray:
     return first
 
 
-def _joined_elsewhere(tie: _Seam, pieces: Sequence[tuple[_Seam, np.ndarray]]) -> np.ndarray:
+def _joined_elsewhere(
+    tie: _Seam,
+    pieces: Sequence[tuple[_Seam, np.ndarray]],
+    held: Mapping[str, tuple[np.ndarray, bool]],
+) -> np.ndarray:
     """The contacts of a tie whose two bodies are joined at their places by other pieces of
     surfaces, each given as a pair and some of its contacts.
+
+    What supports hold and rigid bodies that do not move are one. `held` are the prescribed unknowns
+    of each body, and whether it has a mesh.
     """
+    walls = {name: own for name, (own, meshed) in held.items() if len(own) and not meshed}
     mine, theirs = tie.pair.bodies[tie.own], tie.pair.bodies[1 - tie.own]
     own, other = tie.near[tie.own], tie.near[1 - tie.own]
     touched = np.zeros(own.shape[1])  # how many pieces move each unknown of the own body
@@ -244,23 +258,26 @@ def _joined_elsewhere(tie: _Seam, pieces: Sequence[tuple[_Seam, np.ndarray]]) ->
                 touched[np.unique(seam.near[side][rows].indices)] += 1
     found = []
     for row in np.flatnonzero(tie.edge & tie.left).tolist():
-        start = np.unique(own[row].indices)
-        if np.all(touched[start] < 2):
+        start, goal = np.unique(own[row].indices), other[row].indices
+        fixed = [np.isin(at, held[body][0]).any() for at, body in ((start, mine), (goal, theirs))]
+        if np.all(touched[start] < 2) and not fixed[0]:
             continue
         others = [(seam, rows) for seam, rows in pieces if seam is not tie or row not in rows]
-        reached = _reached(mine, start, others).get(theirs, start[:0])
-        if len(np.intersect1d(reached, other[row].indices)):
+        first = {mine: start} | (walls if fixed == [True, False] else {})
+        reached = _reached(first, others)
+        at_wall = fixed == [False, True] and not walls.keys().isdisjoint(reached)
+        if at_wall or np.isin(goal, reached.get(theirs, goal[:0])).any():
             found.append(row)
     return np.array(found, dtype=int)
 
 
 def _reached(
-    body: str, unknowns: np.ndarray, pieces: Sequence[tuple[_Seam, np.ndarray]]
+    start: Mapping[str, np.ndarray], pieces: Sequence[tuple[_Seam, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """The unknowns of each body that pieces of surfaces join to some unknowns of one body; each
+    """The unknowns of each body that pieces of surfaces join to some unknowns to start with; each
     piece is passed once in each direction.
     """
-    reached, new = {body: unknowns}, True
+    reached, new = dict(start), True
     ways = [(seam, rows, here) for seam, rows in pieces for here in (0, 1)]
     while new:
         new, left = False, []

@@ -15,6 +15,7 @@ from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
 from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
 from contactopt.errors import InputError
+from contactopt.meshes.curves import KINK
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.scene import Scene
 
@@ -48,6 +49,10 @@ def couple_surfaces(
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
     sides = _halved([_faces(body.name, mesh) for body, mesh in zip(bodies, meshes)], meshes)
     m, loose = _carried(sides, meshes, pair.carrier)
+    one = _whole_where_even(sides[m.own], m.nodes, m.normals)
+    if one is not sides[m.own]:
+        sides[m.own] = one
+        m, loose = _carried(sides, meshes, SIDES[m.own])
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
     # as well where a plane of symmetry of both cuts it.
@@ -107,6 +112,22 @@ def _per_node(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> float:
     covered = faces[seen[faces].all(axis=1)]
     count = np.asarray(W.sum(axis=0)).ravel()[covered].mean(axis=1)
     return float(count.min(initial=1.0))
+
+
+def _whole_where_even(side: Faces, nodes: np.ndarray, normals: np.ndarray) -> Faces:
+    """The surface that is not cut at a corner where its contacts, at `nodes` (k,), have nearly the
+    same normals (dim, k): a tip on a flat surface has one contact.
+    """
+    points = side.points[:, nodes]
+    _, first, own = np.unique(points, axis=1, return_index=True, return_inverse=True)
+    twin = first[own.ravel()]
+    even = np.sum(normals * normals[:, twin], axis=0) > np.cos(KINK[0])
+    even &= twin != np.arange(len(nodes))
+    if not even.any():
+        return side
+    number = np.arange(side.points.shape[1])
+    number[nodes[even]] = nodes[twin[even]]
+    return replace(side, faces=number[side.faces])
 
 
 def _mesh(surface: Surface) -> Mesh:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 EXACT = 1e-9  # relative error of a nodal force that rounding may make
 CORNERS = {"RefTri": 2, "RefQuad": 2, "RefTet": 3, "RefHex": 4}  # of a face of these elements
+GAP = 3.0  # what a gap makes of an area, over gap and curvature: 2 on a sphere, and its square
 CHORD = 4.0  # two areas and two components along normals, over 1 - c
 
 
@@ -48,7 +49,7 @@ class Misfit(NamedTuple):
 
     side   0 or 1: the upper or the lower body
     place  (dim,) the node with the largest error [length]
-    error  of the force there, over the mean force on the nodes of the faces around it
+    error  of the force there, over this force or the mean force on the nodes of a face there
     """
 
     side: int
@@ -89,7 +90,8 @@ class _Side:
     acts     (k, s) 1 where a contact acts on a node
     seen     (s,) whether any does
     normals  (dim, s) unit normals
-    error    (s,) of the normal forces, over the mean on the nodes of the faces around
+    error    (s,) of the normal forces, over them or, where it is larger, the mean on the nodes of
+             a face there
     cosine   (k,) of the angle between the normals of contacts and of their nodes
     held     (s,) whether a support holds a node along its normal
     """
@@ -110,7 +112,7 @@ class _Side:
         sign = 2.0 * number - 1  # frames have the lower body's normals
         given = sign * normal([W.T @ made.areas for W in along])
         mean = np.abs(right)[mesh.faces].mean(axis=1)
-        scale = np.zeros(len(right))
+        scale = np.abs(right)
         np.maximum.at(scale, mesh.faces, mean[:, None])
         self.error = np.abs(given - right) / np.maximum(scale, 1e-300)
         pattern = sp.csr_matrix(sum(abs(W) for W in along))
@@ -180,4 +182,4 @@ def _chords(made: Coupling, sides: list[_Side]) -> np.ndarray:
         for end in ends:
             np.maximum.at(size, end, length)
     bent = np.sqrt(2 * turn) / np.where(size > 0, size, np.inf)  # curvature
-    return np.asarray(CHORD * turn + 2 * np.abs(made.gap) * bent)
+    return np.asarray(CHORD * turn + GAP * np.abs(made.gap) * bent)

@@ -31,7 +31,7 @@ from contactopt.figures.style import (
 )
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
-from contactopt.readings.edges import contact_edge
+from contactopt.readings.edges import contact_area, contact_edge
 from contactopt.readings.half_space_readings import surface_maps
 from contactopt.scenes.scene import Scene
 
@@ -110,9 +110,8 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     line, place = contact_line(problem), contact_place(problem)
     x, p = place[line], solution.reactions[line, 0] / problem.areas[line]
     a = contact_edge(scene, problem, solution.reactions)
-    mean = (
-        solution.reactions[:, 0].sum() / scene.analysis.area(a, scene.thickness) if a > 0 else 0.0
-    )
+    area = contact_area(scene, problem, solution.reactions)
+    mean = solution.reactions[:, 0].sum() / area if area > 0 else 0.0
     scaled, mean = _about_origin(problem, solution, place, a), mean or 1.0
     unit = a if scaled else 1.0
     ax.plot(x / unit, p / mean, "o-", color=BLUE, label="contactopt")

@@ -19,7 +19,7 @@ from contactopt.errors import InputError
 
 LARGEST = 10**300
 # what tomllib says of an entry or a table that is there twice
-TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate|expand|redefine).*")
+TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate|expand|redefine)")
 MOST_BYTES = 1_000_000  # bytes of a file that people write
 TOKEN = re.compile(
     r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
@@ -188,10 +188,9 @@ def read_table(path: Path, what: str = "scene file") -> Table:
     except tomllib.TOMLDecodeError as error:
         found = re.search(r" \(at line (\d+), column \d+\)", str(error))
         line = int(found[1]) if found else text.count("\n") + 1
-        said = TWICE.sub(
-            "this name is there twice, or is that of a value and of a table",
-            re.sub(r" \(at .*\)", "", str(error)),
-        )
+        said = re.sub(r" \(at .*\)", "", str(error))
+        if TWICE.match(said):
+            said = f"this name is there twice ({said[:1].lower()}{said[1:]})"
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
         raise InputError(f"{what} '{path}' cannot be read: {type(error).__name__}.") from error

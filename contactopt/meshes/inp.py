@@ -27,6 +27,7 @@ from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
 from contactopt.meshes.inp_elements import CORNERS, FACET, dimension, kind_of, side_of
 from contactopt.meshes.inp_text import LARGEST, Block, Named, bare, blocks, set_of
+from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
 
@@ -80,6 +81,7 @@ def read_inp(path: Path) -> Any:
     }
     of_points = {n: np.searchsorted(tags, sorted(f)) for n, f in whole.node_sets.items()}
     rows = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in cells]
+    rows = [(k, in_order(points, n) if k == "hexahedron27" else n) for k, n in rows]
     return meshio.Mesh(points, rows, cell_sets=of_cells, point_sets=of_points)
 
 
@@ -359,19 +361,35 @@ class Scope:
                     if number not in self.elements:
                         word = f"element {number % LARGEST}"
                         raise block.fail(f"surface '{name}' names {word}, which is not there", line)
-                for place, (_, nodes, ids, _) in enumerate(self.blocks):
-                    own = nodes[_places(ids, members)]
-                    sides = side_of(self.types[place], label, most) if len(own) else ()
-                    if sides is None:
-                        raise block.fail(
-                            f"an element {self.types[place]} has no side"
-                            f" {label or 'that could be meant'}",
-                            line,
-                        )
-                    for side in sides:
-                        corners = own[:, list(side)]
-                        ids = new + np.arange(len(own))
-                        made.append((FACET[len(side)], corners, ids))
-                        set_of(self.element_sets, name).update(dict.fromkeys(ids.tolist()))
-                        new += len(own)
+                sides = self._sides(members, label, block, line, most)
+                for corners in sides if label else _free(sides):
+                    ids = new + np.arange(len(corners))
+                    made.append((FACET[corners.shape[1]], corners, ids))
+                    set_of(self.element_sets, name).update(dict.fromkeys(ids.tolist()))
+                    new += len(corners)
         return made
+
+    def _sides(
+        self, members: Iterable[int], label: str, block: Block, line: int, dim: int
+    ) -> list[np.ndarray]:
+        """Corners of the sides of elements that a row of a surface means."""
+        found = []
+        for place, (_, nodes, ids, _) in enumerate(self.blocks):
+            own = nodes[_places(ids, members)]
+            sides = side_of(self.types[place], label, dim) if len(own) else ()
+            if sides is None:
+                what = label or "that could be meant"
+                raise block.fail(f"an element {self.types[place]} has no side {what}", line)
+            found += [own[:, list(side)] for side in sides]
+        return found
+
+
+def _free(sides: list[np.ndarray]) -> list[np.ndarray]:
+    """Those sides that belong to one element alone, by their number of corners."""
+    made = []
+    for width in {own.shape[1] for own in sides}:
+        corners = np.concatenate([own for own in sides if own.shape[1] == width])
+        keys = np.sort(corners, axis=1)
+        _, place, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        made.append(corners[count[place.ravel()] == 1])
+    return made

@@ -15,6 +15,7 @@ PLANE = {
 }  # fmt: skip
 SOLID = {
     "4": ("tetra", 4), "10": ("tetra10", 10), "8": ("hexahedron", 8), "20": ("hexahedron20", 20),
+    "27": ("hexahedron27", 27),
     "6": ("wedge", 6), "15": ("wedge", 15), "5": ("pyramid", 5), "13": ("pyramid", 13),
 }  # fmt: skip
 CORNERS = {"wedge": 6, "pyramid": 5}

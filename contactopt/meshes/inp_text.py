@@ -71,6 +71,8 @@ class Block:
 
     def whole(self, line: int, word: str) -> int:
         """The number of a node or element, or a step between numbers."""
+        if len(word) < 10 and word.isascii() and word.isdigit():
+            return int(word)
         if re.fullmatch(r"[+-]?\d{1,10}", word, re.ASCII) and abs(int(word)) < LARGEST:
             return int(word)
         raise self.fail(f"{word[:40]!r} is no whole number below {LARGEST}", line)

@@ -3,7 +3,7 @@ proximal loop.
 
 0. Where the problem has no plates, and the package was installed with a compiler: FIRST_SWEEPS
    sweeps of the nonsmooth Gauss-Seidel method, accelerated after Anderson, if they cost little.
-   Where stages 1 and 2 fail, the sweeps go on for ten times as long. Where Q is a convolution,
+   Where stages 1 and 2 fail, the sweeps go on for twice as long. Where Q is a convolution,
    as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
@@ -13,17 +13,15 @@ proximal loop.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-   In the plane a tree over the states of the contacts looks for a solution or for such a proof
+   A tree over the states of the contacts looks for a solution or for such a proof
    (contactopt.methods.kernels.states), BRANCHES of it here, and twice as many after each round of
-   stages 6 and 7.
-4. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
-   linear systems of it.
-5. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
-6. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
+   stages 5 and 6.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
+5. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
    early says nothing of the next; then the proximal loop from the best of all points, its weight
    falling slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved
    the residual, the same again on other paths, with twice the patience.
-7. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
+6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
@@ -49,7 +47,6 @@ from contactopt.methods import NoSolution, Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.methods.kernels.gauss_seidel import Sweeps
-from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.methods.kernels.states import StateTree, can
@@ -182,7 +179,7 @@ class _Robust:
         self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
-        few = can(problem) and problem.contacts <= constants.MOST_STATES
+        few = can(problem) and problem.contacts <= constants.MOST_STATES[problem.dim]
         self.tree, self.met = StateTree(problem.explicit()) if few else None, False
         self.branches = self.tree.points() if self.tree else iter(())
 
@@ -212,21 +209,19 @@ class _Robust:
         if infeasibility(problem) is not None:  # the driver says so
             return
         yield from self.searched(constants.BRANCHES)
-        if self.conic:
-            turning = homotopy_iterates(problem, self.matrix, constants.TURNING)
-            reached = yield from self.interior(reached, turning)
-            if problem.symmetric and not self.loose:
-                reached = yield from self.cones(reached)
+        if self.conic and problem.symmetric and not self.loose:
+            reached = yield from self.cones(reached)
         yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
     def searched(self, branches: int) -> Iterator[Iterate]:
         """The points among the next branches of the tree; NoSolution if it ends without any."""
         if self.tree is None or self.tree.done:
             return
+        branches = min(branches, int(constants.BRANCH_WORK / self.problem.contacts**3))
         for found in islice(self.branches, branches):
             if found is not None:
                 self.met = True
-                yield found[:2]
+                yield from self.proximal(found[:2], constants.POLISH, constants.LEAST_ALPHA)
         if self.tree.done and not self.met:
             raise NoSolution(self.tree.proof)
 
@@ -246,11 +241,6 @@ class _Robust:
         """Paths drawn at random and the gentle proximal loop from the best point, without end."""
         problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
-            if self.conic and restarts:
-                turning = homotopy_iterates(
-                    problem, matrix, constants.TURNING * 2**restarts, random
-                )
-                reached = yield from self.interior(reached, turning)
             for _ in range(constants.PATHS if self.conic else 0):
                 path = Path.random(random, problem.contacts)
                 points = interior_iterates(problem, matrix, path)

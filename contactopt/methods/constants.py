@@ -11,7 +11,7 @@ from __future__ import annotations
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
 # Sweeps at first, and where Newton's method or the first proximal loop has failed; multiplications
 # that they may cost at first (1e6 take about a millisecond).
-FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 5000, 1e9
+FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
 SWEEPS_KEPT = 16  # last sweeps that the next one starts from
@@ -21,8 +21,9 @@ NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically
 PATIENCE = 6  # Newton steps without progress
 FEW_ENTRIES = 5000  # unknowns of an operator whose entries are asked for without progress
 PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
-BRANCHES = 300  # of the tree over the states of a plane problem, at first
-MOST_STATES = 100  # contacts up to which it is tried
+BRANCHES = 300  # of the tree over the states of the contacts, at first
+MOST_STATES = {2: 100, 3: 10}  # contacts up to which it is tried, by the dimension
+BRANCH_WORK = 3e7  # branches at a time, times the cube of the contacts, which each costs
 CONE_PROGRAMS = 5  # of the fixed point of Acary and Cadoux
 CLOSE = 1e-3  # error of an interior point from which the proximal loop finds the last digits
 LEAST_ALPHA = 1e-4  # weight with which it begins there
@@ -32,7 +33,6 @@ POLISH = 10  # proximal steps for the last digits, each so many of which must ha
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 SPARSE_ROUND = 100  # of the first of a sparse Q, where random forces lead nowhere
 PATHS = 3  # interior-point paths drawn at random before each proximal loop of a sparse Q
-TURNING = 1000  # linear systems of the first path that turns back
 EAGER_ALPHA = 1e-2  # weight with which the eager loop begins
 GENTLE_ALPHA = 0.1  # weight with which the gentle loop begins
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left

@@ -47,7 +47,7 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
     InputError : in 3D, for other laws, and for more than 24 contacts
     """
     check_number("limit", limit, low=0.0)
-    if not can(problem) or problem.contacts > MOST_CONTACTS:
+    if not can(problem) or problem.dim != 2 or problem.contacts > MOST_CONTACTS:
         raise InputError(
             f"all_solutions needs a 2D problem of Coulomb's law with at most {MOST_CONTACTS}"
             " contacts; use solve."

@@ -13,7 +13,7 @@ import numpy as np
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
 from contactopt.problem.contact_status import contact_status
-from contactopt.readings.edges import contact_zone, stick_width
+from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.scene import BodyForce, Traction
@@ -174,8 +174,8 @@ def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     """The tables of a summary. 'pairs': for each pair of surfaces its resultant, normal force
-    [force], largest pressure [stress], half-widths [length], coupling with its reason, and counts
-    of contacts. 'holders': the resultant of each support and plate.
+    [force], largest pressure [stress], area [length^2], half-widths [length], coupling with its
+    reason, and counts of contacts. 'holders': the resultant of each support and plate.
     """
     pairs = {}
     for (view, own), (name, found) in zip(
@@ -183,11 +183,13 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     ):
         problem, r = view.problem, own.reactions
         status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
+        level = is_level(problem, view.coupling.frames, r)
         pairs[name] = found.table | {
             "normal_force": float(r[:, 0].sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
-            "contact_half_width": zone[0],
-            "stick_half_width": stick_width(view, own, zone)[0],
+            "contact_area": contact_area(view.scene, problem, r),
+            "contact_half_width": zone[0] if level else None,
+            "stick_half_width": stick_width(view, own, zone)[0] if level else None,
             "coupling": view.coupling.kind,
             "coupled_because": view.coupling.why,
             "carrier": view.coupling.carrier,

@@ -7,10 +7,12 @@ factors that made the interface problem.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
@@ -28,7 +30,9 @@ BOUNDS = {
     # of the surfaces of the displaced bodies where they touch, relative to their displacement
     "misfit": 1e-3,
 }
-IMPOSSIBLE = 0.9  # strain from which on an element is squeezed to nothing
+# strains that no body has: of surfaces that overlap, which squeeze an element to nothing, and of
+# loads, which may be as small or large as their unit
+SQUEEZED, IMPOSSIBLE = 0.9, 3.0
 UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facets"}
 
 
@@ -86,7 +90,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
-        if solution.solved and known["imbalance"] > BOUNDS["imbalance"]:
+        if known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
                 f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces"
                 " on it are left over; it is so thin or so weakly held that rounding moves it."
@@ -111,21 +115,26 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         pairs[pair.name] = largest | {"misfit": misfit}
         for key in ("slip", "closure"):
             remarks += _beyond(key, f"pair '{pair.name}'", largest[key])
-        if solution.solved and misfit > BOUNDS["misfit"]:
+        if misfit > BOUNDS["misfit"]:
             remarks.append(
                 f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other"
                 f" by {misfit:.1e} of their displacement: a body is so thin or so weakly held that"
                 " rounding moves it."
             )
-    return {"bodies": bodies, "pairs": pairs}, remarks
+    # the last iterate of what was not solved says nothing of the bodies
+    return {"bodies": bodies, "pairs": pairs}, remarks if solution.solved else []
 
 
-def check_possible(limits: dict[str, Any]) -> None:
+def check_possible(limits: dict[str, Any], couplings: Sequence[Coupling]) -> None:
     """Raise InputError where a body is squeezed to nothing, and not at the tip of a corner alone,
     by the tables of validity().
     """
+    overlaps = any(
+        -own.gap.min() > SHARE * np.ptp(own.positions, axis=1).max() for own in couplings
+    )
+    most = SQUEEZED if overlaps else IMPOSSIBLE
     for name, known in limits["bodies"].items():
-        if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > IMPOSSIBLE:
+        if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > most:
             raise InputError(
                 f"no body can deform like this: the answer has a strain of {known['strain']:.3g} in"
                 f" body '{name}'; see whether E and the loads are in the same unit, whether the"

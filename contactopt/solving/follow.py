@@ -155,7 +155,7 @@ def state_of(
     now = [(own, body.external_forces(own)) for body, own in zip(reduction.bodies, U)]
     # before the first state are the unloaded bodies
     u0, r0 = (gap, 0.0) if before is None else (before.displacements, before.solution.reactions)
-    moved = [motion(reduction, U, component) for component in (0, 1)]
+    risen, shifted = (motion(reduction, U, component) for component in (0, 1))
     steps = zip(now, last or [(0 * own, 0 * force) for own, force in now])
     here = all(isinstance(own, np.ndarray) for own in U) and sum(own.size for own in U) <= KEPT
     state = State(
@@ -165,7 +165,8 @@ def state_of(
         problem.s,
         slip + earlier,
         slip[:, 1:],
-        *(np.nan if each is None else each.value for each in moved),
+        np.nan if risen is None else risen.value,
+        np.nan if shifted is None else shifted.value,
         elastic=sum(body.energy(own) for body, own in zip(reduction.bodies, U)),
         external=sum(float((F + F0) @ (own - U0)) for (own, F), (U0, F0) in steps) / 2,
         contact=-float(np.sum((r + r0) * (slip + earlier - u0))) / 2,

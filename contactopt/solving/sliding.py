@@ -40,7 +40,10 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
             continue
         V = problem.V.reshape(*problem.q.shape, -1)
         r_n = np.maximum(own.reactions[:, 0], 0.0)
-        most = problem.law.bound(r_n) @ np.linalg.norm(V[:, 1:], axis=1)
+        along = np.linalg.norm(V[:, 1:], axis=1)
+        # ties bear any friction, but nothing along a motion that does not move them
+        borne = np.broadcast_to(problem.law.bound(r_n)[:, None], along.shape)
+        most = np.multiply(borne, along, out=np.zeros_like(along), where=along > 0).sum(axis=0)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
@@ -50,13 +53,16 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
     return found
 
 
-def sliding_words(found: Sliding, scene: Scene, state: str = "", before: str = "") -> str:
-    """One sentence on a state that slides, after the state `before` if there is one."""
-    force = force_unit(scene.units)
-    most = float(f"{found.most:.3g}")
-    held = f"it held up to about {most:.6g} {force}" + (f" in {before}" if before else "")
-    last = f"; numbers and files are those of {before}" if before else ""
-    return (
-        f"{state or 'the scene'} slides, every touching contact slips: the load along"
-        f" {found.motion} is {found.load:.6g} {force}, and {held}{last}"
-    )
+def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
+    """One sentence on a state that slides, after the state `before`; without one the forces are
+    known too badly to say what friction holds.
+    """
+    force, most = force_unit(scene.units), float(f"{found.most:.3g}")
+    load = f"the load along {found.motion} is {found.load:.6g} {force}"
+    held = "more than friction holds"
+    if before:
+        held = (
+            f"and it held up to about {most:.6g} {force} in {before}; numbers and files are those"
+            f" of {before}"
+        )
+    return f"{state} slides, every touching contact slips: {load}, {held}"

@@ -231,7 +231,8 @@ def _solved(
     ranks = range(len(found), 0, -1) if doubts[0] > BEARABLE else doubts
     reduction, solution = min(zip(ranks, found), key=lambda one: (not one[1][1].solved, one[0]))[1]
     if not solution.solved and (slid := sliding(reduction.problem, solution, None)):
-        solution = replace(solution, message=sliding_words(slid, reduction.scene))
+        words = sliding_words(slid, reduction.scene, "the scene", "")
+        solution = replace(solution, message=f"{words} ({solution.message})")
     return Solved(
         _knowing(reduction, solution, options.tol), replace(solution, seconds=dict(seconds))
     )

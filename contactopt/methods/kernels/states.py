@@ -1,18 +1,21 @@
-"""Every solution of a plane problem, or a proof that there is none: a tree over the states of its
+"""Every solution of a small problem, or a proof that there is none: a tree over the states of its
 contacts.
 
-As a linear complementarity problem (contactopt.methods.complementarity) friction in the plane is
-    w = M z + q,   w, z >= 0,   and of each pair (w_i, z_i) one is zero.
-Without the last condition this is a set of linear inequalities. The tree begins with it, and each
-branch sets one side of one more pair to zero, first where both sides are largest. A branch ends
-where its inequalities contradict each other: there is a row y with y'(w - M z) = y'q in which, of
-all that is not set to zero, no term is negative on the left, and the right side is negative. This
-row is computed again from M and q. When all branches have ended so, no solution exists. Feasible
-points come from the dual simplex method without costs: each branch goes on from the tableau of the
-one before.
+The tree begins with the linear inequalities that every solution obeys: u_n >= 0, friction in its
+cone (in space, in the octagon around it), and the balance. Each branch adds what one more state
+means, first where forces and displacements are furthest from the law:
+    plane   u_n = 0 or r = 0;  u_t <= 0 or r_t = -mu r_n;  u_t >= 0 or r_t = mu r_n
+    space   u_n = 0 or r = 0;  then stick, u_t = 0, or slip in one of four arcs of directions, which
+            are halved up to HALVED times: u_t and -r_t lie between the ends of the arc, and r_t
+            between its chord and its tangents
+With unknowns x = (r, lambda), every condition is that some value a'x + b is zero or not negative. A
+branch ends where its conditions contradict each other: some combination of them has no x in it, no
+negative weight at a value that may be positive, and a negative constant. This is computed again
+from a and b. When all branches have ended so, no solution exists. Feasible points come from the
+dual simplex method without costs; each branch goes on from the tableau of the one before.
 
 Nothing is asked of Q: it may be unsymmetric, singular or indefinite. The number of branches grows
-exponentially with the contacts in the worst case.
+exponentially with the contacts in the worst case. In the plane every solution is found.
 
 Source: Farkas' lemma; Al-Khayyal (1987), An implicit enumeration procedure for the general linear
 complementarity problem.
@@ -21,36 +24,70 @@ complementarity problem.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import InterfaceOperator
-from contactopt.methods.complementarity import complementarity_problem
 from contactopt.problem import Infeasible, InterfaceProblem
 
 ZERO = 1e-9  # of a dimensionless problem: what is smaller counts as zero
-PIVOT = 1e-9  # least pivot
-EXACT = 1e-11  # relative size of what rounding leaves of a zero in a contradiction
-MARGIN = 1e-7  # least right side of a contradiction, over the size of its terms
+PIVOT = 1e-8  # least pivot
+EXACT = 1e-10  # relative size of what rounding leaves of a zero in a contradiction
+MARGIN = 1e-7  # least constant of a contradiction, over the size of its terms
 FRESH = 50  # pivots after which a tableau is made anew from the data
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
+HALVED = 4  # how often an arc of 90 degrees is halved
+FREE, SHUT, DECIDED, SLIPPING = range(4)  # what a branch says of a contact in space
 SENTENCE = (
     "whichever contacts are open, stick or slip, their forces and displacements contradict each"
     " other, so there is no solution; check the friction coefficients, the gaps and the supports."
 )
+Point = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass
 class _Branch:
-    """A tableau x_basic = T[:, -1] - T[:, :-1] x_other, and which variables (2m,) are zero."""
+    """Values A x + b, which of them are zero, and the tableau value[basic] = T[:, -1] - T[:, :-1]
+    value[other].
 
+    sides  (3 k, 2) in the plane: which sides of the pairs u_n r_n, (u_t >= 0, r_t + mu r_n),
+           (mu r_n - r_t, u_t <= 0) are zero
+    state  (k,) and arc (k, 2) [rad], in space
+    """
+
+    A: np.ndarray
+    b: np.ndarray
+    zero: np.ndarray
     T: np.ndarray
     basic: np.ndarray
     other: np.ndarray
-    zero: np.ndarray
+    sides: np.ndarray
+    state: np.ndarray
+    arc: np.ndarray
     pivots: int = 0
+
+    def child(self, zero: list[int] | None = None) -> _Branch:
+        """A branch of its own, in which these values are zero as well."""
+        own = ("zero", "T", "basic", "other", "sides", "state", "arc")
+        other = replace(self, **{name: getattr(self, name).copy() for name in own})
+        other.zero[zero or []] = True
+        return other
+
+    def add(self, a: np.ndarray, b: np.ndarray, zero: bool = False) -> None:
+        """Add values a x + b that are not negative, or zero."""
+        part = _solved(self.A[self.other], a)
+        self.T = np.vstack([self.T, np.hstack([-part, (b - part @ self.b[self.other])[:, None]])])
+        self.basic = np.append(self.basic, len(self.b) + np.arange(len(a)))
+        self.A, self.b = np.vstack([self.A, a]), np.append(self.b, b)
+        self.zero = np.append(self.zero, np.full(len(a), zero))
+
+    def remake(self) -> None:
+        """Compute the tableau again from A and b."""
+        part = _solved(self.A[self.other], self.A[self.basic])
+        right = self.b[self.basic] - part @ self.b[self.other]
+        self.T, self.pivots = np.hstack([-part, right[:, None]]), 0
 
     def pivot(self, i: int, j: int) -> None:
         T, value = self.T, self.T[i, j]
@@ -64,46 +101,65 @@ class _Branch:
         self.basic[i], self.other[j] = self.other[j], self.basic[i]
         self.pivots += 1
 
-    def values(self) -> np.ndarray:
-        x = np.zeros(len(self.zero))
-        x[self.basic] = self.T[:, -1]
-        return x
-
-    def with_zero(self, *variables: int) -> _Branch:
-        zero = self.zero.copy()
-        zero[list(variables)] = True
-        return _Branch(self.T.copy(), self.basic.copy(), self.other.copy(), zero, self.pivots)
+    def x(self) -> np.ndarray:
+        return np.linalg.lstsq(self.A[self.other], -self.b[self.other], rcond=None)[0]
 
 
-@dataclass
+def _solved(A: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """y with y A = a."""
+    return np.linalg.lstsq(A.T, a.T, rcond=None)[0].T
+
+
 class StateTree:
-    """The tree of a dimensionless plane problem of Coulomb's law.
+    """The tree of a dimensionless problem of Coulomb's law whose Q is an array.
 
-    done  whether all branches have been looked at
+    done      whether all branches have been looked at
+    branches  how many of them so far
     """
 
-    problem: InterfaceProblem
-    branches: int = 0
-    done: bool = False
-    least: float = np.inf  # least margin of the contradictions so far
-    M: np.ndarray = field(init=False)
-    q: np.ndarray = field(init=False)
-    C: np.ndarray = field(init=False)
+    def __init__(self, problem: InterfaceProblem):
+        self.problem, self.branches, self.done, self.least = problem, 0, False, np.inf
+        (k, dim), p, mu = problem.q.shape, len(problem.s), problem.mu
+        self.n = n = k * dim
+        self.unit, self.K = np.eye(n + p), np.hstack([problem.Q, problem.V])
+        self.rough = np.flatnonzero(mu > 0)
+        normal = self.unit[:n:dim]
+        bound, start = mu[:, None] * normal, self.unit.copy()
+        edges = [bound - self.unit[1:n:2]] if dim == 2 else _octagon(bound, *self._tangential())
+        for c in range(1, dim):
+            part = self.unit[c:n:dim]
+            start[c:n:dim] = np.where(mu[:, None] > 0, bound + (1 if dim == 2 else -1) * part, part)
+        rows = [self.K[::dim], np.hstack([problem.V.T, np.zeros((p, p))])]
+        rest = np.vstack(rows + [edge[self.rough] for edge in edges])
+        right = np.concatenate([problem.q[:, 0], problem.s, np.zeros(len(rest) - k - p)])
+        zero = np.zeros(n + p + len(rest), dtype=bool)
+        zero[n + p + k : n + 2 * p + k] = True  # the balance
+        for c in range(1, dim):
+            zero[dim * np.flatnonzero(mu == 0) + c] = True
+        sides = np.zeros((3, k, 2), dtype=bool)
+        sides[1, :, 1] = sides[2, :, 0] = mu == 0
+        self.root = _Branch(
+            np.vstack([start, rest]),
+            np.concatenate([np.zeros(n + p), right]),
+            zero,
+            np.zeros((len(rest), n + p + 1)),
+            n + p + np.arange(len(rest)),
+            np.arange(n + p),
+            sides.reshape(3 * k, 2),
+            np.zeros(k, dtype=int),
+            np.zeros((k, 2)),
+        )
+        self.root.remake()
 
-    def __post_init__(self) -> None:
-        self.M, self.q, self.C = complementarity_problem(self.problem)
+    def _tangential(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.unit[1 : self.n : 3], self.unit[2 : self.n : 3]
 
-    def points(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
-        """Forces (k, 2), multipliers (p,) and zero sides (3 k, 2) of each branch in which all pairs
-        have a zero side, and None after every other branch.
+    def points(self) -> Iterator[Point | None]:
+        """Forces (k, dim), multipliers (p,) and, in the plane, zero sides (3 k, 2) of each branch
+        in which all states are decided, and None after every other branch. In space it is a
+        solution, or near to one if there is any.
         """
-        k, m = self.problem.contacts, len(self.q)
-        zero = np.zeros(2 * m, dtype=bool)
-        zero[3 * k : m] = True  # the balance; its multipliers are free
-        smooth = np.flatnonzero(self.problem.mu == 0)
-        zero[[*(m + k + smooth), *(2 * k + smooth)]] = True  # x = 0 and 2 mu r_n - x = 0
-        start = _Branch(np.hstack([-self.M, self.q[:, None]]), np.arange(m), m + np.arange(m), zero)
-        waiting = [start]
+        waiting = [self.root]
         while waiting:
             check_time()
             branch = waiting.pop()
@@ -111,17 +167,12 @@ class StateTree:
             if not self.feasible(branch):
                 yield None
                 continue
-            sides = np.stack([branch.zero[: 3 * k], branch.zero[m : m + 3 * k]], axis=1)
-            if sides.any(axis=1).all():
-                yield *self.point(branch), sides
-                continue
-            w, z = branch.values()[[np.arange(3 * k), m + np.arange(3 * k)]]
-            i = int(np.argmax(np.where(sides.any(axis=1), -np.inf, np.minimum(w, z))))
-            # without pressure there is no friction either
-            still = (m + i, m + k + i, 2 * k + i) if i < k else (m + i,)
-            first, second = branch.with_zero(i), branch.with_zero(*still)
-            waiting += [first, second] if w[i] > z[i] else [second, first]
-            yield None
+            x = branch.x()
+            r, lam = x[: self.n].reshape(self.problem.q.shape), x[self.n :]
+            u = self.problem.displacements(r, lam)
+            more = (self._plane if self.problem.dim == 2 else self._space)(branch, r, u)
+            waiting += more
+            yield None if more else (r, lam, branch.sides)
         self.done = True
 
     @property
@@ -130,21 +181,82 @@ class StateTree:
         k, p = self.problem.contacts, len(self.problem.s)
         return Infeasible(np.zeros(k), np.zeros(p), self.least, SENTENCE, self.branches)
 
-    def point(self, branch: _Branch) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and multipliers of a branch, as exact as its basis allows."""
-        self.remade(branch)
-        k, z = self.problem.contacts, branch.values()[len(self.q) :]
-        z[: 3 * k] = np.maximum(z[: 3 * k], 0.0) * ~branch.zero[len(self.q) :][: 3 * k]
-        a, b = np.split(z[3 * k :], 2)
-        return (self.C @ z[: self.C.shape[1]]).reshape(k, 2), a - b
+    def _plane(self, branch: _Branch, r: np.ndarray, u: np.ndarray) -> list[_Branch]:
+        """The two branches of the pair whose sides are largest; none if all are decided."""
+        k, bound = len(r), self.problem.mu * r[:, 0]
+        w = np.concatenate([u[:, 0], u[:, 1], bound - r[:, 1]])
+        z = np.concatenate([r[:, 0], bound + r[:, 1], -u[:, 1]])
+        decided = branch.sides.any(axis=1)
+        if decided.all():
+            return []
+        pair = int(np.argmax(np.where(decided, -np.inf, np.minimum(w, z))))
+        which, i = divmod(pair, k)
+        edge = len(self.root.b) - len(self.rough) + int(np.searchsorted(self.rough, i))
+        rough = bool(self.problem.mu[i] > 0)
+        if which == 0:
+            first = branch.child([self.n + len(self.problem.s) + i])
+            second = branch.child([2 * i, 2 * i + 1] + [edge] * rough)
+            second.sides[k + i, 1] = second.sides[2 * k + i, 0] = True
+        else:
+            first, second = branch.child([edge] * (which == 2)), branch.child()
+            second.zero[2 * i + 1] |= which == 1
+            sign, bounded = (-1.0, first) if which == 1 else (1.0, second)
+            row = slice(2 * i + 1, 2 * i + 2)
+            bounded.add(sign * self.K[row], sign * self.problem.q[i, 1:])
+        first.sides[pair, 0] = second.sides[pair, 1] = True
+        return [first, second] if w[pair] > z[pair] else [second, first]
+
+    def _space(self, branch: _Branch, r: np.ndarray, u: np.ndarray) -> list[_Branch]:
+        """The branches of the contact that is furthest from the law; none at a solution, or where
+        all arcs are small.
+        """
+        mu, state = self.problem.mu, branch.state
+        speed = np.linalg.norm(u[:, 1:], axis=1)
+        along = u[:, 1:] / np.maximum(speed, 1e-300)[:, None]
+        off = np.linalg.norm(r[:, 1:] + (mu * r[:, 0])[:, None] * along, axis=1)
+        wrong = np.where(state == FREE, np.minimum(r[:, 0], u[:, 0]), 0.0)
+        wide = branch.arc[:, 1] - branch.arc[:, 0] > np.pi / 2 / 2**HALVED * 1.01
+        slips = (mu > 0) & ((state <= SHUT) | ((state == SLIPPING) & wide))
+        wrong = np.maximum(wrong, np.where(slips, np.minimum(speed, off), 0.0))
+        if wrong.max() <= ZERO:
+            return []
+        i, (low, high) = int(np.argmax(wrong)), branch.arc[int(np.argmax(wrong))]
+        if state[i] == FREE:
+            apart, shut = branch.child([3 * i, 3 * i + 1, 3 * i + 2]), branch.child()
+            shut.zero[self.n + len(self.problem.s) + i] = True
+            apart.state[i], shut.state[i] = DECIDED, SHUT
+            return [apart, shut] if r[i, 0] > u[i, 0] else [shut, apart]
+        if state[i] == SLIPPING:
+            middle = (low + high) / 2
+            return [self._slip(branch, i, arc) for arc in ((low, middle), (middle, high))]
+        stick, way = branch.child(), float(np.arctan2(u[i, 2], u[i, 1]))
+        stick.add(self.K[3 * i + 1 : 3 * i + 3], self.problem.q[i, 1:], zero=True)
+        stick.state[i] = DECIDED
+        turns = np.pi / 2 * np.array([2, 1, -1, 0])
+        arcs = [(way + turn - np.pi / 4, way + turn + np.pi / 4) for turn in turns]
+        return [self._slip(branch, i, arc) for arc in arcs] + [stick]
+
+    def _slip(self, branch: _Branch, i: int, arc: tuple[float, float]) -> _Branch:
+        """The branch in which a contact slips in a direction of the arc."""
+        other, rows = branch.child(), slice(3 * i + 1, 3 * i + 3)
+        other.state[i], other.arc[i] = SLIPPING, arc
+        ends = np.linalg.inv(np.stack([np.cos(arc), np.sin(arc)]))  # parts along both ends
+        force, bound = -ends @ self.unit[rows], self.problem.mu[i] * self.unit[3 * i]
+        chord = force.sum(axis=0) - bound
+        tangents = bound / np.cos((arc[1] - arc[0]) / 2) - force.sum(axis=0)
+        a = np.vstack([ends @ self.K[rows], force, chord, tangents])
+        other.add(a, np.concatenate([ends @ self.problem.q[i, 1:], np.zeros(4)]))
+        return other
 
     def feasible(self, branch: _Branch) -> bool:
         """Whether the branch has a point, to which its tableau is brought; True also where rounding
         leaves that open.
         """
-        m, doubtful = len(self.q), np.zeros(2 * len(self.q), dtype=bool)
-        fresh = branch.pivots > FRESH and self.remade(branch)
-        patience = branch.pivots + 5 * m
+        doubtful, fresh = np.zeros(len(branch.b), dtype=bool), branch.pivots > FRESH
+        doubtful[self.n : self.n + len(self.problem.s)] = True  # multipliers have either sign
+        if fresh:
+            branch.remake()
+        patience = branch.pivots + 5 * len(branch.basic)
         while True:
             right, fixed = branch.T[:, -1], branch.zero[branch.basic]
             wrong = np.where(fixed, np.abs(right), -right)
@@ -155,52 +267,49 @@ class StateTree:
             careful = branch.pivots > patience  # the least index cannot go round in a circle
             i = int(rows[np.argmin(branch.basic[rows])] if careful else np.argmax(wrong))
             row = branch.T[i, :-1] * (1.0 if right[i] > 0 else -1.0)
+            either = (branch.other >= self.n) & (branch.other < self.n + len(self.problem.s))
+            row = np.where(either, np.abs(row), row)
             usable = np.flatnonzero((row > PIVOT) & ~branch.zero[branch.other])
             if len(usable):
                 least = np.argmin(branch.other[usable]) if careful else np.argmax(row[usable])
                 branch.pivot(i, int(usable[least]))
             elif self.contradicts(branch, i):
                 return False
-            elif fresh or not self.remade(branch):
+            elif fresh:
                 doubtful[branch.basic[i]] = True
             else:
-                patience, fresh = 5 * m, True
+                branch.remake()
+                patience, fresh = 5 * len(branch.basic), True
 
     def contradicts(self, branch: _Branch, i: int) -> bool:
-        """Whether row i of the tableau, computed again from M and q, is a contradiction."""
-        m = len(self.q)
-        y, own = np.zeros(m), branch.other < m
-        y[branch.other[own]] = branch.T[i, :-1][own]
-        if branch.basic[i] < m:
-            y[branch.basic[i]] = 1.0
-        y *= -1.0 if y @ self.q > 0 else 1.0
-        left = np.concatenate([y, -self.M.T @ y])
-        size = np.concatenate([np.abs(y), np.abs(self.M).T @ np.abs(y)])
+        """Whether row i of the tableau, computed again from A and b, is a contradiction."""
+        y = np.zeros(len(branch.b))
+        y[branch.other], y[branch.basic[i]] = branch.T[i, :-1], 1.0
+        y *= -1.0 if y @ branch.b > 0 else 1.0
         counts = ~branch.zero
-        margin, terms = -float(y @ self.q), float(np.abs(y) @ np.abs(self.q))
-        y_rounding = EXACT * max(float(np.abs(y).max()), 1e-300)
-        if np.any(left[counts] < -EXACT * size[counts] - y_rounding) or not margin > MARGIN * terms:
+        counts[self.n : self.n + len(self.problem.s)] = False
+        y[self.n : self.n + len(self.problem.s)] = 0.0
+        largest = float(np.abs(y).max())
+        left, size = np.abs(y @ branch.A), largest * np.abs(branch.A).max(axis=0)
+        margin, terms = -float(y @ branch.b), float(np.abs(y) @ np.abs(branch.b))
+        impossible = not np.any(y[counts] < -EXACT * largest) and np.all(left <= EXACT * size)
+        if not (impossible and margin > MARGIN * terms):
             return False
         self.least = min(self.least, margin / terms)
         return True
 
-    def remade(self, branch: _Branch) -> bool:
-        """Compute the tableau again from M and q; False if its basis is singular."""
-        m = len(self.q)
-        columns = np.hstack([np.eye(m), -self.M, self.q[:, None]])
-        try:
-            branch.T = np.linalg.solve(columns[:, branch.basic], columns[:, [*branch.other, 2 * m]])
-        except np.linalg.LinAlgError:
-            return False
-        branch.pivots = 0
-        return True
+
+def _octagon(bound: np.ndarray, x: np.ndarray, y: np.ndarray) -> list[np.ndarray]:
+    """The edges of the octagon around the cone, besides bound - x and bound - y."""
+    far = np.sqrt(2.0) * bound
+    return [bound + x, bound + y, far - x - y, far + x - y, far - x + y, far + x + y]
 
 
 def can(problem: InterfaceProblem) -> bool:
     """Whether the tree takes a problem."""
     law = problem.law
     coulomb = law.unilateral and law.proportional and not law.dilatant
-    return problem.dim == 2 and coulomb and not isinstance(problem.Q, InterfaceOperator)
+    return coulomb and not isinstance(problem.Q, InterfaceOperator)
 
 
 def sides_of(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> np.ndarray:
