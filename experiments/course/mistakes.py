@@ -16,7 +16,19 @@ import numpy as np
 
 NAMES = {
     name: getattr(np, name)
-    for name in ("sqrt", "exp", "log", "log10", "sin", "cos", "tan", "arccos", "ceil", "floor")
+    for name in (
+        "sqrt",
+        "exp",
+        "log",
+        "log10",
+        "sin",
+        "cos",
+        "tan",
+        "arccos",
+        "ceil",
+        "floor",
+        "hypot",
+    )
 } | {"abs": abs, "pi": np.pi}
 OTHERS = {
     "cos": "sin",
