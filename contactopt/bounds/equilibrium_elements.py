@@ -135,19 +135,11 @@ class EquilibriumElements(Simplices):
         moments: np.ndarray,
         answer: Any = None,
     ) -> tuple[np.ndarray, float]:
-        """The stress of the head of this module that is nearest to `stress`.
+        """The stress (e, s, 4) of the head of this module that is nearest to `stress`, and the
+        largest force by which an element is out of balance over the largest force on one.
 
-        Parameters
-        ----------
-        material, stress, force, held : As for Tetrahedra.equilibrated().
-        moments : (facets, 2, 2) of the tractions on the other boundary facets, vertex by vertex,
-            with the hat functions of the edge; of r times them in bodies of revolution.
-        answer : Not needed in the plane.
-
-        Returns
-        -------
-        The stress (e, s, 4), and the largest force by which an element is out of balance over the
-        largest force on one.
+        The arguments are those of Tetrahedra.equilibrated(), but `moments` (facets, 2, 2) take the
+        hat functions of the edge, in bodies of revolution times r, and `answer` is not needed.
         """
         g, number = self._given(held, moments).ravel(), self._numbers[0]
         free = np.isnan(g)

@@ -197,16 +197,7 @@ def dense(Q: Interface) -> np.ndarray:
 
 
 def diagonal(Q: Interface) -> np.ndarray:
-    """The diagonal of Q [length / force], or the estimate of it that an operator has.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-
-    Returns
-    -------
-    (n,).
-    """
+    """The diagonal (n,) of Q [length / force], or the estimate of it that an operator has."""
     if isinstance(Q, InterfaceOperator):
         return Q.diagonal
     return np.asarray(Q.diagonal())
@@ -251,16 +242,7 @@ def eigenvalue_bound(Q: np.ndarray | sp.csr_array) -> float:
 
 
 def held(Q: Interface) -> np.ndarray:
-    """The components that cannot move, because they are coupled to no other component.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-
-    Returns
-    -------
-    (n,) mask.
-    """
+    """The mask (n,) of the components that cannot move: they are coupled to no other one."""
     if isinstance(Q, InterfaceOperator):
         return Q.held
     size = abs(Q)

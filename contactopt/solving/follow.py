@@ -66,17 +66,7 @@ def follow(
 def follow_path(
     scenes: Iterable[Scene], elements: int | None, zone: float | None, options: Options
 ) -> PathResult:
-    """Solve a load path with options for all states.
-
-    Parameters
-    ----------
-    scenes, elements, zone : as for follow(), and so are the errors
-    options : how each state is solved
-
-    Returns
-    -------
-    PathResult : the states with their solutions, in their order
-    """
+    """Solve a load path with the same options for all states; the errors are those of follow()."""
     total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
