@@ -116,16 +116,8 @@ class InterfaceOperator(LinearOperator):
     def scaled(
         self, factor: float, added: np.ndarray, counter: Counter | None = None
     ) -> InterfaceOperator:
-        """Make the operator factor Q + diag(added).
-
-        Parameters
-        ----------
-        factor, added : One number, and (n,).
-        counter : Counts its products; by default one of its own.
-
-        Returns
-        -------
-        The operator.
+        """The operator factor Q + diag(added), with added (n,); by default it counts its own
+        products.
         """
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
