@@ -87,9 +87,7 @@ def given(value: Any) -> bool:
 
 
 def check_positive(**sizes: float) -> None:
-    """Raise InputError unless every size is a positive finite number. In a name _ stands for a
-    space in the message.
-    """
+    """Raise InputError unless every size is positive and finite. The message shows _ as a space."""
     for name, value in sizes.items():
         check_number(name.replace("_", " "), value, low=0.0)
 
@@ -166,9 +164,7 @@ def meant(name: str, known: Iterable[str]) -> str:
 
 @contextmanager
 def said_once() -> Iterator[None]:
-    """Within, what is wrong with a body or a pair of bodies is said once, and not of each of its
-    meshes.
-    """
+    """Within, what is wrong with a body or a pair is said once, and not of each of its meshes."""
     said: set[Any] = set()
 
     def new(record: logging.LogRecord) -> bool:

@@ -26,9 +26,7 @@ def lame(material: Material) -> tuple[float, float]:
 
 
 def lame_by_poisson(material: Material) -> tuple[float, float]:
-    """The derivatives of Lame's parameters by Poisson's ratio [stress]; those by E are (lambda, G)
-    / E.
-    """
+    """The derivatives of lambda and G by Poisson's ratio [stress]; those by E: (lambda, G) / E."""
     E, nu = material.E, material.nu
     below = (1 + nu) * (1 - 2 * nu)
     return E / below + E * nu * (1 + 4 * nu) / below**2, -E / (2 * (1 + nu) ** 2)

@@ -107,9 +107,7 @@ def ellipse(x: np.ndarray, a: float, peak: float) -> np.ndarray:
 
 
 def check_beta(beta: float) -> None:
-    """InputError unless Dundurs' constant beta [-] is less than one in size, as for every pair of
-    materials.
-    """
+    """InputError unless Dundurs' constant beta [-] is less than one in size, as it always is."""
     check_number("Dundurs' constant beta", beta, low=-1.0, high=1.0)
 
 

@@ -105,9 +105,7 @@ class Peer:
     process: subprocess.Popen[str] | None = field(default=None, init=False)
 
     def found(self) -> tuple[str, str]:
-        """A Python that can import the solver, and the solver's version. InputError, with the line
-        that installs it, if there is none.
-        """
+        """A Python that imports the solver, and its version; InputError tells how to install it."""
         program = f"{inspect.getsource(self.version)}\nprint('VERSION', version())"
         for python in self.pythons:
             if version := _said(python, program):

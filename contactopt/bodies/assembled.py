@@ -172,9 +172,7 @@ class AssembledBody(ABC):
         return Work()
 
     def guides(self) -> Guides | None:
-        """The extent of the body, and planes that may be planes of symmetry; None for a body
-        without nodes.
-        """
+        """Its extent, and planes that may be planes of symmetry; None for a body without nodes."""
         return None
 
     @property
@@ -183,9 +181,7 @@ class AssembledBody(ABC):
         return np.zeros(0, dtype=int)
 
     def iterates(self, solver: str) -> bool:
-        """Whether a solver of linear systems (a name in SOLVERS, or 'auto') works by iteration on
-        this body.
-        """
+        """Whether a solver (a name in SOLVERS, or 'auto') works by iteration on this body."""
         return False
 
     @abstractmethod

@@ -108,7 +108,7 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def bilinear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at the
+        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at
         points.
         """
         places = np.einsum("dve,vs->des", self.mesh.p[:, self.mesh.t], self._points)
@@ -326,9 +326,7 @@ class EquilibriumElements(Simplices):
     def _divergences(
         self, own: np.ndarray, split: SplitTriangle, force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(e, m, n) and (e, m) which divergences are wanted; others follow from the balance of the
-        element.
-        """
+        """(e, m, n) and (e, m) the wanted divergences; others follow from an element's balance."""
         n, ratio = split.stress.shape[-1], self.ratio[own]
         if self.revolved:
             by_node = split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)

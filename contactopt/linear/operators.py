@@ -116,9 +116,7 @@ class InterfaceOperator(LinearOperator):
     def scaled(
         self, factor: float, added: np.ndarray, counter: Counter | None = None
     ) -> InterfaceOperator:
-        """The operator factor Q + diag(added), with added (n,); by default it counts its own
-        products.
-        """
+        """The operator factor Q + diag(added), with added (n,), and by default a new counter."""
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
             return factor * self.product(X, accuracy) + added[:, None] * X

@@ -92,9 +92,7 @@ def solvers_of(law: Law) -> list[str]:
 
 
 def default_method(settings: Mapping[str, Any]) -> str:
-    """The name of the method where none is named: `auto`, or `alternating` where the settings name
-    a backend.
-    """
+    """The method if none is named: `auto`, or `alternating` where the settings name a backend."""
     return "alternating" if settings.get("normal") or settings.get("tangential") else "auto"
 
 

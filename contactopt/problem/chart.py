@@ -74,9 +74,7 @@ class Chart:
         return self.period is not None
 
     def order(self) -> np.ndarray:
-        """The numbers (k,) of the contacts, sorted along a contact line; on a surface, along its
-        first direction.
-        """
+        """The numbers (k,) of the contacts, sorted along the first direction of the surface."""
         return np.argsort(self.places[0], kind="stable")
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:

@@ -212,9 +212,7 @@ class InterfaceProblem:
         return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
 
     def altered(self, **values: Any) -> InterfaceProblem:
-        """The same problem with other values of its fields, which are known to fit and not checked
-        again.
-        """
+        """The same problem with other values of its fields, which must fit and are not checked."""
         other = object.__new__(InterfaceProblem)
         other.__dict__.update({f.name: self.__dict__[f.name] for f in fields(self)} | values)
         return other

@@ -42,9 +42,7 @@ class Scales:
     def to_dimensionless(
         self, reactions: np.ndarray, multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Reactions (k, dim) and multipliers (p,) of the dimensionless problem: the inverse of
-        `to_physical`.
-        """
+        """Reactions (k, dim) and multipliers (p,) without units, the inverse of `to_physical`."""
         if self.stretch is not None:
             tangential = np.linalg.solve(self.stretch, reactions[:, 1:, None])[:, :, 0]
             reactions = np.column_stack([reactions[:, 0], tangential])

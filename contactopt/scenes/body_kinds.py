@@ -140,9 +140,7 @@ class Part:
         return not callable(self.mesh)
 
     def curve_of(self, boundary: str) -> Curve | None:
-        """The function that puts points (dim, m) [length] of a contact boundary on its surface, if
-        there is one.
-        """
+        """The function, if any, that puts points (dim, m) [length] of a boundary on its surface."""
         if callable(self.curve):
             found = self.curve if boundary == self.contact else None
         else:

@@ -116,9 +116,7 @@ def _next_state(
 
 
 def _ended(now: Solved, states: list[State], named: str) -> Solution:
-    """The last iterate of a state that was not solved, with a message that says where the path
-    ends.
-    """
+    """The last iterate of a state that was not solved; its message says where the path ends."""
     solution, before = now.solution, f"state {len(states)}"
     slid = sliding(now.reduction.problem, solution, states[-1].solution)
     if slid is None:

@@ -197,9 +197,7 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
 def _solved(
     reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]
 ) -> Solved:
-    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what
-    came earlier.
-    """
+    """The solution of a reduced scene, with the seconds of all that came earlier."""
     lines = progress_lines(options.note, reduction.problem, options.tol)
     if options.restart is not None:
         options.restart.begin(reduction)

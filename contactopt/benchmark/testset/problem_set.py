@@ -54,9 +54,7 @@ class Problem:
         return self.known.get("reference")
 
     def load(self) -> InterfaceProblem:
-        """Generate the problem, or read it from its file. InputError where the row of the set or
-        the file makes none.
-        """
+        """Generate the problem, or read it from its file; InputError where that makes none."""
         return self.spec.build({})
 
 

@@ -89,9 +89,7 @@ class Law:
 
     @classmethod
     def plain_coulomb(cls) -> bool:
-        """Whether the bound is mu r_n in all directions, and slip does not open the gap: Coulomb's
-        law alone.
-        """
+        """Whether the bound is mu r_n in all directions and slip does not open the gap."""
         return (
             cls.proportional and cls.frictional and cls.opens and not (cls.dilatant or cls.directed)
         )
@@ -172,9 +170,7 @@ class Law:
         raise NotImplementedError
 
     def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
-        """The nearest points (k, dim) of the set K of forces; the arguments are those of
-        `nearest_derivative`.
-        """
+        """The nearest points (k, dim) of the set K of forces; see `nearest_derivative`."""
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
@@ -227,9 +223,7 @@ class Law:
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
-        """The points y (k, dim) [force], of which those that the masks name are moved onto their
-        kinks.
-        """
+        """Points y (k, dim) [force], of which those in the masks are moved onto their kinks."""
         out = y.copy()
         out[kinks.normal, 0] = 0.0
         edge = unit(y[:, 1:]) * self.bound_along(out)[:, None]
@@ -308,9 +302,7 @@ class Law:
         return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
     def select(self, contacts: np.ndarray) -> Law:
-        """The law of some contacts alone, given by a mask (k,) or by their numbers, with
-        repetitions if wanted.
-        """
+        """The law of some contacts, given by a mask (k,) or their numbers, which may repeat."""
         return self._mapped(lambda parameter: parameter[contacts])
 
     def lumped(self, first: np.ndarray, count: int) -> Law:
