@@ -323,7 +323,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    if solution.solved:
+    if solution.solved and solved.path is None:  # the states of a path before are kept
         check_possible(limits, reduction.couplings)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]

@@ -40,7 +40,10 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
             continue
         V = problem.V.reshape(*problem.q.shape, -1)
         r_n = np.maximum(own.reactions[:, 0], 0.0)
-        most = problem.law.bound(r_n) @ np.linalg.norm(V[:, 1:], axis=1)
+        along = np.linalg.norm(V[:, 1:], axis=1)
+        # ties bear any friction, but nothing along a motion that does not move them
+        borne = np.broadcast_to(problem.law.bound(r_n)[:, None], along.shape)
+        most = np.multiply(borne, along, out=np.zeros_like(along), where=along > 0).sum(axis=0)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
